@@ -17,7 +17,7 @@ InvalidResult is internal: a run reports it as ExtensionError of the extension t
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ParamSpec, Self, TypeVar
 
@@ -288,19 +288,25 @@ def quoted(value: object, length: int = 200) -> str:
     return shortened(repr(value), length * 2)
 
 
+def most_similar(word: str, candidates: Collection[str]) -> str | None:
+    """Return the candidate that is most similar to a word; None without one, for a long word or many candidates."""
+    if len(word) > _MAX_WORD or len(candidates) > _MAX_CANDIDATES:
+        return None
+    similar = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
+    if not similar:
+        lowered = {candidate.lower(): candidate for candidate in candidates}
+        similar = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
+    return similar[0] if similar else None
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return a hint for an unknown word: the most similar of `known`, or a list of them if none is similar.
 
     To limit the cost, no similar word is searched if the word is too long or the known ones are too many.
     """
     candidates = sorted(known)
-    if len(word) <= _MAX_WORD and len(candidates) <= _MAX_CANDIDATES:
-        similar = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
-        if not similar:
-            lowered = {candidate.lower(): candidate for candidate in candidates}
-            similar = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
-        if similar:
-            return f"did you mean {similar[0]!r}?"
+    if (similar := most_similar(word, candidates)) is not None:
+        return f"did you mean {similar!r}?"
     if not candidates:
         return "none is known here"
     shown = ", ".join(shortened(name, _MAX_WORD) for name in candidates[:12])

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import MIB, absolute, is_folder, is_regular_file, read_regular_file
+from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.untrusted_xml import first_elements
 
 Kind = Literal["channels", "weather"]
@@ -101,8 +102,13 @@ def resolve_scenario(name: str | Path) -> Path:
         raise SettingError(Diagnostic(f"{quoted(str(name))} is a folder", "give one .xosc file"))
     if str(name) and os.path.exists(path):
         return path  # a pipe or a device: the reader refuses it and states what it is
-    hint = suggestion(str(name).removesuffix(SCENARIO_SUFFIX), scenarios())
+    hint = scenario_suggestion(name)
     raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", hint))
+
+
+def scenario_suggestion(name: str | Path) -> str:
+    """Return a hint for a scenario that is neither a file nor in the library: a similar file beside it or name."""
+    return file_suggestion(name, (SCENARIO_SUFFIX,), scenarios())
 
 
 def from_library(name: str | Path) -> Path:
@@ -160,7 +166,7 @@ def resolve(kind: Kind, name: str | Path) -> Path:
     if is_regular_file(inside):
         return inside
     singular = "channel profile" if kind == "channels" else "weather preset"
-    hint = suggestion(str(name), names(kind))
+    hint = file_suggestion(name, (".yaml", ".yml"), names(kind))
     raise SettingError(Diagnostic(f"no {singular} {quoted(str(name))}: neither a file nor in the library", hint))
 
 

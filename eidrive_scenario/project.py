@@ -2,6 +2,7 @@
 
     [tool.eidrive]
     pythonpath = ["."]                                  # folders with the modules of the project
+    modules = ["demo_actions"]                          # modules that register extensions by `register`
 
     [project.entry-points."eidrive_scenario.criteria"]
     keep_gap = "demo_criteria:KeepGap"
@@ -39,6 +40,31 @@ def select_project(folder: Path) -> None:
         os.environ[VARIABLE] = str(project)
 
 
+def selected_project() -> Path | None:
+    """Return the absolute folder of the selected project, or None."""
+    folder = os.environ.get(VARIABLE)
+    return Path(os.path.abspath(folder)) if folder else None
+
+
+def enter_project(folder: Path) -> str:
+    """Use the project in a folder, and make this folder the current one. Return a notice for the user, or "".
+
+    If the folder does not exist, as with a command of another machine, the project of the current folder is used.
+    Raise SettingError if there is no project.
+    """
+    notice = ""
+    if _project_in(folder) is None:
+        here = None if folder.exists() else _project_of(Path.cwd())
+        if here is None:
+            problem = "has no pyproject.toml with the table tool.eidrive" if folder.is_dir() else "no such folder"
+            raise SettingError(Diagnostic(f"--project: {problem}", "give the folder of a project", str(folder)))
+        notice = f"--project: no folder {folder}; the project of the current folder is used: {here}"
+        folder = here
+    os.chdir(folder)
+    os.environ[VARIABLE] = os.getcwd()
+    return notice
+
+
 def unused_project(path: Path) -> Path | None:
     """Return the folder of the project that contains a file, if it is another one than the selected project."""
     selected = os.environ.get(VARIABLE)
@@ -50,10 +76,25 @@ def unused_project(path: Path) -> Path | None:
     return None if is_used else project
 
 
+def conftest_above(path: Path) -> Path | None:
+    """Return the nearest `conftest.py` in the folder of a file or above, or None."""
+    try:
+        folder = path.absolute().parent
+        return next((file for one in (folder, *folder.parents) if (file := one / "conftest.py").is_file()), None)
+    except (OSError, ValueError):
+        return None
+
+
 def _project_of(folder: Path) -> Path | None:
     """Return the folder of the nearest pyproject.toml there or above, if it has the table `tool.eidrive`."""
     path = next((path for above in (folder, *folder.parents) if (path := above / _FILE).is_file()), None)
-    return path.parent if path is not None and _table(path) is not None else None
+    return None if path is None else _project_in(path.parent)
+
+
+def _project_in(folder: Path) -> Path | None:
+    """Return the folder if its pyproject.toml has the table `tool.eidrive`."""
+    path = folder / _FILE
+    return folder if path.is_file() and _table(path) is not None else None
 
 
 def project_entry_points() -> dict[str, tuple[EntryPoint, ...]]:
@@ -70,9 +111,7 @@ def entry_points_of(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
     """Return the entry points of the project in a folder as `project_entry_points`."""
     path = folder / _FILE
     content = _table(path) or {}
-    folders = content.get("tool", {}).get("eidrive", {}).get("pythonpath", [])
-    if not isinstance(folders, list) or not all(isinstance(entry, str) for entry in folders):
-        raise _error(path, f"tool.eidrive.pythonpath: {quoted(str(folders))}", 'write a list of folders, such as ["."]')
+    folders = _texts(path, content, "pythonpath", 'write a list of folders, such as ["."]')
     groups = content.get("project", {}).get("entry-points", {})
     found: dict[str, tuple[EntryPoint, ...]] = {}
     for group, points in groups.items() if isinstance(groups, dict) else ():
@@ -85,6 +124,26 @@ def entry_points_of(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
     for entry in reversed(folders):
         if (place := str((folder / entry).resolve())) not in sys.path:
             sys.path.insert(0, place)
+    return found
+
+
+@cache
+def modules_of(folder: Path) -> tuple[str, ...]:
+    """Return the names of the modules that the project in a folder imports. Raise SettingError as above."""
+    path = folder / _FILE
+    hint = 'write a list of modules, such as ["my_criteria"]'
+    names = _texts(path, _table(path) or {}, "modules", hint)
+    for name in names:
+        if not all(part.isidentifier() for part in name.split(".")):
+            raise _error(path, f"tool.eidrive.modules: {quoted(name)} is not the name of a module", hint)
+    return tuple(names)
+
+
+def _texts(path: Path, content: dict[str, Any], name: str, hint: str) -> list[str]:
+    """Return a list of texts in the table `tool.eidrive`. Raise SettingError for another value."""
+    found = content.get("tool", {}).get("eidrive", {}).get(name, [])
+    if not isinstance(found, list) or not all(isinstance(entry, str) for entry in found):
+        raise _error(path, f"tool.eidrive.{name}: {quoted(str(found))}", hint)
     return found
 
 

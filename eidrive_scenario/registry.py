@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import sys
 import traceback
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, quoted, suggestion
-from eidrive_scenario.project import entry_points_of, project_entry_points
+from eidrive_scenario.project import entry_points_of, modules_of, project_entry_points, selected_project
 
 GROUPS = (
     "actions",
@@ -155,10 +156,42 @@ def _installed(folders: tuple[str, ...]) -> dict[str, tuple[EntryPoint, ...]]:
     return {kind: tuple(found.select(group=f"eidrive_scenario.{kind}")) for kind in GROUPS}
 
 
-@cache
+_registries: dict[str, Registry] = {}
+_imported: set[Path] = set()
+"""Folders of projects whose modules are imported, or are being imported."""
+_callers: dict[tuple[str, str], set[str]] = {}
+"""Modules that registered an extension in code, by its kind and name."""
+
+
 def registry(kind: str) -> Registry:
-    """Return the registry of one kind; it is read once per process."""
-    return Registry(kind)
+    """Return the registry of one kind; it is read once per process.
+
+    The first call imports the modules that the selected project names, which may register extensions.
+    """
+    if kind not in _registries:
+        folder = selected_project()
+        if folder is not None:
+            project_entry_points()  # puts the folders of the modules on the path of imports
+            _import_modules(folder)
+        if kind not in _registries:  # a module of the project may have called this function
+            _registries[kind] = Registry(kind)
+    return _registries[kind]
+
+
+def _import_modules(folder: Path) -> None:
+    """Import the modules of a project once. Raise RegistryError if one does not import."""
+    if folder in _imported:
+        return
+    _imported.add(folder)
+    for name in modules_of(folder):
+        try:
+            importlib.import_module(name)
+        except BaseException as error:
+            _imported.discard(folder)
+            if not isinstance(error, Exception | SystemExit):
+                raise
+            text = f"{type(error).__name__}: {error} ({_raised_at(error)})"
+            raise RegistryError(f"module {name!r} of the project {folder} does not import: {text}") from error
 
 
 def register(kind: str, name: str, value: str) -> None:
@@ -174,6 +207,22 @@ def register(kind: str, name: str, value: str) -> None:
     if EntryPoint.pattern.match(value) is None or ":" not in value:
         raise RegistryError(f"extension {name!r}: {value!r} is not an object (expected package.module:Object)")
     registry(kind).add(name, value)
+    _callers.setdefault((kind, name), set()).add(sys._getframe(1).f_globals.get("__name__", ""))
+
+
+def has_unnamed_registrations() -> bool:
+    """Whether code that the selected project does not name has registered an extension, such as a `conftest.py`.
+
+    Another process, such as `eidrive run`, does not know these extensions.
+    """
+    folder = selected_project()
+    modules = () if folder is None else modules_of(folder)
+    points = {} if folder is None else entry_points_of(folder)
+    named = {(kind, point.name) for kind, several in points.items() for point in several}
+    return any(
+        key not in named and key[1] in registry(key[0]) and callers.isdisjoint(modules)
+        for key, callers in _callers.items()
+    )
 
 
 def use_project(folder: str) -> None:
@@ -184,6 +233,7 @@ def use_project(folder: str) -> None:
     for kind, points in entry_points_of(Path(folder)).items():
         for point in points if kind in GROUPS else ():
             registry(kind).add(point.name, point.value)
+    _import_modules(Path(folder))
 
 
 def distributions(used: Iterable[tuple[str, str]]) -> dict[str, str]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -32,10 +35,12 @@ def parse_settings(
     source: str = "",
     line: int | None = None,
     lines: Mapping[str, int] | None = None,
+    origins: Mapping[str, str] = MappingProxyType({}),
 ) -> S:
     """Return `data` as an instance of `model`.
 
-    lines  lines of single keys, with the paths of `key_lines`; `line` applies to all others
+    lines    lines of single keys, with the paths of `key_lines`; `line` applies to all others
+    origins  origins of values from elsewhere, such as a parameter, by these paths; an error of the value names it
 
     Raise SettingError with one diagnostic per invalid key.
     """
@@ -43,14 +48,20 @@ def parse_settings(
         settings = model.model_validate(dict(data))
     except ValidationError as error:
         details = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
-        diagnostics = [_diagnostic(model, data, detail, source, line, lines or {}) for detail in details]
+        diagnostics = [
+            _with_origins(
+                _diagnostic(model, data, detail, source, line, lines or {}), _value_path(detail, data), origins
+            )
+            for detail in details
+        ]
         raise SettingError(diagnostics) from error
     immense = next(_immense(settings), None)
     if immense is not None:
         path = _typed_path(immense[0], data)
         message = f"setting {quoted(path)} is {quoted(immense[1])}"
         hint = f"give a number within {MAX_NUMBER:g}"
-        raise SettingError(Diagnostic(message, hint, source, _line_of(immense[0], lines or {}, line)))
+        diagnostic = Diagnostic(message, hint, source, _line_of(immense[0], lines or {}, line))
+        raise SettingError(_with_origins(diagnostic, ".".join(_keys_of(immense[0], data)), origins))
     return settings
 
 
@@ -105,6 +116,30 @@ def _diagnostic(
     text = detail["msg"]
     hint = text.removeprefix("Value error, ") if kind == "value_error" else text.lower()
     return Diagnostic(message if path else "settings contradict each other", hint, source, key_line)
+
+
+def _with_origins(diagnostic: Diagnostic, path: str | None, origins: Mapping[str, str]) -> Diagnostic:
+    """Return a diagnostic with the origins of the value at a path, or of the values below it; None for no value."""
+    if path is None:
+        return diagnostic
+    named = [text for key, text in origins.items() if not path or key == path or key.startswith(f"{path}.")]
+    return replace(diagnostic, hint="; ".join([diagnostic.hint, *dict.fromkeys(named)])) if named else diagnostic
+
+
+def _value_path(detail: ErrorDetails, data: Any) -> str | None:
+    """Return the path of the keys of the user to an invalid value; None for an error about keys."""
+    if detail["type"] in ("missing", "extra_forbidden", "union_tag_not_found"):
+        return None
+    kind = [detail["ctx"]["discriminator"].strip("'")] if detail["type"] == "union_tag_invalid" else []
+    return ".".join([*_keys_of(detail["loc"], data), *kind])
+
+
+def _keys_of(loc: tuple[int | str, ...], data: Any) -> Iterator[str]:
+    """Yield the keys in `loc`, without the parts that only pydantic adds."""
+    for part in loc:
+        with suppress(LookupError, TypeError):
+            data = data[part]
+            yield str(part)
 
 
 def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:

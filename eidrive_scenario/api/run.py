@@ -6,7 +6,7 @@ Stable: all names.
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.driving.station_action import StationAction
-from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, PASSED
+from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, NOT_JUDGED, PASSED
 from eidrive_scenario.experiments.judgement import Judgement, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.statistics.sequential import success_rate
@@ -25,6 +25,7 @@ __all__ = [
     "ABORTED",
     "FAILED",
     "INVALID_INPUT",
+    "NOT_JUDGED",
     "PASSED",
     "CheckReport",
     "Frame",

@@ -9,7 +9,7 @@ from pathlib import Path
 from eidrive_scenario.checks.registry import check_rule_names, run_rules
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.rule import Level
-from eidrive_scenario.checks.scenario_checks import scenario_diagnostics
+from eidrive_scenario.checks.scenario_checks import added_sources, scenario_diagnostics
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution, load_scenario
 from eidrive_scenario.openscenario.distributions import CartesianProduct, ListedValues
@@ -59,6 +59,7 @@ class _DistributionDiagnostics:
     ) -> None:
         self._expansion = expansion
         self._ignored = ignored
+        self._added = added_sources(settings)
         self._found: dict[tuple[Level, Diagnostic], None] = {}
         self._add(Level.WARNING, expansion.warnings)
         self._found.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored, settings)))
@@ -89,7 +90,7 @@ class _DistributionDiagnostics:
         except InputError as error:
             self._add_invalid_run(error, every_value)
             return
-        for level, diagnostic in run_rules(scenario, self._ignored):
+        for level, diagnostic in run_rules(scenario, self._ignored, self._added):
             if _location(diagnostic) not in self._known_rules:
                 self._known_rules.add(_location(diagnostic))
                 self._add(level, [replace(diagnostic, message=f"in run {run.number}: {diagnostic.message}")])

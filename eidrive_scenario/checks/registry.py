@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
 
 from eidrive_scenario.checks.road_rules import ROAD_FILE_RULES, ROAD_RULES, RoadFileContext, RoadLintContext
 from eidrive_scenario.checks.rule import Level, Rule, S
@@ -15,8 +16,12 @@ ALL_RULES: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES, *ROAD_FILE_
 """All rules; each name, level and summary is defined once."""
 
 
-def run_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:
+def run_rules(
+    scenario: Scenario, ignored: Collection[str] = (), added: Iterable[str | Path] = ()
+) -> Iterator[tuple[Level, Diagnostic]]:
     """Yield the diagnostics of all rules except `ignored`; if the road file is invalid, only of rules without roads.
+
+    added  criteria and driving stacks of the run, YAML texts or files, which may refer to parameters
 
     Raise SettingError if `ignored` has an unknown name.
     """
@@ -27,7 +32,7 @@ def run_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[tup
         roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     except InputError:
         rules = RULES
-    yield from _run(rules, RoadLintContext(scenario, roads), ignored)
+    yield from _run(rules, RoadLintContext(scenario, roads, tuple(added)), ignored)
 
 
 def run_road_file_rules(roads: RoadNetwork, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:

@@ -9,12 +9,13 @@ from pathlib import Path
 from eidrive_scenario.checks.registry import check_rule_names, run_road_file_rules, run_rules
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.rule import Level
-from eidrive_scenario.driving.station_declarations import torchscript_warnings
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criteria_parser import unsupported_criteria
 from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
+from eidrive_scenario.simulation.run_outcome import HOW_TO_JUDGE, UNJUDGED
 
 
 def check_scenario(source: Source, ignored: Collection[str] = (), settings: RunSettings | None = None) -> CheckReport:
@@ -42,7 +43,7 @@ def scenario_diagnostics(
         return
     yield from ((Level.WARNING, diagnostic) for diagnostic in (*scenario.warnings, *unsupported_criteria(scenario)))
     errors: set[Diagnostic] = set()
-    for level, diagnostic in run_rules(scenario, ignored):
+    for level, diagnostic in run_rules(scenario, ignored, added_sources(settings)):
         if level is Level.ERROR:
             errors.add(replace(diagnostic, rule=""))
         yield level, diagnostic
@@ -51,9 +52,18 @@ def scenario_diagnostics(
         simulation.close()
         for diagnostic in (*simulation.progress_warnings, *simulation.start_warnings):
             yield Level.WARNING, diagnostic
-        yield from ((Level.WARNING, diagnostic) for diagnostic in torchscript_warnings(scenario))
+        if not simulation.can_be_judged:
+            hint = f"{HOW_TO_JUDGE} of `eidrive run`"
+            yield Level.NOTE, Diagnostic(UNJUDGED, hint, str(scenario.path or ""))
     except InputError as error:
         yield from (found for found in _errors(error) if found[1] not in errors)
+
+
+def added_sources(settings: RunSettings | None) -> tuple[str | Path, ...]:
+    """Return the criteria and driving stacks that settings add to a scenario, as YAML texts and files."""
+    given = settings or RunSettings()
+    stacks = (stack for stack in drive_sources(given.drive).values() if stack is not None)
+    return (*criteria_sources(given.criteria), *stacks)
 
 
 def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:

@@ -1,6 +1,7 @@
 """Command `eidrive`. Each command is imported when it is executed, as the imports of all take longer than a short one.
 
-Exit codes: 0 passed, 1 a criterion failed, 2 invalid input, 3 the run was aborted or reached its time limit.
+Exit codes: 0 passed, 1 a criterion failed, 2 invalid input, 3 the run was aborted or reached its time limit, 4 no
+criterion judges the run.
 """
 
 from __future__ import annotations
@@ -54,14 +55,22 @@ def _options(
     traceback: Annotated[
         bool, typer.Option("--traceback", envvar="EIDRIVE_TRACEBACK", help="Show the traceback of an internal error.")
     ] = False,
+    project: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Run in this folder, and use the extensions of its project."),
+    ] = None,
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Select the project of the current folder. `Guarded` and `_show_version` evaluate the options."""
-    from eidrive_scenario.project import select_project
+    """Select the project, by default that of the current folder. `Guarded` and `_show_version` evaluate the others."""
+    from eidrive_scenario.project import enter_project, select_project
 
     with suppress(FileNotFoundError):  # The current folder is deleted
+        if project is not None:
+            if notice := enter_project(project):
+                typer.echo(notice, err=True)
+            return
         select_project(Path.cwd())
 
 

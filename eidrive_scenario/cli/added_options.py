@@ -22,6 +22,7 @@ AllowTorchscript = Annotated[
         help="Load TorchScript weights, which can execute any code with your permissions.",
     ),
 ]
+NoCriteria = Annotated[bool, rare("--no-criteria", help="Accept runs that no criterion judges: they pass.")]
 Drive = Annotated[
     list[str] | None,
     typer.Option(

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
-from eidrive_scenario.exit_codes import INVALID_INPUT, PASSED
+from eidrive_scenario.exit_codes import INVALID_INPUT, NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
 
 RunSeeds = Callable[[ConcreteRun], Sequence[int]]
@@ -34,7 +34,7 @@ def run_distribution(
     numbers = range(len(expansion)) if max_runs is None else expansion.spread(max_runs)
     for warning in expansion.warnings:
         typer.secho(f"warning: {warning}", fg="yellow", err=True)
-    counts = {"passed": 0, "not passed": 0, "excluded by constraints": 0}
+    counts = {"passed": 0, "not passed": 0, "not judged": 0, "excluded by constraints": 0}
     code = 0
     last: ConstraintError | None = None
     for run in (expansion[number] for number in numbers):
@@ -46,13 +46,14 @@ def run_distribution(
             typer.secho(f"run {run.number} ({run}) is skipped: {error}", fg="yellow", err=True)
             continue
         except InputError as error:
-            if not counts["passed"] + counts["not passed"]:
+            if not counts["passed"] + counts["not passed"] + counts["not judged"]:
                 raise
             typer.echo(f"run {run.number} ({run}): {error}", err=True)
             codes = [INVALID_INPUT] * repeat
-        passed = codes.count(PASSED)
+        passed, unjudged = codes.count(PASSED), codes.count(NOT_JUDGED)
         counts["passed"] += passed
-        counts["not passed"] += len(codes) - passed
+        counts["not judged"] += unjudged
+        counts["not passed"] += len(codes) - passed - unjudged
         code = max(code, *codes)
     if last is not None and counts["excluded by constraints"] == repeat * len(numbers):
         raise ScenarioError(last.diagnostics)

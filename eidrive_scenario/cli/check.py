@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
+from eidrive_scenario.cli.added_options import AllowTorchscript, Criteria, Drive, Planner
 from eidrive_scenario.cli.error_output import print_error, print_unused_projects
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.option_values import check_seconds
+from eidrive_scenario.cli.short_help import HelpAll
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
@@ -34,10 +35,12 @@ def check(
     drive: Drive = None,
     planner: Planner = None,
     criterion: Criteria = None,
+    allow_torchscript: AllowTorchscript = False,
     wall_limit: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
     ] = None,
+    help_all: HelpAll = False,
 ) -> None:
     """Print all diagnostics of scenarios, distributions and roads as `file:line: problem; hint`.
 
@@ -49,7 +52,12 @@ def check(
     from eidrive_scenario.simulation import RunSettings
     from eidrive_scenario.simulation.added_settings import parse_drive
 
-    settings = RunSettings(drive=parse_drive("--drive", drive or []), planner=planner, criteria=criterion)
+    settings = RunSettings(
+        drive=parse_drive("--drive", drive or []),
+        planner=planner,
+        criteria=criterion,
+        allow_torchscript=allow_torchscript,
+    )
     hung = HungCheck()
     if wall_limit is not None:
         check_seconds("--wall-limit", wall_limit)

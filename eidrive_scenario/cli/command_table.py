@@ -27,7 +27,7 @@ FUNCTIONS = {
     "init": "init:init",
 }
 """Module of this package and function of each command, in the order of the help."""
-_SHORT = frozenset({"run", "sweep"})
+_SHORT = frozenset({"run", "check", "sweep"})
 """Commands with options that only `--help-all` describes."""
 
 

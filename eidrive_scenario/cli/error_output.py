@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import sys
 import traceback
@@ -13,7 +14,15 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SimulationError
+from eidrive_scenario.errors import (
+    Diagnostic,
+    EidriveError,
+    ExtensionError,
+    InputError,
+    SimulationError,
+    most_similar,
+    quoted,
+)
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
@@ -38,6 +47,7 @@ class Guarded(TyperGroup):
             raise typer.Exit(_INTERRUPTED) from error
         except (Exception, SystemExit) as error:
             if _from_typer(error):
+                _restate_choice(error)
                 raise
             # The reader, for example `head`, closed the pipe; rich replaces the error by the exit of a failed run.
             if isinstance(error.__context__ if isinstance(error, SystemExit) else error, BrokenPipeError):
@@ -46,6 +56,19 @@ class Guarded(TyperGroup):
                 raise typer.Exit(_BROKEN_PIPE) from error
             (show_traceback if ctx.params.get("traceback") else print_error)(error)
             raise typer.Exit(ABORTED) from error
+
+
+_CHOICE = re.compile(r"Value error, '(.*)' is not one of (.*)\.", re.DOTALL)
+
+
+def _restate_choice(error: BaseException) -> None:
+    """Replace the message of typer about an unknown value of a list by one with the most similar value."""
+    found = _CHOICE.fullmatch(str(getattr(error, "message", "")))
+    if found is not None:
+        word, choices = found[1], re.findall(r"'([^']*)'", found[2])
+        similar = most_similar(word, choices)
+        hint = f"known: {', '.join(choices)}" if similar is None else f"did you mean {similar!r}?"
+        error.message = f"unknown value {quoted(word)}; {hint}"  # type: ignore[attr-defined]
 
 
 def print_error(error: BaseException, what: str = "run", file: object = None) -> None:
@@ -72,19 +95,25 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
 
 
 def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
-    """Print on stderr which projects may define unknown extensions, if the extensions of these projects are not used.
+    """Print on stderr which projects and tests may define unknown extensions, if these extensions are not used.
 
     They are not imported for their files alone, because scenarios of others must not execute code.
     """
-    from eidrive_scenario.project import VARIABLE, unused_project
+    from eidrive_scenario.project import conftest_above, unused_project
     from eidrive_scenario.registry import GROUPS, singular
 
     unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model", "command"))
     sources = dict.fromkeys(one.source for one in diagnostics if one.source and one.message.startswith(unknown))
-    for folder in dict.fromkeys(unused_project(Path(source)) for source in sources):
-        if folder is not None:
-            setting = f"{VARIABLE}={shlex.quote(str(folder))}"
-            typer.echo(f"{folder}: extensions of this project are used only there, or with {setting}", err=True)
+    notices: dict[str, None] = {}
+    for path in map(Path, sources):
+        if (folder := unused_project(path)) is not None:
+            option = f"--project {shlex.quote(str(folder))}"
+            notices[f"{folder}: extensions of this project are used only there, or with eidrive {option}"] = None
+        elif (conftest := conftest_above(path)) is not None:
+            name = "modules of the table tool.eidrive in pyproject.toml"
+            notices[f"{conftest}: only pytest knows extensions that it registers; name the module in {name}"] = None
+    for notice in notices:
+        typer.echo(notice, err=True)
 
 
 def show_traceback(error: BaseException) -> None:

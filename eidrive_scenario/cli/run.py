@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Criteria, Drive, Keep, Planner, UserValues
+from eidrive_scenario.cli.added_options import (
+    AllowTorchscript,
+    Controllers,
+    Criteria,
+    Drive,
+    Keep,
+    NoCriteria,
+    Planner,
+    UserValues,
+)
 from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.live import Live, LivePort, LiveSpeed, live_view, wait_until_closed
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
@@ -58,6 +67,7 @@ def run(
     controller: Controllers = None,
     drive: Drive = None,
     criterion: Criteria = None,
+    no_criteria: NoCriteria = False,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs; seeds from --seed on.")] = 1,
     success_rate: Annotated[
@@ -171,6 +181,7 @@ def run(
         dt=dt,
         time_limit=time_limit,
         allow_torchscript=allow_torchscript,
+        no_criteria=no_criteria,
     )
 
     if success_rate is not None:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, UserValues
+from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, NoCriteria, UserValues
 from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.exit_codes import ABORTED, PASSED
+from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED, PASSED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,6 +57,7 @@ def sweep(
     user_value: UserValues = None,
     controller: Controllers = None,
     criterion: Annotated[list[str] | None, rare(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
+    no_criteria: NoCriteria = False,
     time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
     out: Annotated[
         Path | None, typer.Option(help="Folder of a subfolder per run: recording, result.json.", show_default="none")
@@ -139,6 +140,7 @@ def sweep(
         criteria=criterion,
         time_limit=time_limit,
         allow_torchscript=allow_torchscript,
+        no_criteria=no_criteria,
     )
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
     kind = definition(path)
@@ -192,7 +194,7 @@ def sweep(
         finally:
             crew.close()
     _print_summary(progress, store)
-    raise typer.Exit(PASSED if progress.is_complete else ABORTED)
+    raise typer.Exit(PASSED if progress.is_complete else NOT_JUDGED if progress.lacks_criteria_only else ABORTED)
 
 
 def _print_summary(progress: SweepProgress, store: Path) -> None:

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.evaluation import Verdict
-from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
+from eidrive_scenario.exit_codes import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
@@ -20,7 +20,12 @@ from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
 
-_OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("time limit", "bold red")}
+_OUTCOMES = {
+    PASSED: ("passed", "bold green"),
+    FAILED: ("failed", "bold red"),
+    ABORTED: ("time limit", "bold red"),
+    NOT_JUDGED: ("not judged", "bold yellow"),
+}
 
 
 class _Output(Console):

@@ -61,6 +61,7 @@ def split_planner_settings(
     source: str,
     line: int | None,
     lines: Mapping[str, int],
+    origins: Mapping[str, str],
     diagnostics: list[Diagnostic],
 ) -> tuple[dict[str, Any], PlannerSettings]:
     """Return the properties of the station without those of its planner, and the settings of the planner.
@@ -71,6 +72,7 @@ def split_planner_settings(
     data              properties of the controller
     station_settings  names of the settings of all stations, which are none of the planner
     lines             line of each property
+    origins           that of `parse_settings`
     diagnostics       list that receives all errors
     """
     rest = {key: value for key, value in data.items() if key != "planner_settings"}
@@ -90,9 +92,12 @@ def split_planner_settings(
     for key in [key for key in rest if key not in station_settings]:
         other = _model_with(key)
         if other is not None:
-            _parse(other, {key: rest.pop(key)}, source, lines.get(key, line), lines, diagnostics, incomplete=True)
+            _parse(
+                other, {key: rest.pop(key)}, source, lines.get(key, line), lines, origins, diagnostics, incomplete=True
+            )
     place = lines.get("planner_settings", lines.get("planner", line))
-    found = _parse(model, {**own, **nested}, source, place, lines, diagnostics)
+    nested_origins = {path.removeprefix("planner_settings."): text for path, text in origins.items()}
+    found = _parse(model, {**own, **nested}, source, place, lines, nested_origins, diagnostics)
     return rest, found or PlannerSettings()
 
 
@@ -102,6 +107,7 @@ def _parse(
     source: str,
     line: int | None,
     lines: Mapping[str, int],
+    origins: Mapping[str, str],
     diagnostics: list[Diagnostic],
     *,
     incomplete: bool = False,
@@ -111,7 +117,7 @@ def _parse(
     A missing setting is no error if the settings are incomplete, or if its property is invalid.
     """
     try:
-        return parse_settings(model, given, source=source, line=line, lines=lines)
+        return parse_settings(model, given, source=source, line=line, lines=lines, origins=origins)
     except SettingError as error:
         cause = error.__cause__
         if not isinstance(cause, ValidationError):

@@ -18,7 +18,7 @@ from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.properties import property_entries
-from eidrive_scenario.openscenario.values.references import resolve_references
+from eidrive_scenario.openscenario.values.references import parameter_hints, resolve_references
 from eidrive_scenario.perception.faults import MAX_FALSE_OBJECTS, FalseObject, PoseError
 from eidrive_scenario.perception.pose_noise import PoseNoise
 from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
@@ -231,6 +231,7 @@ def agent_settings(controller: Controller) -> AgentSettings:
     source = controller.source
     data: dict[str, Any] = {}
     lines: dict[str, int] = {}
+    origins: dict[str, str] = {}
     diagnostics: list[Diagnostic] = []
     for entry in property_entries(controller):
         if entry.name in data:
@@ -245,6 +246,7 @@ def agent_settings(controller: Controller) -> AgentSettings:
             message = f"property {entry.name!r} is {entry.value!r}, which is {what}"
             diagnostics.append(Diagnostic(message, "check brackets, commas and quotes", source, entry.line))
             continue
+        origins |= parameter_hints(value, entry.scope, entry.name)
         try:
             data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
         except SettingError as error:
@@ -253,7 +255,9 @@ def agent_settings(controller: Controller) -> AgentSettings:
         also = (NO_PLANNER,) if name == "planner" else ()
         if name in data and data[name] not in (*registry(kind), *also):
             diagnostics.append(registry(kind).unknown(data[name], also=also, source=source, line=lines[name]))
-    return parse_station_settings(data, source=source, line=controller.line, lines=lines, diagnostics=diagnostics)
+    return parse_station_settings(
+        data, source=source, line=controller.line, lines=lines, origins=origins, diagnostics=diagnostics
+    )
 
 
 def parse_station_settings(
@@ -262,18 +266,20 @@ def parse_station_settings(
     source: str = "",
     line: int | None = None,
     lines: Mapping[str, int] = MappingProxyType({}),
+    origins: Mapping[str, str] = MappingProxyType({}),
     diagnostics: Sequence[Diagnostic] = (),
 ) -> AgentSettings:
     """Return the settings of a station and its planner from the properties of its controller.
 
-    `lines` gives the line of each property. Raise SettingError with these diagnostics and those of invalid settings.
+    `lines` gives the line of each property, and `origins` is that of `parse_settings`. Raise SettingError with these
+    diagnostics and those of invalid settings.
     """
     found = list(diagnostics)
     station, planner_settings = split_planner_settings(
-        data, AgentSettings.model_fields, source=source, line=line, lines=lines, diagnostics=found
+        data, AgentSettings.model_fields, source=source, line=line, lines=lines, origins=origins, diagnostics=found
     )
     try:
-        settings = parse_settings(AgentSettings, station, source=source, line=line, lines=lines)
+        settings = parse_settings(AgentSettings, station, source=source, line=line, lines=lines, origins=origins)
     except SettingError as error:
         raise SettingError([*found, *error.diagnostics]) from error
     if found:

@@ -10,13 +10,11 @@ from eidrive_scenario.driving.agent_factory import build_detector, build_fusion,
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
-from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import is_built_in, registry
 from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
@@ -106,7 +104,7 @@ def declared_detectors(
     load_weights: bool = True,
     allow_torchscript: bool = False,
 ) -> dict[str, Detector]:
-    """Build the detector of every station, and load its weights if `load_weights`.
+    """Build the detector of every station, and load its weights if `load_weights`, or else check that a run may.
 
     Raise SettingError with all diagnostics of detectors, sensors, fusion methods and vehicle controllers.
     """
@@ -120,8 +118,8 @@ def declared_detectors(
         line = None if by_option else _line(controller, "detector_settings", "detector")
         try:
             found[name] = subject.call(build_detector, station, source=source, line=line)
-            if load_weights:
-                subject.call(found[name].load_weights, allow_torchscript=allow_torchscript)
+            weights = found[name].load_weights if load_weights else found[name].check_weights
+            subject.call(weights, allow_torchscript=allow_torchscript)
             source, line = controller.source, _line(controller, "sensors")
             for sensor in station.rig_sensors(found[name].needs, found[name].default_sensors).values():
                 sensor_class(sensor.kind).check_settings(sensor)
@@ -134,22 +132,6 @@ def declared_detectors(
     if diagnostics:
         raise SettingError(list(dict.fromkeys(diagnostics)))
     return found
-
-
-def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
-    """Return a warning for each controller whose detector has TorchScript weights, which a run may reject."""
-    warnings = []
-    for controller in dict.fromkeys(one for assigned in scenario.controllers.values() for one in assigned):
-        for entry in property_entries(controller) if is_agent_controller(controller) else ():
-            if entry.name != "detector_settings":
-                continue
-            given = load_yaml(entry.value, source=controller.source, line=entry.line)
-            weights = given.get("weights") if isinstance(given, dict) else None
-            if isinstance(weights, str) and Path(weights).suffix == TORCHSCRIPT_SUFFIX:
-                message = "the run is refused: its TorchScript weights can execute any code"
-                hint = f"export the model to ONNX, or allow it by --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
-                warnings.append(Diagnostic(message, hint, controller.source, entry.line))
-    return warnings
 
 
 def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:

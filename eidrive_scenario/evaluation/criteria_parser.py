@@ -26,7 +26,7 @@ from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX, criteria_of
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.openscenario.values.references import resolve_references
+from eidrive_scenario.openscenario.values.references import parameter_hints, resolve_references
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.storyboard.state.commands import CustomCommand
@@ -139,8 +139,9 @@ def declare_criteria(
     for kind, settings, lines in _items(entries, known_lines, several=isinstance(data, list)):
         here = lines.get("", line)
         try:
+            origins = parameter_hints(settings, scope)
             settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
-            declaration = _declare(kind, settings, source, here, lines)
+            declaration = _declare(kind, settings, source, here, lines, origins)
             criterion = declaration.build()
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
@@ -186,7 +187,9 @@ def _items(
         yield kind, settings, lines[path]
 
 
-def _declare(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int]) -> CriterionDeclaration:
+def _declare(
+    kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int], origins: Mapping[str, str]
+) -> CriterionDeclaration:
     known = registry("criteria")
     if kind not in known:
         raise SettingError(Diagnostic(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
@@ -197,7 +200,9 @@ def _declare(kind: str, settings: Any, source: str, line: int | None, lines: Map
         hint = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
         message = f"criterion {kind!r}: settings are not a mapping (got {settings!r})"
         raise SettingError(Diagnostic(message, hint, source, line))
-    parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
+    parsed = parse_settings(
+        criterion_type.settings_type, settings, source=source, line=line, lines=lines, origins=origins
+    )
     return CriterionDeclaration(kind, criterion_type, parsed)
 
 
@@ -269,7 +274,7 @@ def stop_trigger_declarations(scenario: Scenario) -> list[CriterionDeclaration]:
             continue
         kind, settings = translated
         settings = {"of": _ego(scenario, condition), **settings}
-        declarations.append(_declare(kind, settings, condition.source, condition.line, {}))
+        declarations.append(_declare(kind, settings, condition.source, condition.line, {}, {}))
     return declarations
 
 

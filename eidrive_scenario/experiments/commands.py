@@ -1,4 +1,8 @@
-"""Command lines that repeat runs."""
+"""Command lines that repeat runs.
+
+Paths in a command are absolute, so that it is valid in any folder. With a project (see `eidrive_scenario.project`) they
+are relative to its folder, which the command names once: after a copy of the project only this name changes.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +17,17 @@ from typing import Any
 from eidrive_scenario.library import library_path, name_of, resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.values.parameters import Assignment
+from eidrive_scenario.project import selected_project
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run import RunResult, RunSettings
 from eidrive_scenario.v2x.profile import SUFFIXES
 
 
 def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
-    """Return the `eidrive run` command that repeats a run, quoted for a shell.
-
-    scenario  file of the scenario; paths are absolute, so that the command is valid in any folder
-    """
+    """Return the `eidrive run` command that repeats a run, quoted for a shell."""
     defaults = RunSettings()
-    words: list[str] = ["eidrive", "run", _scenario(scenario)]
+    project = selected_project()
+    words = ["eidrive", *([] if project is None else ["--project", str(project)]), "run", _scenario(scenario)]
     for option, value in (
         ("--channel", _channel(settings.channel)),
         ("--detector", settings.detector),
@@ -51,6 +54,7 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
     ):
         words += [] if number == default else [option, repr(float(number))]
     words += ["--allow-torchscript"] if settings.allow_torchscript else []
+    words += ["--no-criteria"] if settings.no_criteria else []
     return shlex.join(words)
 
 
@@ -78,11 +82,22 @@ def reproduction_lines(result: RunResult) -> list[str]:
 def _scenario(path: Path) -> str:
     name = name_of(path)
     in_library = path.resolve() == (library_path() / f"{name}.xosc").resolve()
-    return name if in_library and not os.path.exists(name) else os.path.abspath(path)
+    if in_library and not os.path.exists(os.path.join(selected_project() or "", name)):
+        return name
+    return _path(path)
+
+
+def _path(path: str | Path) -> str:
+    """Return the absolute path, or the path from the folder of the project for a file below it."""
+    full, project = Path(os.path.abspath(path)), selected_project()
+    if project is None or not full.is_relative_to(project):
+        return str(full)
+    relative = full.relative_to(project).as_posix()
+    return f"./{relative}" if relative.startswith("-") else relative
 
 
 def _channel(value: Any) -> str | None:
-    """Return an inline profile as JSON, the name of a profile, or the absolute path of its file."""
+    """Return an inline profile as JSON, the name of a profile, or the path of its file."""
     if isinstance(value, Mapping):
         return json.dumps(value)
     return _file_or_name(value) if value is None or Path(value).suffix in SUFFIXES else str(value)
@@ -91,7 +106,7 @@ def _channel(value: Any) -> str | None:
 def _file_or_name(value: str | Path | None) -> str | None:
     if value is None:
         return None
-    return os.path.abspath(value) if os.path.isfile(value) else str(value)
+    return _path(value) if os.path.isfile(value) else str(value)
 
 
 def _assignments(option: str, values: Mapping[str, str | Assignment]) -> list[str]:

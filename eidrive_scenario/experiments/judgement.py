@@ -31,7 +31,7 @@ from eidrive_scenario.simulation.recorded_outcome import (
     recorded_context,
     recorded_outcome,
 )
-from eidrive_scenario.simulation.run_outcome import criteria_metrics, exit_code_of
+from eidrive_scenario.simulation.run_outcome import UNJUDGED, criteria_metrics, exit_code_of
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 INCOMPLETE = "the recording is incomplete"
@@ -59,7 +59,7 @@ class Judgement:
 
     @property
     def passed(self) -> bool:
-        """True if all criteria passed, and the run ended before its time limit."""
+        """True if all criteria passed, and the run ended before its time limit; False without criteria."""
         return self.exit_code == PASSED
 
     def as_json(self) -> dict[str, Any]:
@@ -170,7 +170,8 @@ class _Judge:
         verdicts += [] if self._exit is None else [self._exit]
         end = INCOMPLETE if outcome is None else outcome.end_reason
         code = exit_code_of(verdicts, end)
-        warnings = [f"the recording is damaged: {line}" for line in damage]
+        warnings = [] if verdicts else [f"{UNJUDGED}; give one by --criterion, such as '{{collision: {{of: Ego}}}}'"]
+        warnings += [f"the recording is damaged: {line}" for line in damage]
         if self._own and outcome is not None and not damage:
             warnings += _differences(verdicts, outcome.criteria)
         return Judgement(
@@ -178,7 +179,7 @@ class _Judge:
             self._recording.scenario,
             self._recording.seed,
             end,
-            max(code, ABORTED) if damage or outcome is None else code,
+            ABORTED if damage or outcome is None else code,
             tuple(verdicts),
             criteria_metrics(self._criteria),
             self._last.view.time,

@@ -81,7 +81,8 @@ def run_of(job: Job) -> SceneRun:
 
 
 def _passed(result: RunResult, name: str) -> bool:
-    return all(verdict.passed for verdict in result.criteria if verdict.name == name)
+    """Whether the run has a criterion of this name, and it passed."""
+    return [verdict.passed for verdict in result.criteria if verdict.name == name] == [True]
 
 
 def _hardest_braking(speeds: Array, dt: float) -> float:

@@ -75,7 +75,7 @@ def run_and_save(
     log           file for one line per storyboard transition with its reason; `-` is standard output
     explanations  explanations that observe the run
     observers     further observers of the run
-    command       command line that repeats the run of a scenario without a file
+    command       command line that repeats the run; by default that of `eidrive run` for a scenario with a file
     wall_limit    limit of the wall time of loading and run [s]
 
     An aborted or interrupted run leaves `recording.partial.mcap` and a `.partial` table. Its exception has notes with
@@ -87,7 +87,7 @@ def run_and_save(
     settings = settings or RunSettings()
     seed = checked_seed(seed)
     kept = record_mode(record)
-    command = command_of_source(source, seed, settings) or command
+    command = command or command_of_source(source, seed, settings)
     recording: Path | None = None
     simulation: Simulation | None = None
     try:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED
 from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval
 from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest
@@ -47,15 +47,15 @@ def decision_text(test: RatioTest, decision: Decision, rate: Proportion) -> str:
 def decide_rate(run: Callable[[int], RunResult], test: RatioTest, *, first_seed: int = 1) -> RateVerdict:
     """Return the verdict on the success rate of a run, which is called with one seed after the other.
 
-    An exception of a run ends the test. Raise SimulationError for a run that ends at its time limit before a criterion
-    has failed, as it has no verdict.
+    An exception of a run ends the test. Raise SimulationError for a run without a verdict: it ended at its time limit
+    before a criterion failed, or no criterion judges it.
     """
     failures: list[RunResult] = []
     trials = 0
     decision = None
     while decision is None:
         result = run(first_seed + trials)
-        if result.exit_code == ABORTED:
+        if result.exit_code in (ABORTED, NOT_JUDGED):
             raise _without_verdict(result)
         trials += 1
         if not result.passed:
@@ -66,7 +66,9 @@ def decide_rate(run: Callable[[int], RunResult], test: RatioTest, *, first_seed:
 
 
 def _without_verdict(result: RunResult) -> SimulationError:
-    text = f"seed {result.seed}: ended by its {result.end_reason} after {result.simulated_s:.2f} s"
+    is_unjudged = result.exit_code == NOT_JUDGED
+    reason = result.warnings[0] if is_unjudged else f"ended by its {result.end_reason} after {result.simulated_s:.2f} s"
+    text = f"seed {result.seed}: {reason}"
     error = SimulationError(text)
     for note in (*result.final_state, *reproduction_lines(result)):
         error.add_note(note)

@@ -13,6 +13,7 @@ import yaml
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.yaml_text import MAX_DEPTH, load_yaml, load_yaml_file
 
 _INLINE = ("{", "[", "\n", ": ")
@@ -55,7 +56,9 @@ def read_yaml_source(source: str | Path, *, option: str) -> YamlContent:
     path = Path(source)
     if not is_regular_file(path):
         message = f"no file {quoted(str(source))}"
-        raise SettingError(Diagnostic(message, "give the path of a YAML file, or a mapping {key: value}", option))
+        otherwise = "give the path of a YAML file, or a mapping {key: value}"
+        hint = file_suggestion(path, (".yaml", ".yml"), otherwise=otherwise)
+        raise SettingError(Diagnostic(message, hint, option))
     data, lines = load_yaml_file(path)
     return YamlContent(data, str(path), lines)
 

@@ -12,6 +12,7 @@ from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
+from eidrive_scenario.exit_codes import NOT_JUDGED
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.world.view import WorldView
@@ -26,7 +27,7 @@ class RewardSettings(Settings):
     time_to_collision  max(0, 1 - TTC / ttc_limit) times the duration [s]; TTC is the smallest one to any other actor
     communication      size of the sent messages [kB]
     time               duration [s]
-    passed, failed     1 at the end of the run if it has passed or not
+    passed, failed     1 at the end of the run if it has passed or not; both 0 if no criterion judges it
     criteria           by the name of a criterion: 1 at the end of the run if it has passed
     ttc_limit          time to collision from which on there is no term for it [s]
     """
@@ -105,5 +106,5 @@ class Rewards:
         weights = self.settings
         terms = {f"criteria.{name}": weight * verdicts[name] for name, weight in weights.criteria.items()}
         terms["passed"] = weights.passed * result.passed
-        terms["failed"] = weights.failed * (not result.passed)
+        terms["failed"] = weights.failed * (not result.passed and result.exit_code != NOT_JUDGED)
         return terms

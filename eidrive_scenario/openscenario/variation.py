@@ -20,7 +20,7 @@ from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, qu
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
-from eidrive_scenario.openscenario.values.references import hide_parameters, resolve_references
+from eidrive_scenario.openscenario.values.references import hide_parameters, parameter_hints, resolve_references
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.settings import Settings, parse_settings
 
@@ -123,8 +123,9 @@ class _Specification(msgspec.Struct, frozen=True):
         prefix = f"{self.name}."
         own = {path.removeprefix(prefix): line for path, line in self.lines.items() if path.startswith(prefix)}
         scope = hide_parameters(self.command.scope, drawn)
+        origins = parameter_hints(self.bounds, scope)
         bounds = resolve_references(self.bounds, scope, source=source, line=self.line, lines=own)
-        return parse_settings(Distribution, bounds, source=source, line=self.line, lines=own)
+        return parse_settings(Distribution, bounds, source=source, line=self.line, lines=own, origins=origins)
 
 
 def _specifications(scenario: Scenario, command: CustomCommandAction) -> Iterator[_Specification]:

@@ -62,6 +62,9 @@ class Detector(ABC):
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
     """Detections in the last image of each camera, for detectors that process images; recorded with the boxes."""
 
+    def check_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - an optional hook
+        """Raise SettingError if `load_weights` would refuse its data without reading it, as `eidrive check` reports."""
+
     def load_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - an optional hook
         """Load the data that the detector computes with, such as the weights of a network.
 

@@ -18,6 +18,7 @@ from eidrive_scenario.pytest_plugin.options import (
     pytest_addoption,
     pytest_configure,
     pytest_configure_node,
+    pytest_load_initial_conftests,
     pytest_report_header,
 )
 from eidrive_scenario.pytest_plugin.run_records import pytest_runtest_makereport, pytest_runtest_setup
@@ -30,6 +31,7 @@ __all__ = [
     "pytest_configure_node",
     "pytest_generate_tests",
     "pytest_handlecrashitem",
+    "pytest_load_initial_conftests",
     "pytest_report_header",
     "pytest_runtest_makereport",
     "pytest_runtest_setup",

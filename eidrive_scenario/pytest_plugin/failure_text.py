@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
-from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED
 from eidrive_scenario.files.encodable import encodable
 
 if TYPE_CHECKING:
@@ -44,21 +44,22 @@ def explain(result: RunResult) -> str:
     from eidrive_scenario.experiments.commands import reproduction_lines
 
     run = "" if result.run is None else f"run {result.run} of "
-    head = f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}"
+    outcome = "is not judged" if result.exit_code == NOT_JUDGED else "failed"
+    head = f"{run}{result.scenario} {outcome} with channel {result.channel}, seed {result.seed}"
     return "\n".join([head, *reasons(result), *result.final_state, *reproduction_lines(result)])
 
 
 def reasons(result: RunResult) -> list[str]:
-    """Return a line for each failed criterion, and for the end by the limit of simulated time."""
+    """Return a line for each failed criterion, and for a run without a verdict its reason."""
     lines = [_reason(verdict) for verdict in result.criteria if not verdict.passed]
-    if not lines or is_out_of_time(result):
-        lines.append(f"ended by its {result.end_reason} after {result.simulated_s:.2f} s")
+    if not lines or has_no_verdict(result):
+        lines.append(_reason_without_verdict(result))
     return lines
 
 
-def is_out_of_time(result: RunResult | RateVerdict) -> bool:
-    """Whether a single run has reached its limit of simulated time, and no criterion has failed until then."""
-    return getattr(result, "exit_code", None) == ABORTED
+def has_no_verdict(result: RunResult | RateVerdict) -> bool:
+    """Whether a single run has reached its limit of simulated time before a criterion failed, or has no criterion."""
+    return getattr(result, "exit_code", None) in (ABORTED, NOT_JUDGED)
 
 
 def failures_of(result: RunResult | RateVerdict) -> list[RunResult]:
@@ -68,6 +69,17 @@ def failures_of(result: RunResult | RateVerdict) -> list[RunResult]:
     if result.passed:
         return []
     return [result] if isinstance(result, RunResult) else list(result.failures[:_SHOWN_FAILURES])
+
+
+def _reason_without_verdict(result: RunResult) -> str:
+    if result.exit_code == NOT_JUDGED:
+        from eidrive_scenario.simulation.run_outcome import UNJUDGED
+
+        return (
+            f"{UNJUDGED}; add one to the scenario or by --eidrive-criterion '{{collision: {{of: Ego}}}}', or set the "
+            "ini option eidrive_without_criteria to warn or pass"
+        )
+    return f"ended by its {result.end_reason} after {result.simulated_s:.2f} s"
 
 
 def _reason(verdict: Verdict) -> str:

@@ -13,7 +13,7 @@ from eidrive_scenario.pytest_plugin.failure_text import (
     explain_outcome,
     failure_text,
     failures_of,
-    is_out_of_time,
+    has_no_verdict,
 )
 from eidrive_scenario.pytest_plugin.markers import keywords, run_markers
 from eidrive_scenario.pytest_plugin.outcome import run_file_and_report
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 class ScenarioItem(pytest.Item):
     """Test item of one run of a scenario, with one channel and one seed.
 
-    The run is the setup of the test, and its verdict is the test. An invalid file, an exception of an extension and a
-    run beyond its limit of wall time or simulated time are therefore errors, which pytest and JUnit report separately
-    from failures.
+    The run is the setup of the test, and its verdict is the test. An invalid file, an exception of an extension, a
+    run beyond its limit of wall time or simulated time and one without criteria are therefore errors, which pytest and
+    JUnit report separately from failures.
 
     run  concrete run of a parameter value distribution; skipped if it violates the constraints of the scenario
     """
@@ -67,7 +67,7 @@ class ScenarioItem(pytest.Item):
         file = self.path if self.run is None else self.run.scenario
         for failure in failures_of(self._result):
             add_failed_run(self, failure, file)
-        if is_out_of_time(self._result):
+        if has_no_verdict(self._result):
             raise pytest.fail.Exception(explain_outcome(self._result), pytrace=False)
 
     def runtest(self) -> None:

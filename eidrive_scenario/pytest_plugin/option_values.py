@@ -9,6 +9,8 @@ NO_LIMIT = "none"
 """Value of the wall limit for no limit."""
 RECORD = ("always", "on-failure", "never")
 """Runs whose recording is kept."""
+WITHOUT_CRITERIA = ("error", "warn", "pass")
+"""Outcomes of a test whose run no criterion judges."""
 TOPICS = ("foxglove", "osi")
 """Tools whose topics a recording can contain."""
 _MOST_DIGITS = 18
@@ -55,6 +57,13 @@ def parse_record(text: str) -> str:
     """Return the runs whose recording is kept. Raise ArgumentTypeError for an unknown text."""
     if text not in RECORD:
         raise ArgumentTypeError(f"not one of {', '.join(RECORD)} (got {text!r})")
+    return text
+
+
+def parse_without_criteria(text: str) -> str:
+    """Return the outcome of a test without criteria. Raise ArgumentTypeError for an unknown text."""
+    if text not in WITHOUT_CRITERIA:
+        raise ArgumentTypeError(f"not one of {', '.join(WITHOUT_CRITERIA)} (got {text!r})")
     return text
 
 

@@ -23,6 +23,7 @@ from eidrive_scenario.pytest_plugin.option_values import (
     parse_seconds,
     parse_seconds_or_none,
     parse_topics,
+    parse_without_criteria,
 )
 
 _DEFAULT_MAX_RUNS = 100
@@ -30,6 +31,7 @@ _SHOWN = (
     "channel",
     "drive",
     "criterion",
+    "without_criteria",
     "detector",
     "planner",
     "seeds",
@@ -108,6 +110,12 @@ OPTIONS = (
         "add criteria to those of each scenario, such as '{collision: {of: Ego}}', or those of a file; repeatable",
         repeatable=True,
     ),
+    Option(
+        "without_criteria",
+        "error|warn|pass",
+        "outcome of a run that no criterion judges: an error of the test, a warning, or neither (default: error)",
+        parse_without_criteria,
+    ),
     Option("detector", "NAME", "detector of all stations (default: the file's own)"),
     Option("planner", "NAME", "planner of all driven stations (default: the file's own)"),
     Option(
@@ -172,6 +180,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=None,
     )
     markers.add_ini_option(parser)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Select the project of the root, as `eidrive` does, before a `conftest.py` registers further extensions."""
+    from eidrive_scenario.errors import InputError
+    from eidrive_scenario.project import VARIABLE, select_project
+
+    if VARIABLE in os.environ:
+        return
+    try:
+        select_project(early_config.rootpath)
+    except InputError as error:
+        raise pytest.UsageError(str(error)) from None
+
+    def restore() -> None:
+        os.environ.pop(VARIABLE, None)
+
+    early_config.add_cleanup(restore)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -63,11 +63,24 @@ def run_variant(item: pytest.Item, source: Source, variant: RunVariant, **overri
     The output folder follows the path of the scenario, or without a file the path of the test. Raise InputError.
     """
     file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
-    return _run_and_report(item, file, source, variant, overrides, command=pytest_command(item))
+    return _run_and_report(item, file, source, variant, overrides)
+
+
+def _command(item: pytest.Item, source: Source | ConcreteRun) -> str:
+    """Return the command line of pytest for a run that `eidrive run` cannot repeat, else "".
+
+    This is a run of a scenario without a file, or with extensions that only code of the tests registers.
+    """
+    from eidrive_scenario.experiments.commands import command_of_source
+    from eidrive_scenario.registry import has_unnamed_registrations
+    from eidrive_scenario.simulation import RunSettings
+
+    is_repeatable = command_of_source(source, 1, RunSettings()) and not has_unnamed_registrations()
+    return "" if is_repeatable else pytest_command(item)
 
 
 def pytest_command(item: pytest.Item) -> str:
-    """Return the command line that repeats a test, including runs of scenarios without a file."""
+    """Return the command line that repeats a test, including all runs of it."""
     words = ["pytest", "::".join([str(item.path), *item.nodeid.split("::")[1:]])]
     for option in OPTIONS:
         value = None if option.name in _NOT_REPEATED else command_line_value(item.config, option.name)
@@ -96,11 +109,11 @@ def _run_and_report(
     source: Source | ConcreteRun,
     variant: RunVariant,
     overrides: Mapping[str, Any],
-    command: str = "",
 ) -> RunResult:
     # Imported at the first run: pytest loads this plugin in every project of its environment.
     from eidrive_scenario.experiments.single_run import run_and_save
     from eidrive_scenario.simulation import RunSettings
+    from eidrive_scenario.simulation.run_outcome import UNJUDGED
 
     config, overrides = item.config, dict(overrides)
     wall_limit = overrides.pop("wall_limit", wall_limit_of(config))
@@ -112,6 +125,7 @@ def _run_and_report(
         "channel": _channel(config, variant.channel),
         "detector": option_value(config, "detector"),
         "planner": option_value(config, "planner"),
+        "no_criteria": option_value(config, "without_criteria") in ("warn", "pass"),
         **added_settings(config, variant.added),
     }
     if (time_limit := option_value(config, "time_limit")) is not None:
@@ -126,8 +140,10 @@ def _run_and_report(
         below=below,
         record=option_value(config, "record") or True,
         wall_limit=wall_limit,
-        command=command,
+        command=_command(item, source),
     )
+    if option_value(config, "without_criteria") == "pass":
+        result = replace(result, warnings=tuple(text for text in result.warnings if text != UNJUDGED))
     if result.folder is not None:
         record_of(item).folders.append(str(result.folder))
     if result.recording is not None and (topics := option_value(config, "topics")):

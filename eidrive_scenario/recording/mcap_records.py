@@ -17,6 +17,7 @@ import zstandard
 
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.recording.damage import DamageReport
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -77,9 +78,9 @@ class McapFile:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
             status = os.fstat(self._descriptor)
         except OSError as error:
-            raise InputError(
-                Diagnostic(f"cannot read: {error.strerror}", "give an MCAP recording", str(path))
-            ) from error
+            suffixes = (".mcap",) if path.suffix else ()  # a folder of a run has none
+            hint = file_suggestion(path, suffixes, otherwise="give an MCAP recording")
+            raise InputError(Diagnostic(f"cannot read: {error.strerror}", hint, str(path))) from error
         if not stat.S_ISREG(status.st_mode):
             self.close()
             raise InputError(Diagnostic("cannot read: not a regular file", "give an MCAP recording", str(path)))

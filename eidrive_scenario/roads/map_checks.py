@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,6 +21,7 @@ from eidrive_scenario.roads.model.map_warnings import (
     MapWarning,
 )
 from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, LaneSection, Road, RoadLink
+from eidrive_scenario.roads.routing.graph import LaneWays
 from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
 
 JUMP = 0.01
@@ -165,8 +167,64 @@ def _broken(road: Road, section: LaneSection, side: int, known: Mapping[int, Lan
                 yield MapWarning(LANE_LINK, "links to lanes that do not exist", message, hint, lane.line)
 
 
+def missing_lane_link(
+    roads: Mapping[str, Road], links: LaneLinks, ways: LaneWays, start: LaneKey, end: LaneKey
+) -> MapWarning | None:
+    """Return the warning of a lane without a successor whose link would complete a route; None without such a lane."""
+    entries: dict[LaneKey, dict[LaneKey, None]] = {}
+    for key, exits in ways.successors.items():
+        for other in exits:
+            entries.setdefault(other, {})[key] = None
+    reached, leading = _connected(ways.successors, start), _connected(entries, end)
+    for road in dict.fromkeys(key.road for key in reached):
+        for key, link, warning in _dead_lanes(roads[road], links):
+            if key in reached and not leading.keys().isdisjoint(_continuations(roads, key, link)):
+                return warning
+    return None
+
+
+def _connected(edges: Mapping[LaneKey, Mapping[LaneKey, object]], start: LaneKey) -> dict[LaneKey, None]:
+    """Return all lanes to which edges lead from `start`, the nearest first."""
+    found, waiting = {start: None}, deque([start])
+    while waiting:
+        for other in edges.get(waiting.popleft(), ()):
+            if other not in found:
+                found[other] = None
+                waiting.append(other)
+    return found
+
+
+def _continuations(roads: Mapping[str, Road], key: LaneKey, link: RoadLink | None) -> Iterator[LaneKey]:
+    """Yield the lanes at the end of a lane by the links of roads only: of the next section, road or junction."""
+    road = roads[key.road]
+    side = road.directions[key.lane]
+    if link is None:
+        yield from _lanes_away(road, key.section + side, side)
+    elif link.element_type == "road":
+        for direction in (1, -1) if link.contact is None else (1 if link.contact == "start" else -1,):
+            yield from _lanes_away(roads[link.element_id], 0 if direction > 0 else -1, direction)
+    else:
+        for other in roads.values():
+            for back, direction in ((other.predecessor, 1), (other.successor, -1)):
+                is_from_here = back is not None and back.element_type == "road" and back.element_id == road.id
+                if other.junction_id == link.element_id and is_from_here:
+                    yield from _lanes_away(other, 0 if direction > 0 else -1, direction)
+
+
+def _lanes_away(road: Road, section: int, direction: int) -> Iterator[LaneKey]:
+    """Yield the lanes of a section, -1 for the last one, with a driving direction."""
+    if road.sections:
+        chosen = road.sections[section]
+        yield from (LaneKey(road.id, chosen.index, n) for n in chosen.lanes if n and road.directions[n] == direction)
+
+
 def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
-    """Yield warnings of lanes without a successor although their road continues.
+    """Yield warnings of lanes without a successor although their road continues."""
+    return (warning for _, _, warning in _dead_lanes(road, links))
+
+
+def _dead_lanes(road: Road, links: LaneLinks) -> Iterator[tuple[LaneKey, RoadLink | None, MapWarning]]:
+    """Yield lanes without a successor, with the link by which their road continues, None within it, and the warning.
 
     Bidirectional lanes, such as turning lanes in the middle, may end at junctions.
     """
@@ -181,8 +239,10 @@ def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
                 continue
             if lane.width.value(section.length if side > 0 else 0.0) < OPEN:
                 continue
-            if next(links.beyond(LaneKey(road.id, section.index, lane.id), side), None) is None:
-                yield _dead_end(road, section, lane, None if inside else link)
+            key = LaneKey(road.id, section.index, lane.id)
+            if next(links.beyond(key, side), None) is None:
+                ahead = None if inside else link
+                yield key, ahead, _dead_end(road, section, lane, ahead)
 
 
 def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | None) -> MapWarning:

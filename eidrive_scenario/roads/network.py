@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -19,14 +20,14 @@ from eidrive_scenario.roads.geometry import poses
 from eidrive_scenario.roads.geometry.locator import REACH, Locator
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.georeference import GeoReference, parse_geo_reference
-from eidrive_scenario.roads.map_checks import check_road_map
-from eidrive_scenario.roads.model.location import LaneLocation, LaneLocations, Pose, Poses, PositionError
+from eidrive_scenario.roads.map_checks import check_road_map, missing_lane_link
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.model.map_warnings import group_map_warnings
 from eidrive_scenario.roads.model.road_map import RoadMap
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.routing.costs import Cost, assumed_speed
 from eidrive_scenario.roads.routing.distance import Chain, RoadDistances
-from eidrive_scenario.roads.routing.graph import LaneWays, build_ways, find_lanes
+from eidrive_scenario.roads.routing.graph import LaneWays, RouteError, build_ways, find_lanes, lane_key
 from eidrive_scenario.roads.routing.lane_count import lanes_between
 from eidrive_scenario.roads.routing.links import LaneLinks
 from eidrive_scenario.roads.routing.movement import BranchSelector, Movement, driving_direction
@@ -270,10 +271,24 @@ class RoadNetwork(RoadAttributes):
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
         parts = [
-            Route(self.tables, find_lanes(self._ways, self.roads, a, b, cost), a, b)
+            Route(self.tables, self._find_lanes(a, b, cost), a, b)
             for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
         ]
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)
+
+    def _find_lanes(self, start: LaneLocation, end: LaneLocation, cost: Cost | None) -> tuple[LaneKey, ...]:
+        """Return the lanes of the cheapest route. Raise RouteError; if the file lacks a link for it, with its rule."""
+        try:
+            return find_lanes(self._ways, self.roads, start, end, cost)
+        except RouteError as error:
+            ends = lane_key(self.roads, start), lane_key(self.roads, end)
+            missing = missing_lane_link(self.roads, self.links, self._ways, *ends)
+            if missing is None:
+                raise
+            (diagnostic,) = error.diagnostics
+            message = f"{diagnostic.message} ({self.source}:{missing.line}: {missing.message})"
+            named = replace(diagnostic, message=message, hint=missing.hint, rule=missing.rule.name)
+            raise RouteError(named) from None
 
     def distance(
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None, sense: int = 0

@@ -5,7 +5,8 @@ Errors in late events are thus reported at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -31,7 +32,7 @@ from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import variations
 from eidrive_scenario.registry import registry
 from eidrive_scenario.storyboard.state.commands import CustomCommand
-from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
+from eidrive_scenario.v2x.profile import ChannelProfile, load_profile, profile_file
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
@@ -53,6 +54,16 @@ def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
     """Return the profile of a command `eidrive.channel`, None for no cooperation. Raise SettingError."""
     folders = (library_path() / "channels",)
     return load_profile(command.content, folders, origin=command.source, line=command.line, scope=command.scope)
+
+
+def profile_files(scenario: Scenario) -> Iterator[Path]:
+    """Yield the files of the channel profiles that a scenario selects."""
+    for command in scenario.custom_commands:
+        if command.type == CHANNEL:
+            folders = (library_path() / "channels",)
+            with suppress(SettingError):  # of an invalid reference, which `check_commands` reports
+                path = profile_file(command.content, folders, origin=command.source, scope=command.scope)
+                yield from () if path is None else (path,)
 
 
 def check_commands(scenario: Scenario) -> DeclaredCriteria:

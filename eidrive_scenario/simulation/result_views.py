@@ -10,6 +10,7 @@ from html import escape
 from typing import Any, Protocol
 
 from eidrive_scenario.evaluation.criterion import Verdict
+from eidrive_scenario.exit_codes import NOT_JUDGED
 from eidrive_scenario.resolved_settings import ResolvedSettings
 
 Scalar = str | int | float | bool | None
@@ -103,8 +104,8 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Scalar]]:
 
 def result_html(result: Result) -> str:
     """Return the outcome as an HTML fragment: title, table of criteria, end, warnings."""
-    color = "#1a7f37" if result.passed else "#b42318"
-    word = "passed" if result.passed else "not passed"
+    word = outcome_word(result)
+    color = {"passed": "#1a7f37", "not judged": "#9a6700"}.get(word, "#b42318")
     title = f"{escape(result.scenario)}, seed {result.seed}, channel {escape(result.channel)}"
     rows = "".join(
         f"<tr><td>{escape(verdict.name)}</td><td>{'passed' if verdict.passed else 'failed'}</td>"
@@ -122,6 +123,13 @@ def result_html(result: Result) -> str:
         + (f"<p>warnings:</p><ul>{warnings}</ul>" if warnings else "")
         + "</div>"
     )
+
+
+def outcome_word(result: Result) -> str:
+    """Return `passed`, `not passed`, or `not judged` for a run without criteria."""
+    if result.exit_code == NOT_JUDGED:
+        return "not judged"
+    return "passed" if result.passed else "not passed"
 
 
 def _quantity(value: float | None, unit: str) -> str:

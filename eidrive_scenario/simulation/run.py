@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
-from eidrive_scenario.simulation.result_views import result_html, result_row
+from eidrive_scenario.simulation.result_views import outcome_word, result_html, result_row
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
@@ -45,6 +45,7 @@ class RunSettings:
                     the properties of the stack (mapping, YAML text, file; None: defaults); see docs/scenario_files.md
     criteria        further criteria: a mapping, a YAML text, a file, or a list of these
     allow_torchscript  whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
+    no_criteria     whether a run that no criterion judges passes; without it, its exit code is NOT_JUDGED
     """
 
     channel: str | Path | Mapping[str, Any] | None = None
@@ -60,6 +61,7 @@ class RunSettings:
     drive: Mapping[str, Any] | Iterable[str] | None = None
     criteria: str | Path | Mapping[str, Any] | Iterable[str | Path | Mapping[str, Any]] | None = None
     allow_torchscript: bool = False
+    no_criteria: bool = False
 
     def __post_init__(self) -> None:
         """Convert values of parameters and user-defined values to texts, as on a command line.
@@ -93,6 +95,7 @@ _TYPES: tuple[tuple[str, tuple[type, ...], str], ...] = (
     ("time_limit", (Real,), "a number of seconds"),
     # A text such as "no" would be true
     ("allow_torchscript", (bool,), "True or False"),
+    ("no_criteria", (bool,), "True or False"),
 )
 """Types of the settings of a run, and the expected values in messages."""
 
@@ -150,6 +153,7 @@ class RunResult:
     seed: int
     channel: str
     passed: bool
+    """Whether all criteria passed before the time limit; False for a run that no criterion judges."""
     end_reason: str
     """Reason for the end: stop trigger, storyboard complete, criterion: NAME, command: NAME, or time limit."""
     exit_code: int
@@ -181,7 +185,7 @@ class RunResult:
     def __str__(self) -> str:
         """Return the outcome in one line."""
         failed = [verdict.name for verdict in self.criteria if not verdict.passed]
-        outcome = "passed" if self.passed else f"failed by {', '.join(failed)}" if failed else "not passed"
+        outcome = f"failed by {', '.join(failed)}" if failed else outcome_word(self)
         number = "" if self.run is None else f", run {self.run}"
         warned = f", {len(self.warnings)} warning{'s' * (len(self.warnings) > 1)}" if self.warnings else ""
         head = f"{self.scenario}{number}, seed {self.seed}, channel {self.channel}"

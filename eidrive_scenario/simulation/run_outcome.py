@@ -10,7 +10,7 @@ from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
-from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
+from eidrive_scenario.exit_codes import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
@@ -30,6 +30,10 @@ FATAL_CRITERION = "criterion: "
 """Prefixes of the reasons for an end by an exit command, and by a fatal criterion; its name follows."""
 EXPIRED_SHARE = 0.1
 """Share of the received messages of a link that may be too old for their receiver without a warning."""
+UNJUDGED = "the run is not judged: it has no criterion"
+"""Start of the warning of a run without verdicts."""
+HOW_TO_JUDGE = "add one to the scenario or by --criterion '{collision: {of: Ego}}', or accept the run by --no-criteria"
+"""Hint to the warning."""
 
 
 class RunEnd(msgspec.Struct, frozen=True):
@@ -58,14 +62,16 @@ def build_result(
     false_tracks: FalseTracks,
     final_state: tuple[str, ...],
     late_warnings: Iterator[str],
+    no_criteria: bool = False,
 ) -> RunResult:
-    """Return the result of a run that has ended."""
+    """Return the result of a run that has ended; for `no_criteria` see RunSettings."""
     frame, scenario, stack = end.frame, state.scenario, state.stack
     links = dict(stack.link_statistics(frame.view.time))
     for criterion in state.criteria:
         criterion.observe_links(links)
     verdicts = final_verdicts(state.criteria, state.exit)
-    exit_code = exit_code_of(verdicts, end.reason)
+    exit_code = exit_code_of(verdicts, end.reason, no_criteria=no_criteria)
+    unjudged = [] if verdicts else [UNJUDGED if no_criteria else f"{UNJUDGED}; {HOW_TO_JUDGE}"]
     metrics = criteria_metrics(state.criteria)
     metrics.update(stack.metrics(frame.view.time))
     metrics.update(false_tracks.metrics())
@@ -82,7 +88,7 @@ def build_result(
         trace_hash=trace_hash,
         simulated_s=frame.view.time,
         wall_s=end.wall_s,
-        warnings=tuple(dict.fromkeys([*state.warnings, *late_warnings, *map(str, expired_messages(links))])),
+        warnings=tuple(dict.fromkeys([*unjudged, *state.warnings, *late_warnings, *map(str, expired_messages(links))])),
         parameters=dict(scenario.parameters),
         run=settings.run,
         links=links,
@@ -106,11 +112,16 @@ def criteria_metrics(criteria: Sequence[Criterion]) -> dict[str, float]:
     return metrics
 
 
-def exit_code_of(verdicts: Sequence[Verdict], end: str) -> int:
-    """Return the exit code of a run with these verdicts and this reason for its end."""
+def exit_code_of(verdicts: Sequence[Verdict], end: str, *, no_criteria: bool = False) -> int:
+    """Return the exit code of a run with these verdicts and this reason for its end.
+
+    no_criteria  whether a run without verdicts passes
+    """
     if not all(verdict.passed for verdict in verdicts):
         return FAILED
-    return ABORTED if end == TIME_LIMIT else PASSED
+    if end == TIME_LIMIT:
+        return ABORTED
+    return PASSED if verdicts or no_criteria else NOT_JUDGED
 
 
 def end_reason(state: RunState, storyboard: Storyboard, time: float, time_limit: float) -> str | None:

@@ -10,6 +10,7 @@ from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFact
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.evaluation.criteria_parser import (
+    EXITS,
     CriterionDeclaration,
     stop_trigger_declarations,
     unsupported_criteria,
@@ -41,6 +42,7 @@ class RunSetup(msgspec.Struct, frozen=True):
     weather            option that overrides the scenario; None uses the weather of the scenario
     warnings           warnings that are known before the run
     progress_warnings  those about criteria that demand no progress
+    can_be_judged      whether there are criteria, or commands that end the run with a verdict
     """
 
     scenario: Scenario
@@ -54,6 +56,7 @@ class RunSetup(msgspec.Struct, frozen=True):
     world: World
     warnings: tuple[str, ...]
     progress_warnings: tuple[Diagnostic, ...] = ()
+    can_be_judged: bool = True
 
 
 def set_up_run(
@@ -101,10 +104,24 @@ def set_up_run(
     warnings = tuple(
         map(str, [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)])
     )
+    can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
         world.set_weather(weather)
-    return RunSetup(scenario, roads, storyboard, driving, criteria, declared, added, weather, world, warnings, progress)
+    return RunSetup(
+        scenario,
+        roads,
+        storyboard,
+        driving,
+        criteria,
+        declared,
+        added,
+        weather,
+        world,
+        warnings,
+        progress,
+        can_be_judged,
+    )
 
 
 def _stack_context(

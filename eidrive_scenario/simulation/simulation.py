@@ -81,6 +81,8 @@ class Simulation:
         self.storyboard, self.stack, self.world = setup.storyboard, setup.stack, setup.world
         self.progress_warnings = setup.progress_warnings
         """Warnings about criteria that demand no progress; they are warnings of the result as well."""
+        self.can_be_judged = setup.can_be_judged
+        """Whether the run may get a verdict: by a criterion, or by a command that ends it."""
         self._state = RunState.of(setup)
         self.criteria = self._state.criteria
         self._trace, self._false_tracks, self._final_state = TraceHash(), FalseTracks(), FinalState()
@@ -284,6 +286,7 @@ class Simulation:
             false_tracks=self._false_tracks,
             final_state=self._final_state.lines(),
             late_warnings=late_warnings(self.scenario, self.storyboard, self._motionless, values, self._ended),
+            no_criteria=self.settings.no_criteria,
         )
 
     def describe_state(self) -> tuple[str, ...]:

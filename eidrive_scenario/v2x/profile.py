@@ -9,9 +9,10 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.extension_settings import settings_type_of
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.openscenario.values.references import is_reference, resolve_references
+from eidrive_scenario.openscenario.values.references import is_reference, parameter_hints, resolve_references
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.channel import Channel
@@ -56,15 +57,12 @@ def load_profile(
     """
     if isinstance(source, Mapping):
         return _parse(source, "custom", origin or "channel", line, {}, scope)
-    if isinstance(source, str) and is_reference(source.strip()) and scope is not None:
-        source = Path(str(resolve_references(source.strip(), scope, source=origin, line=line)).strip())
-        if str(source) == NO_COOPERATION:
-            return None
+    source = _named_by_reference(source, origin, line, scope)
+    if str(source).strip() == NO_COOPERATION:
+        return None
     if isinstance(source, str):
         text = source.strip()
-        if text == NO_COOPERATION:
-            return None
-        if "{" in text or "\n" in text or ": " in text:
+        if _is_inline(text):
             data = load_yaml(source, source=origin or "channel", line=line)
             lines = {} if line is None else key_lines(source, line)
             return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines, scope)
@@ -77,12 +75,36 @@ def load_profile(
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
         message = f"no {kind} {quoted(str(source))}"
-        hint = suggestion(source.stem, names)
+        hint = file_suggestion(source, SUFFIXES, names, folder=Path(origin).parent)
         if is_regular_file(source):
             message, hint = f"file {quoted(str(source))} is not a channel profile", "expected a file name in .yaml"
         raise SettingError(Diagnostic(message, hint, origin, line))
     data, lines = load_yaml_file(path)
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
+
+
+def profile_file(
+    source: str | Path, folders: Sequence[Path] = (), *, origin: str = "", scope: Scope | None = None
+) -> Path | None:
+    """Return the file of a profile that `load_profile` reads; None for a YAML text, and if there is no such file.
+
+    Raise SettingError for an invalid reference.
+    """
+    source = _named_by_reference(source, origin, None, scope)
+    if isinstance(source, str) and _is_inline(source.strip()):
+        return None
+    return _find(Path(str(source).strip()), Path(origin).parent, folders)
+
+
+def _named_by_reference(source: str | Path, origin: str, line: int | None, scope: Scope | None) -> str | Path:
+    """Return the path or name to which a reference such as `$Channel` refers; another source unchanged."""
+    if isinstance(source, str) and is_reference(source.strip()) and scope is not None:
+        return Path(str(resolve_references(source.strip(), scope, source=origin, line=line)).strip())
+    return source
+
+
+def _is_inline(text: str) -> bool:
+    return "{" in text or "\n" in text or ": " in text
 
 
 def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel | None = None) -> Channel | None:
@@ -138,6 +160,7 @@ def _parse(
     scope: Scope | None,
     folder: Path | None = None,
 ) -> ChannelProfile:
+    origins = parameter_hints(data, scope)
     data = resolve_references(data, scope, source=source, line=line, lines=lines)
     data = _with_paths(data, folder) if folder is not None else data
     model = data.get("model", ChannelProfile.model_fields["model"].default)
@@ -146,5 +169,5 @@ def _parse(
         message, hint = f"unknown channel model {quoted(model)}", suggestion(str(model), models)
         raise SettingError(Diagnostic(message, hint, source, lines.get("model", line)))
     settings_type = settings_type_of("channels", model, models.load(model, Channel), ChannelProfile)
-    profile = parse_settings(settings_type, data, source=source, line=line, lines=lines)
+    profile = parse_settings(settings_type, data, source=source, line=line, lines=lines, origins=origins)
     return profile if profile.name else profile.model_copy(update={"name": name})

@@ -243,3 +243,40 @@ def test_command_of_a_later_event_takes_parameters(make: Make) -> None:
     mean = result.links[LINK].mean_delay
     assert mean is not None
     assert 0.1 < mean < 0.5
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message", "hint"),
+    [
+        (
+            {"Loss": "3000"},
+            "'loss.bernoulli.probability' is 30",
+            "parameter 'Loss' is '3000' instead of its declared 0",
+        ),
+        (
+            {"Latency": "-1"},
+            "'delay.constant.seconds' is -1",
+            "parameter 'Latency' is '-1' instead of its declared 0.1",
+        ),
+        ({"Gap": "-2"}, "'at_least' is -2", "parameter 'Gap' is '-2' instead of its declared 1"),
+        ({"Own": "maybe"}, "parameter 'Own' is 'maybe'", "assigned by an option, the file declares 'false'"),
+    ],
+)
+def test_error_of_a_value_names_its_parameter(
+    make: Make, tmp_path: Path, parameters: dict[str, str], message: str, hint: str
+) -> None:
+    """The file of the channel and the criterion are right: the value of the option is not."""
+    (tmp_path / "late.yaml").write_text("delay: {kind: constant, seconds: $Latency}\n" + DELAY.split(", ", 2)[2][:-1])
+    criterion = "min_distance: {of: Ego, to: Incoming, at_least: $Gap}"
+    path = make("late.yaml", ("collision: {of: Ego}", f"{criterion}\ncollision: {{of: Ego}}"))
+    with pytest.raises(InputError) as caught:
+        delays(path, **parameters)
+    (diagnostic,) = caught.value.diagnostics
+    assert message in diagnostic.message
+    assert hint in diagnostic.hint
+
+
+def test_error_of_a_key_names_no_parameter(make: Make) -> None:
+    with pytest.raises(InputError) as caught:
+        delays(make("{delay: {kind: constant, secnds: $Latency}}"))
+    assert not any("Latency" in diagnostic.hint for diagnostic in caught.value.diagnostics)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from eidrive_scenario.world.view import WorldView
 class RoadLintContext(LintContext):
     """Lint context of a scenario with its road network, without actors in the world."""
 
-    def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
-        super().__init__(scenario)
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None, added: tuple[str | Path, ...] = ()) -> None:
+        super().__init__(scenario, added)
         self.roads = roads
         self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=_empty_view())
 

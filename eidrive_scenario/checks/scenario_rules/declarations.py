@@ -25,6 +25,7 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.values.expressions import REFERENCE
+from eidrive_scenario.simulation.commands import profile_files
 
 
 def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
@@ -32,12 +33,14 @@ def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
     if not context.files:
         return
     scenario, *catalogs = context.files
+    texts = context.texts_of([*profile_files(context.scenario), *context.added])
+    outside = {name for text in texts for name in REFERENCE.findall(text)}
     for declarations in scenario.iter("ParameterDeclarations"):
         scope = declarations.getparent()
         if scope is None:
             continue
         roots = [scope, *catalogs] if scope is scenario else [scope]
-        used = {name for root in roots for name in _used(root)}
+        used = {name for root in roots for name in _used(root)} | outside
         for declaration in declarations.iter("ParameterDeclaration"):
             name = declaration.get("name", "").removeprefix("$")
             if name not in used:

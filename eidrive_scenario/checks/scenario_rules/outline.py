@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from lxml import etree
 
+from eidrive_scenario.files.bounded import MIB, read_regular_file
+from eidrive_scenario.files.yaml_sources import is_inline
 from eidrive_scenario.openscenario.model import (
     Act,
     Action,
@@ -89,10 +92,14 @@ class Node:
 
 
 class Outline:
-    """Storyboard of a scenario, its entities and its references."""
+    """Storyboard of a scenario, its entities and its references.
 
-    def __init__(self, scenario: Scenario) -> None:
+    added  criteria and driving stacks that the settings of the run add, YAML texts or files
+    """
+
+    def __init__(self, scenario: Scenario, added: tuple[str | Path, ...] = ()) -> None:
         self.scenario = scenario
+        self.added = added
         self.root = Node(scenario.storyboard, None, ("storyboard",), None)
         self.root.children = [self._node(story, self.root, ()) for story in scenario.storyboard.story]
         self.nodes = tuple(self.root.walk())
@@ -221,9 +228,21 @@ class Outline:
 
     @cached_property
     def command_words(self) -> frozenset[str]:
-        """Return all words in custom commands, as their executors may use names in them."""
+        """Return all words in custom commands and added sources, which may use names in them."""
         texts = [element.content for element in self.elements if isinstance(element, CustomCommandAction)]
+        texts += self.texts_of(self.added)
         return frozenset(word for text in texts for word in WORD.findall(text))
+
+    def texts_of(self, sources: Iterable[str | Path]) -> list[str]:
+        """Return YAML texts, and the contents of files that can be read."""
+        texts = []
+        for source in sources:
+            if isinstance(source, str) and is_inline(source):
+                texts.append(source)
+                continue
+            with suppress(OSError, ValueError):  # the setup of the run reports them
+                texts.append(read_regular_file(source, MIB).decode(errors="replace"))
+        return texts
 
     @cached_property
     def files(self) -> tuple[etree._Element, ...]:

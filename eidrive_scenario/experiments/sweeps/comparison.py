@@ -11,7 +11,7 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, PairedVerdicts, paired_difference
 from eidrive_scenario.experiments.sweeps.results import Identity, identity, indistinct, stored_runs
-from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, FAILED, INVALID, PASSED, StoredRun
+from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, FAILED, INVALID, NOT_JUDGED, PASSED, StoredRun
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def compare(
     return Comparison(
         verdicts,
         with_verdict - 2 * len(judged),
-        sum(a.status in (PASSED, FAILED) and b.status in (ABORTED, CRASHED, INVALID) for a, b in pairs),
+        sum(a.status in (PASSED, FAILED) and b.status in (ABORTED, CRASHED, INVALID, NOT_JUDGED) for a, b in pairs),
         sum(a.result.get("trace_hash") == b.result.get("trace_hash") for a, b in judged),
         verdicts.interval(confidence),
         verdicts.p_value(),

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from eidrive_scenario import exit_codes
 from eidrive_scenario.errors import ConstraintError, InputError, OutputError, WallLimitError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import run_and_save
@@ -21,6 +22,7 @@ from eidrive_scenario.experiments.sweeps.store import (
     FAILED,
     FOLDER,
     INVALID,
+    NOT_JUDGED,
     PASSED,
     StoredRun,
 )
@@ -72,16 +74,17 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             record=False if files is None else files.record,
             wall_limit=wall_limit,
         )
+        unjudged = result.exit_code == exit_codes.NOT_JUDGED
         return StoredRun(
             key=job.key,
             number=job.number,
             scenario=result.scenario,
             run=job.run,
             seed=job.seed,
-            status=PASSED if result.passed else FAILED,
+            status=PASSED if result.passed else NOT_JUDGED if unjudged else FAILED,
             point=dict(job.point),
             result={**result.to_dict(), **_folder(result.folder, files)},
-            error="",
+            error=result.warnings[0] if unjudged else "",
             command=result.command,
             wall_s=round(time.perf_counter() - start, 4),
             settings=result.settings.canonical,

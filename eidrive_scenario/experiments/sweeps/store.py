@@ -16,6 +16,7 @@ from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, Settin
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.encodable import encodable
+from eidrive_scenario.files.similar_paths import file_suggestion
 
 T = TypeVar("T")
 FORMAT = 1
@@ -23,10 +24,11 @@ FORMAT = 1
 _HEADER = b"SQLite format 3\0"
 APPLICATION = 0x65694452
 """Application id in the header of the file, `eiDR`."""
-PASSED, FAILED, ABORTED, CRASHED, INVALID, EXCLUDED = "passed", "failed", "aborted", "crashed", "invalid", "excluded"
-STATUSES = (PASSED, FAILED, ABORTED, CRASHED, INVALID, EXCLUDED)
-"""Outcomes of a run: verdict of its criteria; aborted by an error or its wall limit; end of its worker process; invalid
-input; excluded by constraints of parameters."""
+PASSED, FAILED, NOT_JUDGED = "passed", "failed", "not judged"
+ABORTED, CRASHED, INVALID, EXCLUDED = "aborted", "crashed", "invalid", "excluded"
+STATUSES = (PASSED, FAILED, NOT_JUDGED, ABORTED, CRASHED, INVALID, EXCLUDED)
+"""Outcomes of a run: verdict of its criteria; end without a criterion; aborted by an error or its wall limit; end of
+its worker process; invalid input; excluded by constraints of parameters."""
 FOLDER = "folder"
 """Column of a result with the folder of the files of the run, relative to that of the store."""
 REPEATABLE = (ABORTED, CRASHED)
@@ -54,7 +56,7 @@ class StoredRun(msgspec.Struct, frozen=True):
     point     values of the axes
     result    outcome, criteria and metrics as columns: `RunResult.to_dict`; if the run did not end, only the parameters
               that its distribution varies
-    error     message of a run that did not end
+    error     message of a run without a verdict
     command   command line that repeats the run
     wall_s    duration with loading [s]
     settings  all settings of the run as JSON, with versions and digests of all files; empty if it did not start
@@ -125,7 +127,8 @@ class ResultStore:
     def read(cls, path: Path) -> Iterator[Self]:
         """Open a store for reading. Raise SettingError if there is none."""
         if not path.is_file():
-            raise _error("no such store", "give the file of a sweep", path)
+            hint = file_suggestion(path, {path.suffix, ".db"}, otherwise="give the file of a sweep")
+            raise _error("no such store", hint, path)
         connection = _checked(path, lambda: _connect(path, read_only=True))
         try:
             _checked(path, lambda: _check_format(path, connection))

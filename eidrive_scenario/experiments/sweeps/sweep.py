@@ -13,7 +13,15 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.execution import KeptFiles, crashed, execute, hung
 from eidrive_scenario.experiments.sweeps.hang_reports import HungRunError
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
-from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.store import (
+    EXCLUDED,
+    FAILED,
+    NOT_JUDGED,
+    PASSED,
+    REPEATABLE,
+    ResultStore,
+    StoredRun,
+)
 from eidrive_scenario.experiments.sweeps.workers import Workers
 from eidrive_scenario.experiments.sweeps.writing import RunWriter
 
@@ -69,7 +77,16 @@ class SweepProgress:
     @property
     def is_complete(self) -> bool:
         """Whether all runs have a verdict, or are excluded by constraints."""
-        return self.left == 0 and not (self.counts.keys() | self.stored.keys()) - JUDGED
+        return self.left == 0 and not self._without_verdict
+
+    @property
+    def lacks_criteria_only(self) -> bool:
+        """Whether all runs have ended, and those without a verdict lack only a criterion."""
+        return self.left == 0 and self._without_verdict == {NOT_JUDGED}
+
+    @property
+    def _without_verdict(self) -> set[str]:
+        return (self.counts.keys() | self.stored.keys()) - JUDGED
 
     @property
     def left(self) -> int:

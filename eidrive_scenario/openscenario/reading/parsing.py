@@ -13,6 +13,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
+from eidrive_scenario.library import scenario_suggestion
 from eidrive_scenario.openscenario.kept_files import KeptFiles
 from eidrive_scenario.resolved_settings import sha256_of
 
@@ -94,7 +95,8 @@ def _content(path: str | Path) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        diagnostic = Diagnostic(f"cannot read: {reason_of(error)}", "check the path", shortened(str(path)))
+        hint = scenario_suggestion(path) if isinstance(error, FileNotFoundError) else "check the path"
+        diagnostic = Diagnostic(f"cannot read: {reason_of(error)}", hint, shortened(str(path)))
         raise ScenarioError(diagnostic) from error
 
 

@@ -199,6 +199,9 @@ def declare(
     """Add a parameter to its scope; report a value that does not match its type or its constraints."""
     scalar = TYPES[declaration.parameter_type]
     origin = (assignment and assignment.origin) or Location.of(declaration)
+    # The line of the declaration does not have the value of an option
+    is_unlocated = assignment is not None and assignment.origin is None
+    elsewhere = f"; the value is assigned by an option, the file declares {quoted(declaration.value)}" * is_unlocated
     name, text = declaration.name, assignment.text if assignment else declaration.value
     text = _without_fraction(text, scalar)
     if not fits_type(_without_fraction(declaration.value, scalar), scalar):
@@ -217,7 +220,7 @@ def declare(
     except ValueError as error:
         collector.error(
             f"parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
-            str(error),
+            f"{error}{elsewhere}",
             source=origin.source,
             line=origin.line,
         )
@@ -237,7 +240,7 @@ def declare(
         )
         collector.constraint_error(
             f"parameter {name!r} is {quoted(text)}, outside its constraints",
-            f"expected {allowed}",
+            f"expected {allowed}{elsewhere}",
             source=origin.source,
             line=origin.line,
         )

@@ -6,9 +6,10 @@ A value is substituted after parsing, so it is always a single number, Boolean o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
 from eidrive_scenario.openscenario.values.parameters import Scope
 
@@ -76,6 +77,30 @@ def _resolve(
             message = f"setting {path!r}: {error.message}" if path else error.message
             diagnostics.append(Diagnostic(message, error.hint, source, line))
         return data
+
+
+def parameter_hints(data: Any, scope: Scope | None, path: str = "") -> dict[str, str]:
+    """Return a hint for each setting that refers to parameters, by its dotted path: their names and values.
+
+    data, scope, path  as those of `resolve_references`, before the substitution
+    """
+    if scope is None:
+        return {}
+    if isinstance(data, Mapping | list | tuple):
+        entries = data.items() if isinstance(data, Mapping) else enumerate(data)
+        found: dict[str, str] = {}
+        for key, value in entries:
+            found |= parameter_hints(value, scope, _below(path, key))
+        return found
+    if not is_reference(data):
+        return {}
+    texts = []
+    for name in dict.fromkeys(REFERENCE.findall(data)):
+        with suppress(ExpressionError):  # reported by `resolve_references`
+            parameter = scope.find(name)
+            assigned = "" if parameter.text == parameter.declared else f" instead of its declared {parameter.declared}"
+            texts.append(f"parameter {name!r} is {quoted(parameter.text)}{assigned}")
+    return {path: ", ".join(texts)} if texts else {}
 
 
 def _below(path: str, key: object) -> str:

@@ -23,7 +23,7 @@ from eidrive_scenario.perception.learned.classes import object_category
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
-from eidrive_scenario.perception.learned.network_loading import build_network, weights_path
+from eidrive_scenario.perception.learned.network_loading import build_network, check_network, weights_path
 from eidrive_scenario.perception.learned.runtime_selection import (
     runtime_versions,
     select_runtime,
@@ -69,6 +69,10 @@ class LearnedDetector(Detector):
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
         self._roads: weakref.ref[RoadNetwork] | None = None
+
+    def check_weights(self, *, allow_torchscript: bool = False) -> None:
+        """Raise SettingError if a run refuses the weights, without reading them."""
+        check_network(self.network, self.settings, allow_torchscript=allow_torchscript)
 
     def load_weights(self, *, allow_torchscript: bool = False) -> None:
         """Create the network. Raise SettingError if its weights are not suitable."""

@@ -28,20 +28,27 @@ def weights_path(name: str, settings: LearnedSettings) -> Path:
     return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
 
 
-def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
-    """Return the network that the settings select.
-
-    Raise SettingError if its weights are missing or not suitable, or are TorchScript without permission of the user,
-    and if the runtime or the device is not available.
+def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool) -> None:
+    """Raise SettingError if the weights that the settings select are missing, or are TorchScript without permission of
+    the user, and if the runtime is not installed. Nothing is read or imported.
     """
     path = weights_path(name, settings)
     check_weights_exist(path)
-    allow_torchscript = torchscript_is_allowed(allow_torchscript)
-    if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
+    if path.suffix == TORCHSCRIPT_SUFFIX and not torchscript_is_allowed(allow_torchscript):
         raise refused_torchscript(path)
     runtime = select_runtime(path, settings.runtime, settings.device)
     if not is_installed(runtime):
         raise missing_runtime(runtime)
+
+
+def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
+    """Return the network that the settings select.
+
+    Raise SettingError as `check_network`, if the weights are not suitable, and if the device is not available.
+    """
+    check_network(name, settings, allow_torchscript=allow_torchscript)
+    path = weights_path(name, settings)
+    runtime = select_runtime(path, settings.runtime, settings.device)
     if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         return ExternalNetwork(
             path,
@@ -53,7 +60,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
             settings.letterbox,
             runtime=runtime,
             device=settings.device,
-            allow_torchscript=allow_torchscript,
+            allow_torchscript=torchscript_is_allowed(allow_torchscript),
         )
     network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device)
     if network.name != name:

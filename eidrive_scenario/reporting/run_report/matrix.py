@@ -91,12 +91,14 @@ def _matrix(
     if len(found) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(found) * len(columns) > MOST_CELLS:
         return None
     names = sorted(found, key=_order) if ordered else list(found)
-    rows = [(name, tuple([_share(found[name].get(column)) for column in columns])) for name in names]
+    rows = [(name, tuple([success_rate(found[name].get(column, ())) for column in columns])) for name in names]
     return Matrix(corner, tuple(columns), tuple(rows))
 
 
-def _share(runs: Sequence[ReportedRun] | None) -> Proportion | None:
-    return wilson(sum(run.passed for run in runs), len(runs)) if runs else None
+def success_rate(runs: Sequence[ReportedRun]) -> Proportion | None:
+    """Return the share of passed runs among those that are judged; None if there is none."""
+    judged = [run.passed for run in runs if run.is_judged]
+    return wilson(sum(judged), len(judged)) if judged else None
 
 
 def _order(text: str) -> tuple[int, float, str]:

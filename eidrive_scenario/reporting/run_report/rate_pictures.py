@@ -87,13 +87,17 @@ def rate_curves(groups: Sequence[RunGroup]) -> Iterator[RateCurves]:
 
 
 def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> ChartSeries | None:
-    """Return the rates of a group at each level; None if no value occurs twice and the runs are no sweep."""
+    """Return the rates of a group at each level; None without judged runs, and if no value of other runs than those of
+    a sweep occurs twice."""
     levels = levels_of(runs, axis)
     if levels is None or (not runs[0].is_swept and len(levels.centers) == len(runs)):
         return None
     found: dict[int, list[bool]] = defaultdict(list)
     for run in runs:
-        found[levels.index(run)].append(run.passed)
+        if run.is_judged:
+            found[levels.index(run)].append(run.passed)
+    if not found:
+        return None
     rates = {level: wilson(sum(passed), len(passed)) for level, passed in sorted(found.items())}
     return ChartSeries(
         name,
@@ -121,8 +125,10 @@ def rate_maps(group: RunGroup) -> Iterator[RateMap]:
         if matrix is None or columns is None or rows is None:
             continue
         passed: dict[tuple[int, int], list[bool]] = defaultdict(list)
-        for run in group.distinct:
+        for run in (run for run in group.distinct if run.is_judged):
             passed[columns.index(run), rows.index(run)].append(run.passed)
+        if not passed:
+            continue
         rates: dict[tuple[int, int], Proportion] = {place: wilson(sum(one), len(one)) for place, one in passed.items()}
         svg = rate_map(
             columns.centers,

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.experiments.statistics.samples import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix
+from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix, success_rate
 from eidrive_scenario.reporting.run_report.rate_pictures import rate_curves, rate_maps
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
@@ -69,8 +68,9 @@ def write_report(
         **{**common, **values},
         total=len(counted),
         passed=sum(run.passed for run in counted),
-        failed=sum(not run.passed and run.finished for run in counted),
+        failed=sum(not run.passed and run.finished and run.is_judged for run in counted),
         broken=sum(not run.passed and not run.finished for run in counted),
+        without_criteria=sum(not run.is_judged for run in counted),
         metrics=[_title(name, runs) for name in metrics],
         groups=[
             {
@@ -86,7 +86,7 @@ def write_report(
                 "varied": group.varied,
                 "matrix": None if group.numbers == group.varied else parameter_matrix(group.distinct, group.varied),
                 "maps": list(rate_maps(group)),
-                "share": wilson(sum(run.passed for run in group.distinct), len(group.distinct)),
+                "share": success_rate(group.distinct),
                 "summaries": [_summary(group.distinct, name) for name in metrics],
             }
             for index, group in enumerate(groups)

@@ -77,6 +77,11 @@ class ReportedRun(BaseModel):
         return bool(self.axes or self.sweep)
 
     @property
+    def is_judged(self) -> bool:
+        """False for a run that ended without a criterion, unless it was accepted as it is."""
+        return self.passed or bool(self.criteria) or not self.finished
+
+    @property
     def finished(self) -> bool:
         """False if the run ended at its time limit."""
         return self.end_reason != TIME_LIMIT

@@ -98,7 +98,7 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
                     if value and name not in _NAMES
                 },
             },
-            channel_text(members[0].settings) if not any(name.startswith("channel.") for name in axes) else "",
+            channel_text(*(run.settings for run in members)),
             tuple(members),
             axes,
         )

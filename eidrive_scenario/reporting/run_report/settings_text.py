@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 _MAX_DEPTH = 12
 _FRACTION = re.compile(r"[+-]?(0|[1-9]\d*)?\.\d+([eE][+-]?\d+)?", re.ASCII)
 _MAX_LENGTH = 2000
 """Maximum number of displayed characters of a value."""
+_MOST_VALUES = 8
+"""Maximum number of displayed values of a setting that varies; of more numbers, the range is shown."""
+_ABSENT = "absent"
 
 
 def flow_text(value: Any, depth: int = 0) -> str:
@@ -44,12 +47,31 @@ def _flatten(path: str, value: Any, depth: int) -> Iterator[tuple[str, str]]:
         yield path, flow_text(value)
 
 
-def channel_text(settings: Mapping[str, Any]) -> str:
-    """Return the content of the initial channel without its description; empty without a channel."""
-    profile = settings.get("channel_profile")
-    if not isinstance(profile, Mapping):
-        return ""
-    return shorten(flow_text({key: item for key, item in profile.items() if key not in ("name", "description")}))
+def channel_text(*settings: Mapping[str, Any]) -> str:
+    """Return the content of the initial channel of runs without its description; empty without a channel.
+
+    A value in which the channels differ is `varies: 0.1, 0.2`.
+    """
+    profiles = [found for one in settings if isinstance(found := one.get("channel_profile"), Mapping)]
+    hidden = ("name", "description")
+    shown = [{key: item for key, item in profile.items() if key not in hidden} for profile in profiles]
+    return shorten(flow_text(_common(shown))) if shown else ""
+
+
+def _common(values: Sequence[Any], depth: int = 0) -> Any:
+    """Return the value of several runs; in place of different values, at any depth of mappings, their list as text."""
+    if all(value == values[0] for value in values[1:]):
+        return values[0]
+    if depth < _MAX_DEPTH and all(isinstance(value, Mapping) for value in values):
+        keys = dict.fromkeys(key for value in values for key in value)
+        return {key: _common([value.get(key, _ABSENT) for value in values], depth + 1) for key in keys}
+    numbers = {value for value in values if isinstance(value, int | float) and not isinstance(value, bool)}
+    texts = [flow_text(number) for number in sorted(numbers)]
+    if len(texts) > _MOST_VALUES:
+        texts = [f"{texts[0]} … {texts[-1]} ({len(texts)} values)"]
+    others = [flow_text(value) for value in values if isinstance(value, bool) or not isinstance(value, int | float)]
+    texts += dict.fromkeys(others)
+    return "varies: " + ", ".join(texts[:_MOST_VALUES]) + ", …" * (len(texts) > _MOST_VALUES)
 
 
 def run_facts(settings: Mapping[str, Any]) -> dict[str, str]:

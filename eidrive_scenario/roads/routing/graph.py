@@ -132,7 +132,7 @@ def find_lanes(
 
     Raise RouteError if there is none.
     """
-    source, target = _key(roads, start), _key(roads, end)
+    source, target = lane_key(roads, start), lane_key(roads, end)
     successors: Successors = ways.successors
     goal = ways.nodes[target]["end"] if target in ways.nodes else (0.0, 0.0)
     last = ways.nodes[target]["length"] if target in ways.nodes else 0.0
@@ -224,6 +224,7 @@ class _StartLane(LaneKey):
         return hash(("started", *self))
 
 
-def _key(roads: Mapping[str, Road], location: LaneLocation) -> LaneKey:
+def lane_key(roads: Mapping[str, Road], location: LaneLocation) -> LaneKey:
+    """Return the lane of a location. Raise PositionError if it does not exist."""
     section, lane = lane_at(roads[location.road], location.lane, location.s)
     return LaneKey(location.road, section.index, lane.id)

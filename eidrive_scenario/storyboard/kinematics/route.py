@@ -56,9 +56,11 @@ def build_route(
     try:
         return _connect_waypoints(places, roads, costs, start, closed=again and route.closed)
     except RouteError as error:
+        (cause,) = error.diagnostics
         kind = "closed route" if again and route.closed else "route"
-        message = f"{kind} {route.name!r} is not drivable: {error.diagnostics[0].message}"
-        hint = "change its waypoints" + (', or set closed="false"' if again and route.closed else "")
+        message = f"{kind} {route.name!r} is not drivable: {cause.message}"
+        reopened = ', or set closed="false"' if again and route.closed else ""
+        hint = f"{cause.hint}, or " * bool(cause.rule) + f"change its waypoints{reopened}"
         raise ScenarioError(Diagnostic(message, hint, route.source, route.line)) from error
 
 

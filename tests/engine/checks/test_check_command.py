@@ -116,6 +116,46 @@ def test_check_rule_violation_reports_the_rule_name(eidrive: Eidrive, folder: Ca
     ]
 
 
+@pytest.mark.parametrize("named", ["late.yaml", "$Channel"])
+def test_check_parameter_in_channel_file_is_used(eidrive: Eidrive, folder: Callable[..., Path], named: str) -> None:
+    """The file that an event may select, too; by its name, or by a parameter."""
+    command = f'<CustomCommandAction type="eidrive.channel">{named}</CustomCommandAction></UserDefinedAction>'
+    place = folder(
+        late=("</UserDefinedAction>", f"</UserDefinedAction><UserDefinedAction>{command}"),
+    )
+    declared = "".join(
+        f'<ParameterDeclaration name="{name}" parameterType="{kind}" value="{value}"/>'
+        for name, kind, value in (("Late", "double", "0.1"), ("Channel", "string", "late.yaml"), ("Other", "int", "1"))
+    )
+    path = place / "late.xosc"
+    path.write_text(path.read_text().replace(UNUSED[0], UNUSED[0] + declared, 1))
+    (place / "late.yaml").write_text("delay: {kind: constant, seconds: '${$Late * 2}'}\n")
+    unused = ["Other"] if named == "$Channel" else ["Channel", "Other"]
+    shown = re.findall(r"parameter '(\w+)' is never used", eidrive("check", path).stdout)
+    assert shown == unused
+
+
+def test_check_names_in_options_are_used(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    """A parameter to which a criterion of the option or of its file refers, and one of a driving stack."""
+    path = folder(unused=UNUSED) / "unused.xosc"
+    limit = path.with_name("limit.yaml")
+    limit.write_text("max_speed: {of: Ego, at_most: $N}\n")
+    for option in (["--criterion", "{max_speed: {of: Ego, at_most: $N}}"], ["--criterion", str(limit)]):
+        assert eidrive("check", path, *option).stdout == "1 file, 0 errors, 0 warnings\n"
+    driven = eidrive("check", path, "--drive", "Ego={target_speed: $N}").stdout
+    assert "parameter 'N' is never used" not in driven
+
+
+def test_check_scenario_without_criterion_has_a_note(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    place = folder(bare=('type="eidrive.criterion"', 'type="other"'))
+    done = eidrive("check", place / "bare.xosc", "--strict")
+    assert done.exit_code == 0
+    assert f"{place}/bare.xosc: the run is not judged: it has no criterion; add one to the scenario" in done.stdout
+    assert done.stdout.splitlines()[-1] == "1 file, 0 errors, 0 warnings, 1 note"
+    judged = eidrive("check", place / "bare.xosc", "--criterion", "{collision: {of: Ego}}")
+    assert judged.stdout == "1 file, 0 errors, 0 warnings\n"
+
+
 def test_check_strict_with_warning_exits_with_2(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     place = folder(unused=UNUSED)
     assert eidrive("check", "--strict", place).exit_code == 2

@@ -52,3 +52,14 @@ def test_keyboard_interrupt_ends_with_exit_code_130(eidrive: Eidrive, monkeypatc
 def test_unknown_command_or_option_is_invalid_input(eidrive: Eidrive) -> None:
     assert eidrive("rum").exit_code == 2
     assert eidrive("run", "--no-such-option").exit_code == 2
+
+
+def test_unknown_value_of_a_list_has_a_suggestion(eidrive: Eidrive) -> None:
+    for arguments, expected in (
+        (("list", "critera"), "unknown value 'critera'; did you mean 'criteria'?"),
+        (("list", "zzz"), "unknown value 'zzz'; known: scenarios, catalogs"),
+        (("run", "coop/scenario_1", "--record", "alway"), "unknown value 'alway'; did you mean 'always'?"),
+    ):
+        done = eidrive(*arguments)
+        text = " ".join(done.stderr.replace("│", " ").split())
+        assert (done.exit_code, expected in text, "Value error" in text) == (2, True, False), text

@@ -129,7 +129,7 @@ def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive
         done = subprocess.run(outside, cwd=tmp_path, capture_output=True, text=True, check=False, env=given)
         assert done.returncode == (0 if named else 2)
         assert ("unknown criterion 'keep_gap'" in done.stdout + done.stderr) is not named
-        assert (f"or with EIDRIVE_PROJECT={folder}" in done.stderr) is not named
+        assert (f"or with eidrive --project {folder}" in done.stderr) is not named
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
         write_scenario(folder / f"{name}.xosc")
     for name, extensions in FAULTS.items():
         write_scenario(folder / f"{name}.xosc", **extensions)  # type: ignore[arg-type]
-    pytester.makeini(f"[pytest]\neidrive_wall_limit = {LIMIT}\n")
+    pytester.makeini(f"[pytest]\neidrive_wall_limit = {LIMIT}\neidrive_without_criteria = pass\n")
     return pytester
 
 
@@ -91,7 +91,7 @@ def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytes
 
 
 def test_wall_limit_option_overrides_ini_option(project: pytest.Pytester) -> None:
-    project.makeini("[pytest]\neidrive_wall_limit = never\n")
+    project.makeini("[pytest]\neidrive_wall_limit = never\neidrive_without_criteria = pass\n")
     refused = project.runpytest_subprocess("xosc/sound_0.xosc", "-p", "no:cacheprovider")
     refused.stderr.fnmatch_lines(
         ["*ini option eidrive_wall_limit: not a positive number of seconds or none (got 'never')*"]

@@ -28,6 +28,7 @@ def run(scenario: str, channel: str, seed: int, passed: bool, **parameters: str)
         "channel": channel,
         "passed": passed,
         "end_reason": "stop trigger",
+        "criteria": [{"name": "collision", "passed": passed}],
         "parameters": parameters,
         "trace_hash": f"{seed}",
         "run": seed if parameters else None,

@@ -100,6 +100,33 @@ def test_settings_that_follow_from_an_axis_do_not_separate_groups() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("delays", "expected"),
+    [
+        ((0.2, 0.2), "0.2"),
+        ((0.3, 0, 0.1), "varies: 0, 0.1, 0.3"),
+        (range(1, 21), "varies: 1 … 20 (20 values)"),
+        ((0.1, {"mean": 1}), "varies: 0.1, {mean: 1}"),
+    ],
+)
+def test_content_of_channel_states_values_that_vary(delays: Any, expected: str) -> None:
+    """The file of the channel refers to the speed, the axis of the sweep, as `seconds: $Speed` does."""
+    profile = {"name": "late", "range": 300.0}
+    runs = [
+        swept(float(index), channel_profile={**profile, "delay": {"kind": "constant", "seconds": delay}})
+        for index, delay in enumerate(delays)
+    ]
+    (group,) = group_runs(runs)
+    assert group.content == f"{{range: 300, delay: {{kind: constant, seconds: {expected}}}}}"
+
+
+def test_content_of_channels_of_different_kinds_states_absent_settings() -> None:
+    delays = ({"kind": "constant", "seconds": 0.1}, {"kind": "normal", "mean": 0.2})
+    (group,) = group_runs([swept(float(index), channel_profile={"delay": one}) for index, one in enumerate(delays)])
+    expected = "{kind: varies: constant, normal, seconds: varies: 0.1, absent, mean: varies: 0.2, absent}"
+    assert group.content == f"{{delay: {expected}}}"
+
+
 def test_settings_of_other_sweeps_separate_groups() -> None:
     """The second sweep continues the axis of the first one with another range of the detector."""
     far: dict[str, Any] = {"stations": {"Ego": {"target_speed": 8.0, "detector": "oracle", "range": 80.0}}}

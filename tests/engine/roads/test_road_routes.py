@@ -6,7 +6,17 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
-from opendrive_xml import lane_links_xml, lane_xml, map_xml, ring_xml, road_xml, section_xml
+from opendrive_xml import (
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    ring_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, RouteError
 from eidrive_scenario.roads.routing.graph import cheapest_path
@@ -81,6 +91,53 @@ def test_route_cost_equals_dijkstra(crossing: RoadNetwork) -> None:
                 assert nx.path_weight(crossing.graph, found, "weight") == pytest.approx(cost)
                 checked += 1
     assert checked > 100
+
+
+def through_junction(*, entry: bool = True, leave: bool = True) -> RoadNetwork:
+    """Return road 1, a connecting road 10 and road 2; the arguments are whether the lane links of road 10 exist."""
+
+    def lane(before: int | None = None, after: int | None = None) -> str:
+        return lane_xml(-1, link=lane_links_xml(before, after))
+
+    roads = (
+        road_xml("1", lanes=section_xml(right=lane()), link=successor_xml(junction="100")),
+        road_xml(
+            "10",
+            x=100.0,
+            length=20.0,
+            junction="100",
+            link=predecessor_xml("1") + successor_xml("2"),
+            lanes=section_xml(right=lane(-1 if entry else None, -1 if leave else None)),
+        ),
+        road_xml("2", x=120.0, link=predecessor_xml(junction="100"), lanes=section_xml(right=lane())),
+    )
+    return RoadNetwork.parse(map_xml(*roads, rest=junction_xml("100", "1", {"10": -1} if entry else {})))
+
+
+@pytest.mark.parametrize(
+    ("missing", "expected"),
+    [
+        ("entry", "lane -1 of road '1' (section at s = 0 m) has no successor although the road continues in junction"),
+        ("leave", "lane -1 of road '10' (section at s = 0 m) has no successor although the road continues in road '2'"),
+    ],
+)
+def test_route_error_names_missing_lane_link(missing: str, expected: str) -> None:
+    """The links of the roads lead from road 1 over road 10 to road 2; one of its lanes lacks its own."""
+    start, end = LaneLocation("1", -1, 10.0, 0.0, -1.75), LaneLocation("2", -1, 90.0, 0.0, -1.75)
+    assert through_junction().route(start, end).lanes[-1].road == "2"
+    with pytest.raises(RouteError) as caught:
+        through_junction(**{missing: False}).route(start, end)
+    (diagnostic,) = caught.value.diagnostics
+    assert f"<memory>:1: {expected}" in diagnostic.message
+    assert diagnostic.rule == "lane-link"
+
+
+def test_route_error_names_no_link_that_does_not_help() -> None:
+    """Road 2 leads away from road 1: no link of its lane makes a way back, although one is missing elsewhere."""
+    start, end = LaneLocation("2", -1, 10.0, 0.0, -1.75), LaneLocation("1", -1, 10.0, 0.0, -1.75)
+    with pytest.raises(RouteError) as caught:
+        through_junction(leave=False).route(start, end)
+    assert caught.value.diagnostics[0].rule == ""
 
 
 def test_route_against_the_traffic_is_an_error(crossing: RoadNetwork) -> None:

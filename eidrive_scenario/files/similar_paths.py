@@ -1,0 +1,67 @@
+"""Hints for paths of files that do not exist: similar files and folders beside them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable
+from itertools import islice
+from pathlib import Path
+
+from eidrive_scenario.errors import most_similar, suggestion
+
+_MOST_ENTRIES = 2000
+"""Maximum number of entries of a folder with which a name is compared."""
+
+
+def file_suggestion(
+    given: str | Path,
+    suffixes: Collection[str],
+    known: Iterable[str] = (),
+    *,
+    folder: Path = Path(),
+    otherwise: str = "check the path",
+) -> str:
+    """Return a hint for a missing file: the most similar file of its folder, or else of `known` names.
+
+    given      path, or one of the names with or without a suffix
+    suffixes   of the files
+    folder     folder of relative paths
+    otherwise  hint without a similar file and without known names
+    """
+    similar = _similar_path(folder / given, suffixes)
+    if similar is not None:
+        return f"did you mean {str(similar.relative_to(folder) if similar.is_relative_to(folder) else similar)!r}?"
+    names, path = list(known), Path(given)
+    if not names:
+        return otherwise
+    word = next((str(path)[: -len(suffix)] for suffix in suffixes if path.suffix == suffix), str(given))
+    beside = [str(path.parent / name) for name in _names(folder / path.parent, suffixes)]
+    is_path = path.suffix in suffixes or len(path.parts) > 1
+    return suggestion(word, beside if beside and is_path and most_similar(word, names) is None else names)
+
+
+def _similar_path(path: Path, suffixes: Collection[str]) -> Path | None:
+    """Return an existing file whose path differs from `path` by similar names only; None without one."""
+    above = path.parent
+    if not os.path.isdir(above):
+        folder = None if above == path else _similar_path(above, ())
+        return None if folder is None else _existing(folder / path.name, suffixes)
+    name = most_similar(path.name, _names(above, suffixes))
+    return None if name is None else above / name
+
+
+def _existing(path: Path, suffixes: Collection[str]) -> Path | None:
+    return path if os.path.isfile(path) else _similar_path(path, suffixes)
+
+
+def _names(folder: Path, suffixes: Collection[str]) -> list[str]:
+    """Return the names of the files with these suffixes, or of the folders without suffixes."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(
+                entry.name
+                for entry in islice(entries, _MOST_ENTRIES)
+                if (Path(entry.name).suffix in suffixes if suffixes else entry.is_dir())
+            )
+    except (OSError, ValueError):
+        return []
