@@ -18,6 +18,7 @@ from eidrive_scenario.experiments.cooperative_perception.conditions import (
 )
 from eidrive_scenario.experiments.cooperative_perception.samples import OVERLAPS, RANGES, PerceptionRecord
 from eidrive_scenario.experiments.cooperative_perception.scores import Pool
+from eidrive_scenario.experiments.reproduction import pose_errors
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import (
     Column,
@@ -43,12 +44,13 @@ ALL_RANGES = "all"
 
 
 def cases(detectors: Sequence[str]) -> list[Case]:
-    """Return one run per scene: all arms measure the same frames."""
+    """Return one run per scene, in which all arms measure the same frames, and the drives with pose errors."""
     conditions = all_conditions()
-    return [
+    measured = [
         Case(scene, detector, RunSettings(detector=detector, time_limit=DURATION), conditions=conditions)
         for scene, detector in product(SCENES, detectors)
     ]
+    return measured + pose_errors.cases(detectors)
 
 
 def records(episodes: Sequence[Episode]) -> list[PerceptionRecord]:
@@ -230,6 +232,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
             _hidden_table(hidden),
         ),
         Section("Precision and volume", (), DataTable("perception_volume", VOLUME_COLUMNS, volumes)),
+        pose_errors.section(episodes),
         Section(
             "Data",
             ("By arm, axis, value, range and overlap, with interval and local sort: perception.csv.",),
@@ -248,8 +251,8 @@ PART = Part(
     "perception",
     "Average precision of cooperative perception",
     (
-        "What do late and early fusion gain in average precision, and how much of it do pose errors, latency, "
-        "loss and fewer bytes cost?"
+        "What do late and early fusion gain in average precision, how much of it do pose errors, latency, loss and "
+        "fewer bytes cost, and do pose errors make the ego brake?"
     ),
     4,
     DETECTORS,

@@ -9,7 +9,7 @@ import pytest
 
 from eidrive_scenario.experiments.cooperative_perception.conditions import ARMS, AXES, COMPARED, all_conditions
 from eidrive_scenario.experiments.cooperative_perception.samples import PerceptionRecord, Tally
-from eidrive_scenario.experiments.reproduction import perception
+from eidrive_scenario.experiments.reproduction import perception, pose_errors
 from eidrive_scenario.experiments.reproduction.digests import job_digest
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Row
@@ -122,3 +122,40 @@ def test_crossing_is_interpolated() -> None:
     assert crossing({0.0: 0.8, 0.2: 0.6, 0.4: 0.2}, 0.5) == pytest.approx(0.25)
     assert crossing({0.0: 0.8, 0.2: 0.6}, 0.5) is None
     assert crossing({0.0: 0.4, 0.2: 0.2}, 0.5) == 0.0
+
+
+def test_closed_loop_rows_summarize_runs_of_an_arm() -> None:
+    """Two runs of one arm: least speeds 9.9 and 6.1 m/s, mean 8.0; one of them brakes twice and collides."""
+    arm = next(arm for arm in pose_errors.arms() if arm.deviation == 0.2)
+    drives = [
+        Episode(
+            pose_errors.SCENE,
+            arm.name,
+            seed,
+            "0" * 16,
+            "",
+            17.0,
+            5.0,
+            {"min_speed.Ego": speed, "false_braking.Ego.brakings": brakings, "collision.count": brakings / 2},
+        )
+        for seed, speed, brakings in ((1, 9.9, 0.0), (2, 6.1, 2.0))
+    ]
+    (row,) = pose_errors.rows(drives)
+    assert (row["detector"], row["tracker"], row["deviation"]) == (arm.detector, arm.tracker, 0.2)
+    assert (row["runs"], row["least_speed"], row["brakings"], row["collisions"]) == (2, 6.1, 2, 1)
+    assert row["mean_least_speed"] == pytest.approx(8.0)
+
+
+def test_closed_loop_covers_each_tracker_and_fusion_at_all_errors() -> None:
+    drives = pose_errors.cases(perception.DETECTORS)
+    assert len({case.arm for case in drives}) == len(drives)
+    cells = {(arm.tracker, arm.fusion, arm.deviation) for arm in pose_errors.arms() if arm.detector == "oracle"}
+    expected = {
+        (tracker, fusion, deviation)
+        for tracker in ("none", "cv", "ctrv")
+        for fusion in ("average", "covariance_intersection")
+        for deviation in (0.0, 0.05, 0.2, 0.4, 0.6)
+    }
+    assert cells == expected
+    assert {arm.fusion for arm in pose_errors.arms() if arm.detector == "lidar"} >= {"early"}
+    assert pose_errors.cases(()) == [case for case in drives if not case.arm.startswith("lidar")]
