@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
@@ -113,6 +114,20 @@ def test_body_stays_the_same_track_of_a_station(car: ActorSpec) -> None:
     assert kept(own, seen((16.0, 0.0), tracks=(5,))) == []
     assert kept(own, seen((16.0, 0.0), tracks=(6,))) == [(16.0, 0.0)]
     assert kept(own, seen((20.0, 0.0), tracks=(5,))) == [(20.0, 0.0)]
+
+
+def test_station_that_has_just_reported_the_body_reports_it_again(car: ActorSpec) -> None:
+    """The error of a pose lasts: a deviation of 4 standard deviations, which is outside the gate of 99 %, is the body
+    if the station reported the body within the last second, and if no other object of its report is likelier."""
+    far, near = seen((15.0, 0.0)), seen((8.0, 0.0))
+    assert kept(body(car), far) == [(15.0, 0.0)]
+    for pause, expected in ((0.5, []), (1.5, [(15.0, 0.0)])):
+        own = body(car)
+        assert kept(own, near) == []
+        assert kept(own, replace(far, time=pause)) == expected
+    own = body(car)
+    assert kept(own, near) == []
+    assert kept(own, replace(seen((15.0, 0.0), (3.0, 0.0)), time=0.1)) == [(15.0, 0.0)]
 
 
 def test_empty_reports_and_those_older_than_the_history_are_read(car: ActorSpec) -> None:
