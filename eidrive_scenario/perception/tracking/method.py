@@ -25,8 +25,8 @@ class TrackingMethod(ABC):
         self.settings = settings
 
     def set_pose(self, pose: PoseUncertainty) -> None:  # noqa: B027 - an optional hook
-        """Store the pose of the station and its uncertainty; called before each call below if the pose has random
-        errors.
+        """Store the pose of the station and its uncertainty; called in each time step, before the calls below, if the
+        pose has random errors. With a latency of the detector, `update` gets detections of an earlier time step.
 
         Detections have a common error then, which their covariances do not contain.
         """

@@ -89,18 +89,18 @@ class Tracker(TrackingMethod):
             self._pose_errors.advance(detections.time)
         noise = position_noise(detections.covariance)
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
-        predicted = self._filter.combined(self._tracks)
-        rows, columns = associate(predicted, confirmed, detections.boxes, noise, self._gate)
-        on_bodies = self._boxes_on_bodies(predicted, confirmed, detections.boxes)
+        expected = self._filter.combined(self._tracks)
+        rows, columns = associate(expected, confirmed, detections.boxes, noise, self._gate)
+        on_bodies = self._boxes_on_bodies(expected, confirmed, detections.boxes)
         for column, row in on_bodies.items():
             if column not in columns and row not in rows:
                 rows.append(row)
                 columns.append(column)
                 # It says that the object is there, and little about its place.
-                offset = detections.boxes[column, :2] - predicted.state[row, :2]
+                offset = detections.boxes[column, :2] - expected.state[row, :2]
                 noise[column] += np.outer(offset, offset)
         hit = set(rows)
-        self._update_existence(predicted, rows, detections, columns, noise, in_view)
+        self._update_existence(expected, rows, detections, columns, noise, in_view)
         if rows:
             self._correct(rows, detections, columns, noise)
         for row, history in enumerate(self._histories):
@@ -112,14 +112,14 @@ class Tracker(TrackingMethod):
         self._delete(detections.time)
         return self._confirm_and_report(detections.time)
 
-    def _boxes_on_bodies(self, predicted: Estimates, confirmed: Bools, boxes: Array) -> dict[int, int]:
+    def _boxes_on_bodies(self, expected: Estimates, confirmed: Bools, boxes: Array) -> dict[int, int]:
         """Return the boxes with their centers on the body of a confirmed track, with the row of this track.
 
         Two bodies cannot overlap, so that they show this object: a part of it, or all of it outside the gate.
         """
         tracks = np.flatnonzero(confirmed)
         length, width, yaw = self._shape[tracks][:, [1, 2, 4]].T
-        offset = boxes[None, :, :2] - predicted.state[tracks, None, :2]
+        offset = boxes[None, :, :2] - expected.state[tracks, None, :2]
         cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
         ahead = cos * offset[..., 0] + sin * offset[..., 1]
         aside = cos * offset[..., 1] - sin * offset[..., 0]
@@ -128,7 +128,7 @@ class Tracker(TrackingMethod):
 
     def _update_existence(
         self,
-        predicted: Estimates,
+        expected: Estimates,
         rows: list[int],
         detections: Detections,
         columns: list[int],
@@ -138,8 +138,8 @@ class Tracker(TrackingMethod):
         """Update the existence of all tracks; those in `rows` are detected."""
         settings = self.settings
         if rows:
-            offset = detections.boxes[columns, :2] - predicted.state[rows, :2]
-            spread = predicted.covariance[rows][:, :2, :2] + noise[columns]
+            offset = detections.boxes[columns, :2] - expected.state[rows, :2]
+            spread = expected.covariance[rows][:, :2, :2] + noise[columns]
             determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
             squared = np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset)
             ratio = likelihood_ratio(
@@ -152,7 +152,7 @@ class Tracker(TrackingMethod):
             self._existence[rows] = detected(self._existence[rows], ratio)
         lost = np.setdiff1d(np.arange(len(self._histories)), rows)
         if len(lost):
-            share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, predicted.state[lost])), 0.0, 1.0)
+            share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, expected.state[lost])), 0.0, 1.0)
             self._existence[lost] = missed(self._existence[lost], settings.detection_probability * share)
 
     def _boxes(self, rows: NDArray[np.intp] | list[int], state: Array) -> Array:

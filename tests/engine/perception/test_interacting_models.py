@@ -122,7 +122,7 @@ def test_mixture_has_moments_of_gaussian_mixture() -> None:
 def scene_with_pose_error(shared: bool) -> tuple[Tracks, Tracks, InteractingModels]:
     """Return tracks of five standing cars and one at 4 m/s, without and with the pose change that all others show.
 
-    The station at the origin has a pose error of 0.4 m, drawn anew in each scan.
+    The station at the origin has a pose error of 0.4 m, drawn in each scan.
     """
     errors = PoseErrors()
     models = InteractingModels(ConstantVelocity(), errors)
