@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
+from eidrive_scenario.errors import quoted
 from eidrive_scenario.recording.frame import Frame
 
+MAX_TIME = 1e9
+"""Maximum time of a frame [s]. In nanoseconds it fits into the 64 bits of MCAP."""
+MAX_TICK = 2**32 - 1
+"""Maximum tick of a frame: the sequence number of its message has 32 bits."""
 _COLUMNS = {
     "position": 3,
     "yaw": 0,
@@ -22,10 +25,12 @@ _COLUMNS = {
 
 
 def check_frame(frame: Frame) -> None:
-    """Raise ValueError if the time is not finite or an array of the view does not have one row per actor."""
+    """Raise ValueError if time or tick are out of range or an array of the view does not have one row per actor."""
     view = frame.view
-    if not math.isfinite(view.time):
-        raise ValueError(f"time is not finite (got {view.time})")
+    if not 0.0 <= view.time <= MAX_TIME:
+        raise ValueError(f"time is out of range (got {view.time}; expected 0 to {MAX_TIME:g})")
+    if not 0 <= view.tick <= MAX_TICK:
+        raise ValueError(f"tick is out of range (got {quoted(view.tick)}; expected 0 to {MAX_TICK})")
     count = len(view.names)
     if len(view.categories) != count or len(set(view.names)) != count:
         raise ValueError("names and categories of the actors are inconsistent")
