@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from eidrive_scenario.errors import quoted
 from eidrive_scenario.recording.frame import Frame
 
@@ -9,6 +11,8 @@ MAX_TIME = 1e9
 """Maximum time of a frame [s]. In nanoseconds it fits into the 64 bits of MCAP."""
 MAX_TICK = 2**32 - 1
 """Maximum tick of a frame: the sequence number of its message has 32 bits."""
+MAX_NUMBER = 1e12
+"""Maximum absolute value of the numbers of a view. Scenarios have positions and speeds of at most 1e9."""
 _COLUMNS = {
     "position": 3,
     "yaw": 0,
@@ -35,6 +39,8 @@ def check_frame(frame: Frame) -> None:
     if len(view.categories) != count or len(set(view.names)) != count:
         raise ValueError("names and categories of the actors are inconsistent")
     for name, columns in _COLUMNS.items():
-        shape = getattr(view, name).shape
-        if shape != ((count, columns) if columns else (count,)):
-            raise ValueError(f"{name} has an invalid shape (got {shape} for {count} actors)")
+        array = getattr(view, name)
+        if array.shape != ((count, columns) if columns else (count,)):
+            raise ValueError(f"{name} has an invalid shape (got {array.shape} for {count} actors)")
+        if not (np.abs(array) <= MAX_NUMBER).all():
+            raise ValueError(f"{name} is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})")
