@@ -34,6 +34,8 @@ GRACE = 3.0
 """Time from the first interruption to the last resort [s]."""
 CLOSING = 30.0
 """Time in which an interrupted run has to close its files before the last resort [s]."""
+LONGEST = 1e9
+"""Limit that replaces longer ones, which exceed the timers of some systems [s]. No run takes 30 years."""
 _SIGNAL: int | None = getattr(signal, "SIGUSR2", None)
 
 
@@ -154,7 +156,7 @@ class _LimitedBlock:
     """
 
     def __init__(self, seconds: float | None) -> None:
-        self._seconds = seconds
+        self._seconds = None if seconds is None else min(float(seconds), LONGEST)
         self._watchdog: _Watchdog | None = None
 
     def __enter__(self) -> Limit | None:

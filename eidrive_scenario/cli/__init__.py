@@ -16,7 +16,7 @@ import typer
 from eidrive_scenario import __version__
 from eidrive_scenario.cli.command_table import CommandTable
 from eidrive_scenario.cli.error_output import Guarded, print_error
-from eidrive_scenario.cli.streams import make_writable
+from eidrive_scenario.cli.streams import echo, make_writable
 from eidrive_scenario.cli.supervision import allow
 from eidrive_scenario.exit_codes import ABORTED
 
@@ -46,7 +46,7 @@ app = typer.Typer(
 
 def _show_version(requested: bool) -> None:
     if requested:
-        typer.echo(f"eidrive-scenario {__version__}")
+        echo(f"eidrive-scenario {__version__}")
         raise typer.Exit
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-import typer
-
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
 from eidrive_scenario.exit_codes import INVALID_INPUT, NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
@@ -33,7 +32,7 @@ def run_distribution(
     _check_not_varied(expansion, parameters)
     numbers = range(len(expansion)) if max_runs is None else expansion.spread(max_runs)
     for warning in expansion.warnings:
-        typer.secho(f"warning: {warning}", fg="yellow", err=True)
+        echo(f"warning: {warning}", color="yellow", err=True)
     counts = {"passed": 0, "not passed": 0, "not judged": 0, "excluded by constraints": 0}
     code = 0
     last: ConstraintError | None = None
@@ -43,12 +42,12 @@ def run_distribution(
         except ConstraintError as error:
             last = error
             counts["excluded by constraints"] += repeat
-            typer.secho(f"run {run.number} ({run}) is skipped: {error}", fg="yellow", err=True)
+            echo(f"run {run.number} ({run}) is skipped: {error}", color="yellow", err=True)
             continue
         except InputError as error:
             if not counts["passed"] + counts["not passed"] + counts["not judged"]:
                 raise
-            typer.echo(f"run {run.number} ({run}): {error}", err=True)
+            echo(f"run {run.number} ({run}): {error}", err=True)
             codes = [INVALID_INPUT] * repeat
         passed, unjudged = codes.count(PASSED), codes.count(NOT_JUDGED)
         counts["passed"] += passed
@@ -59,7 +58,7 @@ def run_distribution(
         raise ScenarioError(last.diagnostics)
     counts["not selected"] = repeat * (len(expansion) - len(numbers))
     summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
-    typer.echo(f"{repeat * len(expansion)} runs in {path}: {summary}", err=True)
+    echo(f"{repeat * len(expansion)} runs in {path}: {summary}", err=True)
     return code
 
 

@@ -15,6 +15,7 @@ from eidrive_scenario.cli.error_output import print_error, print_unused_projects
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.option_values import check_seconds
 from eidrive_scenario.cli.short_help import HelpAll
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
@@ -67,7 +68,7 @@ def check(
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     printed: dict[str, dict[Diagnostic, None]] = {"error": dict.fromkeys(missing), "warning": {}, "note": {}}
     for diagnostic in missing:
-        typer.echo(str(diagnostic))
+        echo(str(diagnostic))
     for path in files:
         hung.file = path
         try:
@@ -83,13 +84,13 @@ def check(
         for level, found in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
             for diagnostic in found:
                 if diagnostic not in printed[level]:
-                    typer.echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")
+                    echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")
             printed[level].update(dict.fromkeys(found))
         if isinstance(report, DistributionCheckReport) and report.runs:
-            typer.echo(f"{path}: {_count(report.runs, 'run')}")
+            echo(f"{path}: {_count(report.runs, 'run')}")
     print_unused_projects(printed["error"])
     counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in printed.items())]
-    typer.echo(", ".join(counts if printed["note"] else counts[:-1]))
+    echo(", ".join(counts if printed["note"] else counts[:-1]))
     if aborted:
         raise typer.Exit(ABORTED)
     raise typer.Exit(INVALID_INPUT if printed["error"] or (strict and printed["warning"]) else 0)

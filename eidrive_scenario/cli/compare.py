@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import FAILED, PASSED
 
@@ -37,7 +38,7 @@ def compare(
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0.5 and 1"))
     found = compare_stores([first], [second], margin=margin, confidence=confidence, metrics=metric or [])
     for line in lines_of(found):
-        typer.echo(line)
+        echo(line)
     raise typer.Exit(PASSED if found.is_not_worse else FAILED)
 
 

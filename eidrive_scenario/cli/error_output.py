@@ -14,6 +14,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import (
     Diagnostic,
     EidriveError,
@@ -38,11 +39,11 @@ class Guarded(TyperGroup):
             return super().invoke(ctx)
         except InputError as error:
             for diagnostic in error.diagnostics:
-                typer.echo(str(diagnostic), err=True)
+                echo(str(diagnostic), err=True)
             print_unused_projects(error.diagnostics)
             raise typer.Exit(INVALID_INPUT) from error
         except KeyboardInterrupt as error:
-            typer.echo("interrupted", err=True)
+            echo("interrupted", err=True)
             print_notes(error)
             raise typer.Exit(_INTERRUPTED) from error
         except (Exception, SystemExit) as error:
@@ -81,16 +82,16 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
     error = _attribute(error)
     if isinstance(error, EidriveError):
         subject = f"{what} " if isinstance(error, SimulationError) or file is not None else ""
-        typer.echo(f"{prefix}{subject}aborted: {error}", err=True)
+        echo(f"{prefix}{subject}aborted: {error}", err=True)
         print_notes(error)
         return
     if isinstance(error, OSError) and error.strerror:
         filename = f": {error.filename}" if error.filename is not None else ""
-        typer.echo(f"{prefix}aborted: {error.strerror}{filename}", err=True)
+        echo(f"{prefix}aborted: {error.strerror}{filename}", err=True)
         print_notes(error)
         return
-    typer.echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)
-    typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) prints the traceback; please report it", err=True)
+    echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)
+    echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) prints the traceback; please report it", err=True)
     print_notes(error)
 
 
@@ -113,24 +114,24 @@ def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
             name = "modules of the table tool.eidrive in pyproject.toml"
             notices[f"{conftest}: only pytest knows extensions that it registers; name the module in {name}"] = None
     for notice in notices:
-        typer.echo(notice, err=True)
+        echo(notice, err=True)
 
 
 def show_traceback(error: BaseException) -> None:
     """Print the traceback of an error on stderr."""
-    typer.echo("".join(traceback.format_exception(error)).rstrip(), err=True)
+    echo("".join(traceback.format_exception(error)).rstrip(), err=True)
 
 
 def print_notes(error: BaseException) -> None:
     """Print the notes of an error of a run: the command that reproduces the run, and the path of its recording."""
     for note in getattr(error, "__notes__", ()):
-        typer.echo(note, err=True)
+        echo(note, err=True)
 
 
 def print_warnings(warnings: Iterable[str]) -> None:
     """Print warnings on stderr, one per line."""
     for warning in warnings:
-        typer.secho(f"warning: {warning}", fg="yellow", err=True)
+        echo(f"warning: {warning}", color="yellow", err=True)
 
 
 def _attribute(error: BaseException) -> BaseException:

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.streams import echo
+
 
 class TableName(StrEnum):
     """Tables of a run for CSV and Parquet files."""
@@ -67,6 +69,6 @@ def export(
     check_output_paths({option: path for option, (path, _) in given.items()}, [run.recording.path])
     for path, write in given.values():
         write(run, path)
-        typer.echo(str(path))
+        echo(str(path))
     for warning in dict.fromkeys(run.warnings):
-        typer.secho(f"warning: {warning}", fg="yellow", err=True)
+        echo(f"warning: {warning}", color="yellow", err=True)

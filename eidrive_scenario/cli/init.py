@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 TEMPLATE = "project_template"
@@ -48,9 +49,9 @@ def init(
     except OSError as error:
         raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "give a new folder", str(folder))) from error
     for path in sorted(written):
-        typer.echo(path.relative_to(folder))
+        echo(path.relative_to(folder))
     start = f"./{folder}" if str(folder).startswith("-") else str(folder)
-    typer.echo("next: " + ("pytest" if folder == Path() else f"cd {shlex.quote(start)} && pytest"), err=True)
+    echo("next: " + ("pytest" if folder == Path() else f"cd {shlex.quote(start)} && pytest"), err=True)
 
 
 def _package(name: str) -> str:

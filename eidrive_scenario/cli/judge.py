@@ -27,13 +27,13 @@ def judge(
 
     Exit codes as for eidrive run; 3 also for an incomplete or damaged recording.
     """
-    from eidrive_scenario.cli.streams import has_all_characters
+    from eidrive_scenario.cli.streams import echo, has_all_characters
     from eidrive_scenario.experiments.judgement import judge_recording
     from eidrive_scenario.experiments.single_run import as_json_text
 
     judgement = judge_recording(recording, criterion or None)
     if json:
-        typer.echo(as_json_text(judgement, ascii_only=not has_all_characters()))
+        echo(as_json_text(judgement, ascii_only=not has_all_characters()))
         print_warnings(judgement.warnings)
     else:
         from eidrive_scenario.cli.verdicts import show_judgement

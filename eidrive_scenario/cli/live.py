@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.short_help import rare
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 if TYPE_CHECKING:
@@ -46,8 +47,8 @@ def live_view(
     from eidrive_scenario.reporting.live.live_view import WAIT, LiveView
 
     def announce(address: str) -> None:
-        typer.echo(f"live view: {address}", err=to_stderr)
-        typer.echo(f"The run starts when the page is open, at the latest in {WAIT:g} s.", err=True)
+        echo(f"live view: {address}", err=to_stderr)
+        echo(f"The run starts when the page is open, at the latest in {WAIT:g} s.", err=True)
 
     return LiveView(speed=factor, port=port or 0, wait=WAIT, announce=announce)
 
@@ -58,7 +59,7 @@ def wait_until_closed(view: LiveView | None) -> None:
         return
     with suppress(KeyboardInterrupt):
         if view.clients:
-            typer.echo("The run has ended. Close the page or press Ctrl-C.", err=True)
+            echo("The run has ended. Close the page or press Ctrl-C.", err=True)
             view.wait_until_closed()
 
 

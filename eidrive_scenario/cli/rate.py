@@ -5,8 +5,7 @@ from __future__ import annotations
 import json as json_text
 from collections.abc import Sequence
 
-import typer
-
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import FAILED, PASSED
 from eidrive_scenario.experiments.statistics.proportions import anytime_interval
@@ -42,7 +41,7 @@ def decision_code(test: RatioTest, codes: Sequence[int], *, json: bool) -> int |
     rate = anytime_interval(passed, len(codes), 1.0 - test.false_pass)
     if json:
         found = {"at_least": test.bad, "decision": str(decision), "passed": passed, "runs": len(codes)}
-        typer.echo(json_text.dumps({"success_rate": {**found, "low": rate.low, "high": rate.high}}))
+        echo(json_text.dumps({"success_rate": {**found, "low": rate.low, "high": rate.high}}))
     else:
-        typer.echo(decision_text(test, decision, rate))
+        echo(decision_text(test, decision, rate))
     return PASSED if decision is Decision.PASSED else FAILED

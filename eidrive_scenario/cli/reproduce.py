@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.streams import echo
+
 
 def reproduce(
     parts: Annotated[
@@ -73,14 +75,14 @@ def reproduce(
         draw(part.name, done.report, out)
         if replays and part.has_replays:
             written = write_part_replays(part, out, used, workers=workers, console=Console(stderr=True))
-            typer.echo(f"{part.name}: wrote {written}")
+            echo(f"{part.name}: wrote {written}")
         elif replays:
-            typer.echo(f"{part.name}: --replays has no effect on this part", err=True)
+            echo(f"{part.name}: --replays has no effect on this part", err=True)
         page = write_paper_page(out)
         kept = len(done.episodes) - done.added
-        typer.echo(
+        echo(
             f"{part.name}: {done.added} runs in {done.elapsed_s:.0f} s, {kept} from the record; all "
             f"{len(done.episodes)} took {done.computed_s:.0f} s of one process; wrote {out / part.name}.md and {page}"
         )
         if done.unused:
-            typer.echo(f"{part.name}: {done.unused} runs of the record have other settings, seeds or code", err=True)
+            echo(f"{part.name}: {done.unused} runs of the record have other settings, seeds or code", err=True)

@@ -25,7 +25,7 @@ from eidrive_scenario.cli.option_values import check_seconds, parse_assignments,
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
 from eidrive_scenario.cli.short_help import HelpAll, rare
-from eidrive_scenario.cli.streams import has_all_characters
+from eidrive_scenario.cli.streams import echo, has_all_characters
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
@@ -232,7 +232,7 @@ def run(
             except InputError as error:
                 if not codes or isinstance(error, ConstraintError):
                     raise
-                typer.echo(f"seed {each}: {error}", err=True)  # The values that it draws are invalid
+                echo(f"seed {each}: {error}", err=True)  # The values that it draws are invalid
                 codes.append(INVALID_INPUT)
                 continue
             except EidriveError as error:
@@ -241,18 +241,18 @@ def run(
                 codes.append(ABORTED)
                 continue
             if json:
-                typer.echo(as_json_text(result, ascii_only=not has_all_characters()))
+                echo(as_json_text(result, ascii_only=not has_all_characters()))
                 print_warnings(result.warnings)
                 for line in reproduction_lines(result):
-                    typer.echo(line, err=True)
+                    echo(line, err=True)
             else:
                 from eidrive_scenario.cli.verdicts import show
 
                 show(result, varied="" if isinstance(source, Path) else str(source))
             if result.folder is not None:
-                typer.echo(f"files: {result.folder}", err=json)
+                echo(f"files: {result.folder}", err=json)
             for explanation in explanations:
-                typer.echo("\n".join(explanation.lines()), err=json)
+                echo("\n".join(explanation.lines()), err=json)
             wait_until_closed(viewed)
             codes.append(result.exit_code)
         decided = None if test is None else decision_code(test, codes, json=json)

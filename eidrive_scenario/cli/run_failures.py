@@ -10,10 +10,8 @@ import sys
 from types import FrameType
 from typing import TYPE_CHECKING
 
-import typer
-
 from eidrive_scenario.cli.error_output import print_error, show_traceback
-from eidrive_scenario.cli.streams import has_all_characters
+from eidrive_scenario.cli.streams import echo, has_all_characters
 from eidrive_scenario.errors import EidriveError, SimulationError
 from eidrive_scenario.exit_codes import ABORTED
 
@@ -103,4 +101,4 @@ class RunFailures:
         }
         if notes := getattr(error, "__notes__", None):
             entry["notes"] = notes
-        typer.echo(json.dumps(entry, ensure_ascii=not has_all_characters()))
+        echo(json.dumps(entry, ensure_ascii=not has_all_characters()))

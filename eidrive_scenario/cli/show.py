@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.output_paths import check_output_paths
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
         known = registry(what.value)
         lines = _columns([(name, known.value(name)) for name in known])
     for line in lines:
-        typer.echo(line)
+        echo(line)
 
 
 def _scenario_lines() -> list[str]:
@@ -120,7 +121,7 @@ def tree(
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
     storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
     if svg is not None:
-        typer.echo(str(write_storyboard_diagram(storyboard, svg)))
+        echo(str(write_storyboard_diagram(storyboard, svg)))
     else:
         console().print(storyboard_tree(storyboard))
 
@@ -176,12 +177,12 @@ def view(
     if page is not None:
         damage = _write_replay(opened, page, complete)
     for line in damage:
-        typer.secho(f"warning: {path} is damaged: {line}", fg="yellow", err=True)
+        echo(f"warning: {path} is damaged: {line}", color="yellow", err=True)
     if not complete:
-        typer.secho(f"warning: {path}: the run did not end, the recording is incomplete", fg="yellow", err=True)
+        echo(f"warning: {path}: the run did not end, the recording is incomplete", color="yellow", err=True)
     for written in (png, gif, mp4, page):
         if written is not None:
-            typer.echo(str(written))
+            echo(str(written))
     if browser and page is not None:
         typer.launch(page.resolve().as_uri())
 
@@ -220,6 +221,6 @@ def report(
         out = runs[0] if runs[0].is_dir() else runs[0].parent
 
     def warn(text: str) -> None:
-        typer.secho(f"warning: {text}", fg="yellow", err=True)
+        echo(f"warning: {text}", color="yellow", err=True)
 
-    typer.echo(str(report_files(runs, out, replays=replays, warn=warn)))
+    echo(str(report_files(runs, out, replays=replays, warn=warn)))

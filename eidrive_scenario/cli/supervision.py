@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import typer
 
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.exit_codes import ABORTED
 
 if TYPE_CHECKING:
@@ -87,9 +88,9 @@ def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str
         return ABORTED
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
-        typer.echo(f"{what} aborted: its process was ended by {signal.Signals(-code).name}", err=True)
+        echo(f"{what} aborted: its process was ended by {signal.Signals(-code).name}", err=True)
         return ABORTED
     if code != ABORTED and not os.read(finished, 1):
-        typer.echo(f"{what} aborted: an extension ended its process (os._exit)", err=True)
+        echo(f"{what} aborted: an extension ended its process (os._exit)", err=True)
         return ABORTED
     return code

@@ -14,6 +14,7 @@ from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.short_help import HelpAll, rare
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED, PASSED
 
@@ -169,11 +170,11 @@ def sweep(
     )
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
     if dry_run:
-        typer.echo(f"{len(jobs)} runs of {scenario}: {len(plan.points)} combinations, {len(plan.seeds)} seeds each")
+        echo(f"{len(jobs)} runs of {scenario}: {len(plan.points)} combinations, {len(plan.seeds)} seeds each")
         for point in plan.points[:10]:
-            typer.echo("  " + (", ".join(f"{name}={value}" for name, value in point.items()) or "no axis"))
+            echo("  " + (", ".join(f"{name}={value}" for name, value in point.items()) or "no axis"))
         if len(plan.points) > 10:
-            typer.echo(f"  and {len(plan.points) - 10} more")
+            echo(f"  and {len(plan.points) - 10} more")
         raise typer.Exit
     if out is not None:
         check_writable(out)
@@ -205,14 +206,14 @@ def _print_summary(progress: SweepProgress, store: Path) -> None:
     counts = ", ".join(f"{count} {status}" for status, count in sorted(progress.counts.items()))
     stored = ", ".join(f"{count} {status}" for status, count in sorted(progress.stored.items()))
     kept = f", {progress.kept} already in the store ({stored})" if stored else ""
-    typer.echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
+    echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
     count, command = progress.warned
     if count:
         print_warnings([describe_warned(count, progress.done, command)])
     for (status, message), count in progress.errors.most_common(REASONS):
-        typer.echo(f"{count} {status}: {message}", err=True)
+        echo(f"{count} {status}: {message}", err=True)
     if not progress.is_complete:
-        typer.echo(f"all runs without a verdict: eidrive results {shlex.quote(str(store))} --failures", err=True)
+        echo(f"all runs without a verdict: eidrive results {shlex.quote(str(store))} --failures", err=True)
 
 
 def results(
@@ -257,13 +258,13 @@ def results(
         write_parquet(found, parquet)
     if json:
         for row in rows:
-            typer.echo(json_text.dumps(_as_json(row)))
+            echo(json_text.dumps(_as_json(row)))
     elif failures:
         for run in found:
             if run.status != PASSED_RUN:
-                typer.echo(f"{run.status}: {run.command or f'{run.scenario}, run {run.run}, seed {run.seed}'}")
+                echo(f"{run.status}: {run.command or f'{run.scenario}, run {run.run}, seed {run.seed}'}")
                 if run.error:
-                    typer.echo("  " + run.error.replace("\n", "\n  "))
+                    echo("  " + run.error.replace("\n", "\n  "))
     else:
         _print_table(rows, interval, confidence)
 
@@ -275,8 +276,9 @@ def _as_json(row: PointSummary) -> dict[str, object]:
 
 
 def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float) -> None:
-    from rich.console import Console
     from rich.table import Table
+
+    from eidrive_scenario.cli.verdicts import console
 
     axes = list(dict.fromkeys(name for row in rows for name in row.point))
     statuses = [
@@ -297,10 +299,10 @@ def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float)
             "" if rate is None else f"{rate.share:.1%}",
             "" if rate is None else f"{rate.low:.1%} to {rate.high:.1%}",
         )
-    console = Console()
-    if not console.is_terminal:  # lines as long as necessary, so that other programs can read them
-        console = Console(width=max(200, 40 * len(table.columns)))
-    console.print(table)
+    out = console()
+    if not out.is_terminal:  # lines as long as necessary, so that other programs can read them
+        out.width = max(200, 40 * len(table.columns))
+    out.print(table)
 
 
 def _short(value: object) -> str:

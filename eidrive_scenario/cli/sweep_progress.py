@@ -6,9 +6,9 @@ import time
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from eidrive_scenario.cli.verdicts import console
 from eidrive_scenario.experiments.sweeps.store import PASSED, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress
 
@@ -20,7 +20,7 @@ class ProgressDisplay:
     """Display of a running sweep: ended runs, rate, runs that did not pass, time left."""
 
     def __init__(self, total: int) -> None:
-        self._console = Console(stderr=True)
+        self._console = console(stderr=True)
         columns = (TextColumn("sweep"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
         self._bar = Progress(*columns, console=self._console, disable=not self._console.is_terminal)
         self._task = self._bar.add_task("", total=total)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
-import typer
-
+from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, check_different
 from eidrive_scenario.experiments.sweeps.boundary import Boundary
@@ -130,14 +129,14 @@ class Search:
             bound=self.bound,
             tolerance=self.tolerance,
             runs=self.runs,
-            shown=lambda one: typer.echo(_estimate(one), err=True),
+            shown=lambda one: echo(_estimate(one), err=True),
         )
         name = self.boundary.name
         if math.isnan(found.value) or found.inside < 0.5:
-            typer.echo(f"{name}: the success rate does not cross {self.bound:g} in the range ({found.runs} runs)")
+            echo(f"{name}: the success rate does not cross {self.bound:g} in the range ({found.runs} runs)")
             return
         change = "rises" if found.rising > 0.5 else "falls"
-        typer.echo(
+        echo(
             f"{name}: the success rate {change} through {self.bound:g} at {found.value:.4g} "
             f"(95 %: {found.low:.4g} to {found.high:.4g}; {found.runs} runs)"
         )
@@ -149,13 +148,13 @@ class Search:
             execute,
             runs=self.runs,
             objective=self.objective,
-            shown=lambda done, failed: typer.echo(f"{done} runs, {failed} failed", err=True),
+            shown=lambda done, failed: echo(f"{done} runs, {failed} failed", err=True),
         )
-        typer.echo(f"{found.failed} of {found.runs} runs failed")
+        echo(f"{found.failed} of {found.runs} runs failed")
         for run in found.failures:
-            typer.echo(run.command)
+            echo(run.command)
         if not found.failures and found.least is not None:
-            typer.echo(f"nearest to a failure: {found.least.command}")
+            echo(f"nearest to a failure: {found.least.command}")
 
 
 def _estimate(one: Boundary) -> str:

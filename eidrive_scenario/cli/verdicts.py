@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook, RenderResult
 from rich.table import Table
 from rich.text import Text
 
@@ -14,6 +14,7 @@ from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.exit_codes import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.experiments.commands import reproduction_lines
+from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
@@ -29,17 +30,40 @@ _OUTCOMES = {
 
 
 class _Output(Console):
+    """Console whose texts are neither markup nor control sequences, as names of files may contain both."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(highlight=False, markup=False, emoji=False, **options)
+        self.push_render_hook(_EscapeControls())
+
     def on_broken_pipe(self) -> None:
         """Raise BrokenPipeError for the command line: rich would end with the exit code of a failed criterion."""
         raise BrokenPipeError
 
 
-def console() -> Console:
+class _EscapeControls(RenderHook):
+    """Escape control characters in all output except those that rich adds for styles and positions."""
+
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        """Return the same output with escapes."""
+        return [_Escaped(renderable) for renderable in renderables]
+
+
+class _Escaped:
+    def __init__(self, renderable: ConsoleRenderable) -> None:
+        self._renderable = renderable
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for segment in console.render(self._renderable, options):
+            yield segment if segment.control else segment._replace(text=printable(segment.text))
+
+
+def console(*, stderr: bool = False) -> Console:
     """Return a console of the terminal width; for a file, wide enough for a reason on one line."""
-    plain = _Output(highlight=False)
+    plain = _Output(stderr=stderr)
     if plain.is_terminal or "COLUMNS" in os.environ:
         return plain
-    return _Output(highlight=False, width=180)
+    return _Output(stderr=stderr, width=180)
 
 
 def show(result: RunResult, varied: str = "") -> None:

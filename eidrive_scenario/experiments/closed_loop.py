@@ -20,6 +20,7 @@ from rich.console import Console
 from eidrive_scenario.experiments.paper import EGO, HIDDEN, SCENARIOS
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
 
@@ -112,7 +113,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rows += added
     rows.sort(key=lambda row: (row.detector, row.scenario, row.channel, row.seed))
     result = table(rows)
-    (options.out / "closed_loop.md").write_text(result, encoding="utf-8")
+    with write_atomically(options.out / "closed_loop.md") as stream:
+        stream.write(result.encode())
     sys.stdout.write(result)
 
 

@@ -16,6 +16,7 @@ from rich.console import Console
 
 from eidrive_scenario.experiments.planner_scenes import CONTACT, EGO, SceneRun, run_of
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.simulation import RunSettings
 
 VEHICLE, UNIT = {"Participants": "vehicle"}, {"Participants": "rsu"}
@@ -102,7 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = jobs(options.names or ARMS, range(1, options.seeds + 1))
     runs = run_jobs(chosen, run_of, workers=options.workers, console=Console(stderr=True), title="corner cases")
     result = table(runs)
-    (options.out / "corner_cases.md").write_text(result, encoding="utf-8")
+    with write_atomically(options.out / "corner_cases.md") as stream:
+        stream.write(result.encode())
     sys.stdout.write(result)
 
 

@@ -22,6 +22,7 @@ from rich.console import Console
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.driven_files import positive, table, worse_runs
 from eidrive_scenario.experiments.driven_runs import DEFAULT, STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_scenario.files.atomic import write_atomically
 
 CORPORA, MAPS = "EIDRIVE_CORPORA", "EIDRIVE_MAPS"
 """Environment variables with the folders of the corpora and of the maps."""
@@ -176,7 +177,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except SettingError as error:
             parser.error(str(error))
         found.append((group, runs))
-        (options.out / "driven_corpora.md").write_text(report(found), encoding="utf-8")
+        with write_atomically(options.out / "driven_corpora.md") as stream:
+            stream.write(report(found).encode())
     sys.stdout.write(report(found))
 
 

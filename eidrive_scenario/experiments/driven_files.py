@@ -21,6 +21,7 @@ from rich.console import Console
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted, suggestion
 from eidrive_scenario.experiments.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.model import Controller
@@ -148,7 +149,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except SettingError as error:
         parser.error(str(error))
     result = table(runs, has_reference=reference is not None)
-    (options.out / "driven_files.md").write_text(result, encoding="utf-8")
+    with write_atomically(options.out / "driven_files.md") as stream:
+        stream.write(result.encode())
     sys.stdout.write(result)
 
 

@@ -21,6 +21,7 @@ from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.experiments.driven_motion import CONTACT, Stop, observed_run
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.experiments.town_drives import EGO, write_town_drive
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings
 
@@ -143,7 +144,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except EidriveError as error:
         parser.error(str(error))
     result = table(drives)
-    (options.out / "long_drives.md").write_text(result, encoding="utf-8")
+    with write_atomically(options.out / "long_drives.md") as stream:
+        stream.write(result.encode())
     sys.stdout.write(result)
 
 

@@ -18,6 +18,7 @@ from rich.console import Console
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.experiments.repetitions import Job, jobs_of, run_jobs
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import describe_scenarios, resolve_scenario
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
 
@@ -129,7 +130,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     jobs = [job for scene in scenes() for job in jobs_of(scene, arms, seeds)]
     runs = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="scenes")
     result = table(runs)
-    (options.out / "planner_scenes.md").write_text(result, encoding="utf-8")
+    with write_atomically(options.out / "planner_scenes.md") as stream:
+        stream.write(result.encode())
     sys.stdout.write(result)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from eidrive_scenario.errors import Diagnostic, InputError, OutputError
-from eidrive_scenario.files.atomic import partial_path
+from eidrive_scenario.files.atomic import partial_path, write_atomically
 from eidrive_scenario.files.lock import FileLock
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, read_result
 from eidrive_scenario.resolved_settings import ResolvedSettings
@@ -69,9 +69,8 @@ class RunFolder:
             self.recording.replace(self.path / RECORDING)
         if self.images.exists():
             self.images.replace(self.path / IMAGES)
-        unfinished = partial_path(self.path / RESULT)
-        unfinished.write_bytes(result)
-        unfinished.replace(self.path / RESULT)
+        with write_atomically(self.path / RESULT) as stream:
+            stream.write(result)
 
     def earlier_trace(self) -> str | None:
         """Return the trace hash of the result in the folder, or None without a result."""

@@ -10,6 +10,7 @@ from xml.sax.saxutils import quoteattr
 import networkx as nx
 
 from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
@@ -169,7 +170,8 @@ def write_town_drive(
         arrival=ARRIVAL,
         limit=120.0 * minutes,
     )
-    path.write_text(text, encoding="utf-8")
+    with write_atomically(path) as stream:
+        stream.write(text.encode())
 
 
 def draw_way(roads: RoadNetwork, seed: int, seconds: float) -> list[LaneKey]:

@@ -3,24 +3,40 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from eidrive_scenario.errors import Diagnostic, InputError, OutputError
 from eidrive_scenario.files.lock import FileLock
 
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
+
 PARTIAL = ".partial"
 """Part of the name of a file before its suffix, during its run and after an aborted one."""
+
+
+class _NamedFile(io.FileIO):
+    """File whose errors, such as a full disk, have its name."""
+
+    def write(self, data: Buffer, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            error.filename = os.fsdecode(self.name)
+            raise
 
 
 def create(path: str | Path) -> BinaryIO:
     """Open a new file for writing and create its folders. Raise OutputError if it cannot be written."""
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        return Path(path).open("wb")
+        return io.BufferedWriter(_NamedFile(os.fspath(path), "w"))
     except OSError as error:
         raise OutputError(Diagnostic(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
 
@@ -53,6 +69,27 @@ def atomic_output(path: Path) -> Iterator[Path]:
                 unfinished.unlink()
             raise
         unfinished.replace(path)
+
+
+@contextmanager
+def write_atomically(path: Path) -> Iterator[BinaryIO]:
+    """Open a file for writing that replaces that of its name when the block ends without an error.
+
+    Otherwise a file of this name is unchanged. Raise OutputError if it cannot be written.
+    """
+    with atomic_output(path) as unfinished:
+        try:
+            with create(unfinished) as stream:
+                yield stream
+        except BaseException as error:
+            if unfinished != path:
+                with suppress(OSError):
+                    unfinished.unlink()
+            if isinstance(error, OSError) and error.filename == str(unfinished):
+                error.filename = str(path)
+            if isinstance(error, OutputError):
+                raise OutputError([replace(one, source=str(path)) for one in error.diagnostics]) from error
+            raise
 
 
 @contextmanager

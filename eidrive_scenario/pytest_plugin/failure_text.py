@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
 from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED
-from eidrive_scenario.files.encodable import encodable
+from eidrive_scenario.files.encodable import encodable, printable
 
 if TYPE_CHECKING:
     from eidrive_scenario.evaluation import Verdict
@@ -36,7 +36,7 @@ def explain_outcome(result: RunResult | RateVerdict) -> str:
     """Return the reason of a failed run, or of a failed test of the success rate."""
     from eidrive_scenario.simulation import RunResult
 
-    return explain(result) if isinstance(result, RunResult) else explain_rate(result)
+    return printable(explain(result) if isinstance(result, RunResult) else explain_rate(result))
 
 
 def explain(result: RunResult) -> str:
@@ -93,10 +93,10 @@ def _reason(verdict: Verdict) -> str:
 def failure_text(error: BaseException) -> str | None:
     """Return the text of a failure without traceback, or None for an error that requires a traceback."""
     if isinstance(error, ScenarioFailed | InputError):
-        return str(error)
+        return printable(str(error))
     notes: list[str] = getattr(error, "__notes__", [])
     if isinstance(error, OSError) and notes:
-        return "\n".join([f"aborted: {error}", *notes])
+        return printable("\n".join([f"aborted: {error}", *notes]))
     if not isinstance(error, EidriveError):
         return None
     lines = [str(error), *notes]
@@ -104,4 +104,4 @@ def failure_text(error: BaseException) -> str | None:
         from eidrive_scenario.simulation.attribution import traceback_from_extension
 
         lines += ["", encodable(traceback_from_extension(error))]
-    return "\n".join(lines).rstrip()
+    return printable("\n".join(lines).rstrip())

@@ -12,6 +12,7 @@ import pytest
 
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.failure_text import explain_outcome, failures_of
 from eidrive_scenario.pytest_plugin.markers import run_markers, test_name
@@ -202,7 +203,7 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             result = run_variant(request.node, source, variant, **settings)
         except InputError as error:
             add_error(request.node, error, request.node.path)
-            raise pytest.fail.Exception(str(error), pytrace=False) from None
+            raise pytest.fail.Exception(printable(str(error)), pytrace=False) from None
         except SimulationError as error:
             add_error(request.node, error, request.node.path)
             place = error.place if isinstance(error, ExtensionError | WallLimitError) else None

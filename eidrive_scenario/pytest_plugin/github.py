@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from eidrive_scenario.files.encodable import printable
+
 _PLUGIN = "pytest_github_actions_annotate_failures"
 """Plugin that writes annotations of all tests itself."""
 _MOST_ANNOTATIONS = 10
@@ -38,7 +40,7 @@ def show_annotations(terminalreporter: Any, config: pytest.Config) -> None:
     if reports and not config.pluginmanager.hasplugin(_PLUGIN):
         terminalreporter.section("annotations", sep="-")
         for report in reports[:_MOST_ANNOTATIONS]:
-            terminalreporter.line(annotation(report, config.rootpath))
+            terminalreporter.line(printable(annotation(report, config.rootpath)))
     path = os.environ.get("GITHUB_STEP_SUMMARY")
     if path:
         counts = Counter({outcome: _count(terminalreporter.stats.get(outcome, ())) for outcome in _OUTCOMES})

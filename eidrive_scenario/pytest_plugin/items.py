@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from eidrive_scenario.errors import ConstraintError
+from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.pytest_plugin.failure_text import (
     ScenarioFailed,
     explain_outcome,
@@ -56,8 +57,8 @@ class ScenarioItem(pytest.Item):
         except ConstraintError as error:
             if self.run is None:
                 add_error(self, error, self.path)
-                raise pytest.fail.Exception(str(error), pytrace=False) from None
-            pytest.skip(f"excluded by constraints: {error}")
+                raise pytest.fail.Exception(printable(str(error)), pytrace=False) from None
+            pytest.skip(printable(f"excluded by constraints: {error}"))
         except Exception as error:
             add_error(self, error, self.path)
             text = failure_text(error)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.pytest_plugin.options import command_line_value, option_value
 
 RUNS = "runs"
@@ -44,9 +45,9 @@ def show_report(terminalreporter: Any, config: pytest.Config) -> None:
         terminalreporter.line(f"{page}: not written, as no run has kept files")
         return
     try:
-        written = report_files(locations, page, warn=lambda text: terminalreporter.line(f"warning: {text}"))
+        written = report_files(locations, page, warn=lambda text: terminalreporter.line(printable(f"warning: {text}")))
     except InputError as error:
-        terminalreporter.line(f"{page}: not written: {error}", red=True)
+        terminalreporter.line(printable(f"{page}: not written: {error}"), red=True)
         return
     terminalreporter.line(str(written))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.pytest_plugin.outcome import WARNING
 
 _SHOWN = 20
@@ -23,6 +24,6 @@ def show_warnings(terminalreporter: Any) -> None:
     terminalreporter.section("warnings of runs", sep="-", yellow=True)
     for text, nodes in list(tests.items())[:_SHOWN]:
         more = f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""
-        terminalreporter.line(f"{nodes[0]}{more}: {text}")
+        terminalreporter.line(printable(f"{nodes[0]}{more}: {text}"))
     if len(tests) > _SHOWN:
         terminalreporter.line(f"{len(tests) - _SHOWN} more are properties of the tests (--junitxml)")

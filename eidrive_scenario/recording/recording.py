@@ -74,9 +74,10 @@ class Recording:
         """
         decode = JsonText(Frame).decode
         last = -1
-        with mcap.McapFile(self.path, DamageReport()) as file:
+        damage = DamageReport()
+        with mcap.McapFile(self.path, damage) as file:
             for offset in self._blocks:
-                for message in _messages(file.record_at(offset)):
+                for message in _messages(file, file.record_at(offset), damage):
                     if message.sequence <= last:
                         continue  # duplicate
                     try:
@@ -90,7 +91,8 @@ class Recording:
     def _skip(self, tick: int, error: ValueError, skipped: Callable[[str], None] | None) -> None:
         reason = f"frame {tick} cannot be decoded: {error}"
         if not self.damage:
-            hint = f"read it with the version that wrote it ({self.metadata.get('eidrive-scenario', 'unknown')})"
+            version = self.metadata.get("eidrive-scenario", "unknown")
+            hint = f"record the run again, or read it with the version that wrote it ({version})"
             raise InputError(Diagnostic(reason, hint, str(self.path))) from error
         if skipped is not None:
             skipped(reason)
@@ -110,8 +112,9 @@ def read_recording(path: str | Path) -> Recording:
 
 def open_recording(path: Path) -> Recording:
     """Open a recording as `read_recording` does, given as its file and without the warning."""
-    reading = _Reading()
-    with mcap.McapFile(path, reading.damage) as file:
+    damage = DamageReport()
+    with mcap.McapFile(path, damage) as file:
+        reading = _Reading(file, damage)
         for record in file.records():
             reading.add(record)
             if reading.is_full:
@@ -122,15 +125,15 @@ def open_recording(path: Path) -> Recording:
 class _Reading:
     """State of one pass over a file: content and damage."""
 
-    def __init__(self) -> None:
-        self.damage = DamageReport()
+    def __init__(self, file: mcap.McapFile, damage: DamageReport) -> None:
+        self.damage = damage
+        self._file = file
         self._metadata: dict[str, str] = {}
         self._attachments: dict[str, bytes] = {}
         self._blocks: list[tuple[int, int]] = []
         self._seal = Seal()
         self._stored: dict[str, str] | None = None
         self._ticks = _Ticks(self.damage)
-        self._content = 0
         self._stated: int | None = None
         self.is_full = False
 
@@ -177,10 +180,12 @@ class _Reading:
         self._seal.add_attachment(name, data)
 
     def _add_frames(self, record: mcap.Record) -> None:
-        messages = _messages(record, self.damage)
-        self._content += sum(len(message.data) for message in messages)
-        if self._content > mcap.LARGEST_CONTENT or self._seal.frames + len(messages) > MAX_FRAMES:
-            self.damage.add("the recording exceeds the maximum number or size of frames")
+        try:
+            messages = _messages(self._file, record, self.damage)
+        except mcap.ContentLimitError:
+            messages, self.is_full = [], True
+        if self.is_full or self._seal.frames + len(messages) > MAX_FRAMES:
+            self.damage.add("the recording exceeds the maximum number or size of frames and messages")
             self.is_full = True
             return
         for message in messages:
@@ -246,13 +251,11 @@ class _Ticks:
                 self._damage.add("ticks are missing", gap)
 
 
-def _messages(record: mcap.Record, damage: DamageReport | None = None) -> list[mcap.Message]:
+def _messages(file: mcap.McapFile, record: mcap.Record, damage: DamageReport) -> list[mcap.Message]:
     """Return the frames of a record without frames beyond the maximum size, and without messages of other topics."""
-    damage = DamageReport() if damage is None else damage
-    read = [mcap.message_of(record.body)] if record.opcode == mcap.MESSAGE else mcap.chunk_messages(record, damage)
-    found = [message for message in read if message.channel == FRAMES]
-    kept = [message for message in found if len(message.data) <= LARGEST_FRAME]
-    if len(kept) < len(found):
+    frames = file.messages(record, FRAMES)
+    kept = [message for message in frames if len(message.data) <= LARGEST_FRAME]
+    if len(kept) < len(frames):
         damage.add(f"a frame is larger than {LARGEST_FRAME // 2**20} MiB", f"byte {record.offset}")
     return kept
 

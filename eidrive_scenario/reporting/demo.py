@@ -36,7 +36,7 @@ from eidrive_scenario.experiments.paper import (
 from eidrive_scenario.experiments.repetitions import Job, jobs_of, run_jobs
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.experiments.tables import render
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.properties import is_agent_controller
@@ -106,7 +106,7 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
 def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
     """Write all results as a JSON list with one line per run, in the format of `--json`. Return `out`."""
     lines = (as_json_text(replace(result, scenario=job.scenario)) for job, result in runs)
-    with create(out) as stream:
+    with write_atomically(out) as stream:
         stream.write(("[\n" + ",\n".join(lines) + "\n]\n").encode())
     return out
 

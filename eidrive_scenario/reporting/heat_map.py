@@ -20,7 +20,7 @@ from rich.console import Console
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.outcome_grid import GridCell, OutcomeGrid, run_outcome_grid
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import from_library
 from eidrive_scenario.reporting.drawing.heat_cells import heat_cells
 
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 console=Console(stderr=True),
             )
             path = options.out / f"{grid.name}.png"
-            with create(path) as stream:
+            with write_atomically(path) as stream:
                 heat_map(grid).savefig(stream, format="png", dpi=130)
         except InputError as error:
             typer.echo(str(error), err=True)

@@ -17,7 +17,7 @@ import cv2
 import typer
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import LibraryScenario, describe_scenarios
 from eidrive_scenario.reporting.drawing.canvas import Image
 from eidrive_scenario.reporting.drawing.road_drawing import house_outline, road_drawing
@@ -106,12 +106,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 continue
             path = options.root / FOLDER / file_name(scenario)
             _, encoded = cv2.imencode(".png", picture(scenario.name), [cv2.IMWRITE_PNG_COMPRESSION, 9])
-            with create(path) as stream:
+            with write_atomically(path) as stream:
                 stream.write(encoded.tobytes())
             typer.echo(f"wrote {path}")
         readme = options.root / "README.md"
         text = with_table(readme.read_text(encoding="utf-8"), scenarios)
-        with create(readme) as stream:
+        with write_atomically(readme) as stream:
             stream.write(text.encode())
     except (InputError, OSError) as error:
         typer.echo(str(error), err=True)

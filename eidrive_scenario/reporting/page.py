@@ -9,7 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 
 
 @cache
@@ -33,7 +33,7 @@ def write_page(out: Path, template: str, **values: Any) -> Path:
 
     Raise SettingError if the file cannot be written.
     """
-    with create(out) as stream:
+    with write_atomically(out) as stream:
         stream.write(render_page(template, **values).encode(errors="replace"))
     return out
 

@@ -20,7 +20,7 @@ from eidrive_scenario.experiments.trends import (
     precision_by_delay,
     reception_by_distance,
 )
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 
 COLORS = ("#0b6e99", "#c2410c", "#4d7c0f", "#7e22ce")
 SPEEDS = (5.0, 10.0, 15.0)
@@ -107,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, figure in FIGURES.items():
         path = folder / f"{name}.png"
         try:
-            with create(path) as stream:
+            with write_atomically(path) as stream:
                 figure().savefig(stream, format="png", dpi=130)
         except InputError as error:
             typer.echo(str(error), err=True)

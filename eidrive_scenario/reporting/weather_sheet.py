@@ -15,7 +15,7 @@ import typer
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.library import library_path, names
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.reporting.drawing.street_view import look_at
@@ -133,7 +133,7 @@ def write(
     chosen = weather or [*(name for name in order if name in known), *sorted(known - {*order})]
     try:
         weathers = [load_weather(name, origin="--weather") for name in chosen]
-        with create(out) as stream:
+        with write_atomically(out) as stream:
             stream.write(cv2.imencode(".png", cv2.cvtColor(contact_sheet(weathers), cv2.COLOR_RGB2BGR))[1].tobytes())
     except InputError as error:
         typer.echo(str(error), err=True)

@@ -121,7 +121,7 @@ class Simulation:
             check_spawns(self.scenario, self.roads, self.world, drivers)
             found += spawn_warnings(self.scenario, self.roads, self.world, drivers)
         with collector:
-            found += check_destinations(self.scenario, self.stack.undirected, self.world.view(), commands)
+            found += check_destinations(self.scenario, self.stack.undirected, self.world.poses(), commands)
         collector.raise_if_any()
         return tuple(found)
 

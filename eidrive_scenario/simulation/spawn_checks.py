@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 
 from eidrive_scenario.driving.planning.area_checks import MARGIN
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Element
@@ -18,6 +18,8 @@ from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.world import World
 from eidrive_scenario.world.view import WorldView
 
+MOST_OTHERS = 20
+"""Maximum number of further actors that are counted for each one that starts inside of another."""
 _TOUCH = 0.02
 """Depth up to which two bodies touch, but do not overlap [m]."""
 _LOW = 0.2
@@ -32,7 +34,7 @@ def check_spawns(scenario: Scenario, roads: RoadNetwork | None, world: World, dr
     """
     if not drivers:
         return
-    view = world.view()
+    view = world.poses()
     present = [name for name in scenario.entities if name in view.rows and name in drivers]
     found = [*overlapping_spawns(scenario, view, present), *_off_road(scenario, roads, view, present)]
     if found:
@@ -44,29 +46,39 @@ def overlapping_spawns(
 ) -> Iterator[Diagnostic]:
     """Yield those of these actors that overlap another one; a pair of them is one diagnostic.
 
-    Vehicle and trailers of a train do not count. `among` limits the other actors; None: all that are present.
+    Vehicle and trailers of a train do not count. `among` limits the other actors; None: all that are present. The
+    number of diagnostics and of the others in each is limited: of actors at one place, all pairs overlap.
     """
     present = [name for name in scenario.entities if name in view.rows and (among is None or name in among)]
     boxes = {name: _core(view.plain_boxes[view.rows[name]]) for name in present}
     table = np.reshape([boxes[name] for name in present], (-1, 7))
-    reach = np.hypot(table[:, 3], table[:, 4]) / 2.0
+    cos, sin = np.abs(np.cos(table[:, 6])), np.abs(np.sin(table[:, 6]))
+    reach_x = (table[:, 3] * cos + table[:, 4] * sin + _TOUCH) / 2.0
+    reach_y = (table[:, 3] * sin + table[:, 4] * cos + _TOUCH) / 2.0
+    rows = {name: row for row, name in enumerate(present)}
     trains = _trains(scenario)
     done: set[str] = set()
+    yielded = 0
     for name in names:
         done.add(name)
-        train = trains.get(name, name)
-        x, y, _, length, width, *_ = boxes[name]
-        within = math.hypot(length, width) / 2.0 + reach + _TOUCH
-        near = np.flatnonzero(~(np.hypot(table[:, 0] - x, table[:, 1] - y) > within)).tolist()
-        candidates = [other for other in (present[row] for row in near) if other not in done]
-        others = [
+        train, row = trains.get(name, name), rows[name]
+        apart = np.abs(table[:, :2] - table[row, :2])
+        is_far = (apart[:, 0] > reach_x + reach_x[row]) | (apart[:, 1] > reach_y + reach_y[row])
+        candidates = (other for other in map(present.__getitem__, (~is_far).nonzero()[0]) if other not in done)
+        overlapping = (
             other for other in candidates if trains.get(other, other) != train and overlap(boxes[name], boxes[other])
-        ]
+        )
+        others = list(islice(overlapping, MOST_OTHERS + 2))
         if others:
             x, y, *_ = boxes[others[0]]
-            more = f", and of {len(others) - 1} more" if len(others) > 1 else ""
+            count = f"{len(others) - 1}" if len(others) < MOST_OTHERS + 2 else f"more than {MOST_OTHERS}"
+            more = f", and of {count} more" if len(others) > 1 else ""
             message = f"{quoted(name)} starts inside of {quoted(others[0])}, whose center is at ({x:.1f}, {y:.1f}) m"
             yield start_diagnostic(scenario, name, message + more, "move one of them")
+            yielded += 1
+            if yielded == MAX_DIAGNOSTICS:
+                yield start_diagnostic(scenario, name, "further actors that start inside of others are not listed", "")
+                return
 
 
 def _core(box: Sequence[float]) -> list[float]:

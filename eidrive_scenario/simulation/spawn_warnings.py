@@ -36,7 +36,7 @@ def spawn_warnings(
     world    state after Init
     drivers  vehicles that a driving stack drives, whose places `check_spawns` has checked
     """
-    view = world.view()
+    view = world.poses()
     names = [
         name
         for name, entity in scenario.entities.items()

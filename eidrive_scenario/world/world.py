@@ -205,6 +205,10 @@ class World:
             self._view = self._actors.view(self.time, self.tick, contacts, self._unseen, self._unseen_by)
         return self._view
 
+    def poses(self) -> WorldView:
+        """Return the current view without its contacts, of which actors at one place have one for each pair."""
+        return self._view or self._actors.view(self.time, self.tick, (), self._unseen, self._unseen_by)
+
     def distance(self, first: str, second: str) -> float:
         """Return the distance between the boxes of two actors [m], 0 in contact. Raise SimulationError."""
         self._update_attributes()

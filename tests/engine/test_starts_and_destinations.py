@@ -11,6 +11,7 @@ from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml, w
 
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.geometry import Box, overlap
 from eidrive_scenario.simulation import RunSettings, run_file
 
 TRAILER = """<Trailer><TrailerRef entityRef="Cart"/></Trailer></Vehicle>"""
@@ -135,6 +136,30 @@ def test_many_vehicles_at_one_place_are_one_error_each() -> None:
         f"'Car{number}' starts inside of 'Car{number + 1}'" for number in range(4)
     ]
     assert caught.value.diagnostics[0].message.endswith(" m, and of 3 more")
+
+
+def test_number_of_overlaps_that_are_compared_is_linear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """300 vehicles at one place are 44,850 pairs. Each of 200 diagnostics names one other and counts 20 more."""
+    pairs: list[int] = []
+
+    def counted(a: Box, b: Box) -> bool:
+        pairs.append(1)
+        return overlap(a, b)
+
+    monkeypatch.setattr("eidrive_scenario.simulation.spawn_checks.overlap", counted)
+    monkeypatch.setattr("eidrive_scenario.world.physics.contacts.overlap", counted)
+    names = [f"Car{number}" for number in range(300)]
+    source = scenario_xml(
+        entities="".join(object_xml(name) for name in names),
+        init="".join(init_xml(name, teleport_xml(world_position_xml(0))) for name in names),
+        stop=end_xml(0.1),
+    )
+    found = check_scenario(source).warnings
+    inside = [one.message for one in found if "starts inside of" in one.message]
+    assert len(inside) == 200
+    assert inside[0].endswith(" m, and of more than 20 more")
+    assert found[-1].message == "further actors that start inside of others are not listed"
+    assert len(pairs) <= 200 * 22
 
 
 def test_placed_selection_has_the_line_of_its_action(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import Frame, read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
-from eidrive_scenario.wall_limit import current_limit, limit_wall_time
+from eidrive_scenario.wall_limit import LastResort, current_limit, limit_wall_time, set_last_resort
 
 pytestmark = pytest.mark.timeout(600)
 LONG = 3600.0
@@ -209,6 +209,18 @@ def test_limits_that_end_with_their_blocks_leave_none() -> None:
 def test_limit_that_is_not_a_positive_number_is_refused(package: Path, tmp_path: Path, seconds: float) -> None:
     with pytest.raises(InputError, match="give a positive number of seconds"):
         run_file(write_scenario(tmp_path / "s.xosc"), settings=RunSettings(), wall_limit=seconds)
+
+
+def test_limit_beyond_the_timers_of_the_system_is_not_reached(tmp_path: Path) -> None:
+    """Timers of faulthandler and of threads have 64 bits of nanoseconds."""
+    with (tmp_path / "dump").open("w") as dump:
+        before = set_last_resort(LastResort(lambda limit, frame: None, dump))
+        try:
+            with limit_wall_time(1e308) as limit:
+                assert limit is not None
+                assert limit.armed
+        finally:
+            set_last_resort(before)
 
 
 def test_line_of_finds_the_package_line(package: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.reproduction.digests import code_digest
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.library import library_path
 from eidrive_scenario.resolved_settings import ENGINE
@@ -59,7 +59,7 @@ def write_provenance(
     if not added and isinstance(former, dict) and former.get("code") == code["code"]:
         call = {name: former.get(name) for name in call}
     parts = {**known, part: {**code, **call, **values}}
-    with create(out / FILE) as stream:
+    with write_atomically(out / FILE) as stream:
         stream.write((json.dumps(parts, indent=1, sort_keys=True) + "\n").encode())
 
 

@@ -16,7 +16,7 @@ from eidrive_scenario.experiments.reproduction.layout import PartReport, Section
 from eidrive_scenario.experiments.reproduction.part import Part
 from eidrive_scenario.experiments.reproduction.provenance import read_provenance, write_provenance
 from eidrive_scenario.experiments.reproduction.record import Record
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 
 
 @dataclass(frozen=True)
@@ -96,5 +96,5 @@ def _write_report(part: Part, out: Path, report: PartReport) -> None:
     }
     texts |= {f"{name}.csv": as_csv(rows) for name, rows in tables.items()}
     for name, text in texts.items():
-        with create(out / name) as stream:
+        with write_atomically(out / name) as stream:
             stream.write(text.encode())

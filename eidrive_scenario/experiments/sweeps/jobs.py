@@ -138,6 +138,8 @@ def plan_of(
         points, probes = (
             [{RUN: number, **point} for number in numbers for point in several] for several in (points, probes)
         )
+    if runs is not None and seeds is None:
+        _check_total(runs)  # before the range of as many seeds
     chosen = _seeds(len(points), None if seeds is None else list(seeds), runs)
     total = len(points) * len(chosen)
     _check_total(total)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import msgspec
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
-from eidrive_scenario.files.atomic import atomic_output
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
 
@@ -223,7 +224,7 @@ def read_results(*stores: str | Path) -> Any:
 def write_csv(runs: Iterable[StoredRun], path: Path) -> None:
     """Write the runs as a CSV file. Raise SettingError if it cannot be written."""
     names, rows = as_table(runs)
-    with atomic_output(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
+    with write_atomically(path) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(map(neutralize_formula, names))
         writer.writerows([[_cell(row.get(name)) for name in names] for row in rows])
@@ -241,8 +242,8 @@ def write_parquet(runs: Iterable[StoredRun], path: Path) -> None:
     arrow, parquet = optional_import("pyarrow", "tables"), optional_import("pyarrow.parquet", "tables")
     names, rows = as_table(runs)
     columns = {name: _one_type([row.get(name) for row in rows]) for name in names}
-    with atomic_output(path) as partial:
-        parquet.write_table(arrow.table(columns), partial)
+    with write_atomically(path) as stream:
+        parquet.write_table(arrow.table(columns), stream)
 
 
 def _one_type(values: list[Any]) -> list[Any]:

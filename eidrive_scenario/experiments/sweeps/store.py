@@ -7,14 +7,16 @@ import sqlite3
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import msgspec
 
-from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError, quoted
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.files.encodable import encodable
 from eidrive_scenario.files.similar_paths import file_suggestion
 
@@ -44,6 +46,14 @@ CREATE TABLE IF NOT EXISTS runs (
 """
 
 
+_MAX_SETTINGS = 64 * 2**20
+"""Maximum size of the settings of a run [bytes]; a delay trace of 32 MiB is part of them."""
+_SMALL_SETTINGS, _MAX_COMPRESSION_RATIO = 256 * 2**20, 100
+"""Total size of the settings of all runs up to which their compression ratio is not limited [bytes], and maximum ratio
+of a larger size to that of the file. Settings of the library have ratios of 3 to 5."""
+_STEPS, _SMALL_STEPS, _STEPS_PER_BYTE = 100_000, 10_000_000, 50
+"""Steps of SQLite between two checks of their number, number that every file may take, and further ones per byte of the
+file. A run takes about 50 steps and at least 1 kB."""
 _INSERT = f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 12)})"
 
 
@@ -185,13 +195,16 @@ class ResultStore:
             ) from error
 
     def statuses(self) -> dict[str, str]:
-        """Return the status of each run by its key."""
-        return dict(self._select("SELECT key, status FROM runs"))
+        """Return the status of each run by its key. Raise SettingError if any run is damaged."""
+        return {run.key: run.status for run in self.runs()}
 
     def runs(self) -> Iterator[StoredRun]:
         """Yield all runs in the order of their sweep."""
+        left = max(_SMALL_SETTINGS, _MAX_COMPRESSION_RATIO * self.path.stat().st_size)
         for row in self._select("SELECT * FROM runs ORDER BY number, key"):
-            yield self._run(row)
+            run = self._run(row, left)
+            left -= len(run.settings)
+            yield run
 
     def rows(self, keys: Sequence[str]) -> list[StoredRun]:
         """Return the runs with these keys in their order. Raise KeyError if one is missing."""
@@ -208,12 +221,12 @@ class ResultStore:
         try:
             yield from self._connection.execute(statement, values)
         except sqlite3.Error as error:
-            raise _damaged(encodable(str(error)), self.path) from error
+            raise _damaged(_reason(error), self.path) from error
 
-    def _run(self, row: Sequence[Any]) -> StoredRun:
-        """Return the run of a row. Raise SettingError if the row is damaged."""
+    def _run(self, row: Sequence[Any], largest: int = _MAX_SETTINGS) -> StoredRun:
+        """Return the run of a row with settings of at most `largest` bytes. Raise SettingError if it is damaged."""
         try:
-            return _stored_run(row)
+            return _stored_run(row, min(largest, _MAX_SETTINGS))
         except (ValueError, TypeError, RecursionError, zlib.error, msgspec.MsgspecError) as error:
             raise _damaged(f"the row of run {encodable(str(row[1]))}: {encodable(str(error))}", self.path) from error
 
@@ -243,17 +256,29 @@ def _row(run: StoredRun) -> tuple[Any, ...]:
     )
 
 
-def _stored_run(row: Sequence[Any]) -> StoredRun:
+def _stored_run(row: Sequence[Any], largest: int) -> StoredRun:
     *head, point, result, error, command, wall_s, settings = row
     columns = _scalars("point", point), _scalars("result", result)
-    text = zlib.decompress(settings).decode()
-    if text and not isinstance(json.loads(text), dict):
+    data = _decompressed(settings, largest)
+    text = data.decode()
+    if text and not isinstance(load_json(data), dict):
         raise ValueError("settings: not an object")
     values = (*head, *columns, error, command, wall_s, text)
     run = msgspec.convert(dict(zip(StoredRun.__struct_fields__, values, strict=True)), StoredRun)
     if run.status not in STATUSES:
         raise ValueError(f"unknown status {run.status!r}")
     return run
+
+
+def _decompressed(data: bytes, largest: int) -> bytes:
+    """Return at most `largest` bytes. Raise ValueError for more of them, and zlib.error for invalid data."""
+    unpacking = zlib.decompressobj()
+    unpacked = unpacking.decompress(data, largest + 1)
+    if len(unpacked) > largest:
+        raise ValueError(f"settings: larger than {largest // 2**20} MiB")
+    if not unpacking.eof:
+        raise zlib.error("settings: incomplete")
+    return unpacked
 
 
 def _scalars(column: str, text: str) -> dict[str, Any]:
@@ -265,8 +290,16 @@ def _scalars(column: str, text: str) -> dict[str, Any]:
 
 
 def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
+    """Return a connection whose statements end, even those of a forged file with pages that refer to each other."""
     uri = f"{path.absolute().as_uri()}{'?mode=ro' if read_only else ''}"
-    return sqlite3.connect(uri, uri=True, timeout=30.0, check_same_thread=False)
+    connection = sqlite3.connect(uri, uri=True, timeout=30.0, check_same_thread=False)
+    calls = count(1)
+
+    def is_exceeded() -> bool:
+        return next(calls) * _STEPS > _SMALL_STEPS + _STEPS_PER_BYTE * path.stat().st_size
+
+    connection.set_progress_handler(is_exceeded, _STEPS)
+    return connection
 
 
 def _is_empty(connection: sqlite3.Connection) -> bool:
@@ -281,6 +314,24 @@ def _check_format(path: Path, connection: sqlite3.Connection) -> None:
     if held != FORMAT:
         hint = "read it with the version that wrote it, or give a new file"
         raise _error(f"the store has format {held} (expected {FORMAT})", hint, path)
+    _check_tables(path, connection)
+
+
+def _check_tables(path: Path, connection: sqlite3.Connection) -> None:
+    """Raise SettingError if the file has other tables or triggers than a store, a view in their place, or damage.
+
+    The check of the pages excludes pages that belong to several rows, with which a small file has endless content.
+    """
+    expected = {" ".join(text.replace("IF NOT EXISTS ", "").split()) for text in _TABLES.split(";") if text.strip()}
+    for kind, name, text in connection.execute("SELECT type, name, sql FROM sqlite_master").fetchall():
+        if kind != "table" or " ".join(str(text).split()) not in expected:
+            raise _damaged(f"unexpected {quoted(kind)} {quoted(name)}", path)
+        expected.remove(" ".join(str(text).split()))
+    if expected:
+        raise _damaged("a table is missing", path)
+    for (result,) in connection.execute("PRAGMA quick_check(1)"):
+        if result != "ok":
+            raise _damaged(str(result), path)
 
 
 def _checked(path: Path, action: Callable[[], T]) -> T:
@@ -290,7 +341,11 @@ def _checked(path: Path, action: Callable[[], T]) -> T:
     except InputError:
         raise
     except sqlite3.Error as error:
-        raise _error(f"cannot use the store: {error}", "give a new file", path) from error
+        raise _error(f"cannot use the store: {_reason(error)}", "give a new file", path) from error
+
+
+def _reason(error: sqlite3.Error) -> str:
+    return "its content does not end" if str(error) == "interrupted" else encodable(str(error))
 
 
 def _damaged(what: str, path: Path) -> SettingError:

@@ -47,6 +47,8 @@ from eidrive_scenario.openscenario.values.scalars import Version
 
 MAX_ABSOLUTE = 1e9
 """Maximum absolute value of coordinates [m], times [s] and speeds [m/s]."""
+MIN_POSITIVE = 1e-9
+"""Minimum value of lengths and weights by which other numbers are divided, so that no quotient overflows."""
 UNLIMITED: tuple[type[Element], ...] = (
     DynamicConstraints,
     Fog,
@@ -102,7 +104,7 @@ POSITIVE: Mapping[type[Element], tuple[str, ...]] = {
     ClothoidSplineSegment: ("length",),
     ControlPoint: ("weight",),
 }
-"""Attributes that must be above 0."""
+"""Attributes that must be above 0: at least MIN_POSITIVE."""
 
 
 def unusable(element: Element, version: Version) -> str:
@@ -120,6 +122,8 @@ def unusable(element: Element, version: Version) -> str:
             message = f"is {_format(value)}; a number of at least 0 is expected"
         elif value <= 0.0 and name in POSITIVE.get(kind, ()):
             message = f"is {_format(value)}; a number above 0 is expected"
+        elif value < MIN_POSITIVE and name in POSITIVE.get(kind, ()):
+            message = f"is {_format(value)}; a number of at least {MIN_POSITIVE:g} is expected"
         if message:
             known = rules(kind, version).attributes.items()
             spelling = next((spelling for spelling, rule in known if rule.field == name), name)

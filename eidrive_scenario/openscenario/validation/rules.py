@@ -36,6 +36,8 @@ from eidrive_scenario.openscenario.validation.names import check_names
 from eidrive_scenario.openscenario.validation.numbers import unusable
 from eidrive_scenario.openscenario.values.scalars import Version
 
+MAX_NURBS_ORDER = 20
+"""Maximum order of a Nurbs. The time per sample grows with its square; roads and maneuvers have orders up to 6."""
 _EMPTY_ORIENTATION = Orientation()
 
 
@@ -86,6 +88,8 @@ def _nurbs(curve: Nurbs) -> str:
         return ""
     if order < 2:
         return f"Nurbs has the order {order}; it must be at least 2, the order of straight lines"
+    if order > MAX_NURBS_ORDER:
+        return f"Nurbs has the order {order}; it must be at most {MAX_NURBS_ORDER}"
     if points < order:
         return f"Nurbs of order {order} has {points} control points; at least {order} are required"
     if len(knots) != points + order:

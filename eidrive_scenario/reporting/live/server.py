@@ -109,7 +109,12 @@ class _Handler(BaseHTTPRequestHandler):
         if not _LOCAL.fullmatch(self.headers.get("Host", "")):
             self.send_error(HTTPStatus.FORBIDDEN, "Host is not local")
             return
-        token, _, name = urlsplit(self.path).path.removeprefix("/").partition("/")
+        try:
+            path = urlsplit(self.path).path
+        except ValueError:  # such as http://[
+            self.send_error(HTTPStatus.BAD_REQUEST)
+            return
+        token, _, name = path.removeprefix("/").partition("/")
         if not secrets.compare_digest(token.encode(errors="replace"), self.server.token.encode()):
             self.send_error(HTTPStatus.NOT_FOUND)
         elif name == "":

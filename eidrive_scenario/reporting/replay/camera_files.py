@@ -30,9 +30,9 @@ def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
             if match is not None:
                 ticks.setdefault(match["camera"], []).append(int(match["tick"]))
         if ticks:
-            relative = quote(Path(os.path.relpath(station, page)).as_posix())
+            relative = quote(os.fsencode(Path(os.path.relpath(station, page)).as_posix()))
             found[unquote(station.name)] = {
-                unquote(camera): {"address": f"{relative}/{quote(camera)}-", "ticks": sorted(numbers)}
+                unquote(camera): {"address": f"{relative}/{quote(os.fsencode(camera))}-", "ticks": sorted(numbers)}
                 for camera, numbers in sorted(ticks.items())
             }
     return found

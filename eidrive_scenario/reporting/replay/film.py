@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import cv2
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.drawing.canvas import Image
@@ -158,7 +158,7 @@ def write_png(station: RecordedStation, path: Path, time: float | None = None) -
     if not first - TIME_TOLERANCE <= wanted <= last + TIME_TOLERANCE:
         raise SettingError(Diagnostic(f"--at {wanted:g} s is not in the run", f"give {first:g} to {last:g} s"))
     _, data = cv2.imencode(".png", station.picture(wanted))
-    with create(path) as stream:
+    with write_atomically(path) as stream:
         stream.write(data.tobytes())
 
 
@@ -194,5 +194,5 @@ def _encode(station: RecordedStation, path: Path, size: tuple[int, int], rate: f
             message = encoder.stderr.read().decode(errors="replace").strip()
         if encoder.returncode or not made.is_file():
             raise SettingError(Diagnostic(f"FFmpeg cannot write the film: {message[:300]}", "", str(path)))
-        with create(path) as stream, made.open("rb") as content:
+        with write_atomically(path) as stream, made.open("rb") as content:
             shutil.copyfileobj(content, stream)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
@@ -42,7 +43,7 @@ def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[Repor
         except InputError as error:
             omitted.append(f"{recording}: {error.diagnostics[0].message}; the run has no replay")
             continue
-        linked[index] = runs[index].model_copy(update={"replay": f"{FOLDER}/{quote(page.name)}"})
+        linked[index] = runs[index].model_copy(update={"replay": f"{FOLDER}/{quote(os.fsencode(page.name))}"})
     if len(recordings) > MOST:
         omitted.append(f"{len(recordings) - MOST} passed or later runs have no replay: `eidrive view` writes it")
     return linked, omitted

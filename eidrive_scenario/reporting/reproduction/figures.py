@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from eidrive_scenario.experiments.published import COUNTS, TABLE_2
 from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
 from eidrive_scenario.experiments.reproduction.rows import distinct, number, scenario_title
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.reporting.reproduction.channel_curves import channels_figure
 from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
 from eidrive_scenario.reporting.reproduction.precision import perception_figure
@@ -128,7 +128,7 @@ def draw(part: str, report: PartReport, out: Path) -> Path | None:
     if part not in FIGURES:
         return None
     path = out / f"{part}.png"
-    with create(path) as stream:
+    with write_atomically(path) as stream:
         # Without the version of matplotlib in the file, equal results give equal files
         FIGURES[part](report.data()).savefig(stream, format="png", dpi=130, metadata={"Software": None})
     return path

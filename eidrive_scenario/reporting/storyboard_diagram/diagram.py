@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.reporting.storyboard_diagram.boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
 from eidrive_scenario.reporting.storyboard_diagram.layout import (
     GAP,
@@ -42,7 +42,7 @@ ARROWS = ("#b45309", "#0369a1", "#be185d", "#4d7c0f", "#7c3aed", "#0f766e")
 
 def write_storyboard_diagram(storyboard: Storyboard, out: Path) -> Path:
     """Draw a storyboard to an SVG file and return `out`. Raise SettingError if the file cannot be written."""
-    with create(out) as stream:
+    with write_atomically(out) as stream:
         stream.write(storyboard_diagram(storyboard).encode())
     return out
 

@@ -234,7 +234,7 @@ def _samples(tables: RoadTables) -> tuple[Integers, Array]:
     section = tables.lane_section[lanes]
     length = tables.section_length[section]
     width = np.max([tables.width.value(lanes, length * part) for part in (0.0, 0.5, 1.0)], axis=0)
-    widest = np.zeros(len(tables.section_start))
+    widest = np.full(len(tables.section_start), -np.inf)  # All lanes of a section may have negative widths
     np.maximum.at(widest, section, width)
     chosen = (width >= NARROW) | (width >= widest[section])
     lanes, length, section = lanes[chosen], length[chosen], section[chosen]

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.roads.model.curves import Cubic, Curve, ReferenceLine, Spiral
+from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral
 from eidrive_scenario.roads.model.fresnel import fresnel
 from eidrive_scenario.roads.model.polynomials import spread
 
@@ -119,7 +119,7 @@ class CurveTable:
         du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
         ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
         norm = np.hypot(du, dv)
-        bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > 0.0)
+        bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > STANDSTILL)
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
         return u, v, np.arctan2(dv, du), bend, norm * pace
 

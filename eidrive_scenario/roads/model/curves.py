@@ -24,6 +24,8 @@ lose precision.
 """
 
 
+STANDSTILL = 1e-9
+"""Maximum path length per unit of the parameter of a cubic at which it has no direction, and no curvature."""
 MAX_CUBICS = 20_000
 """Maximum number of cubics that replace one poly3. Cubics of a longer poly3 are longer than a meter."""
 
@@ -139,7 +141,7 @@ class Cubic(Curve):
         du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
         ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
         norm = math.hypot(du, dv)
-        return (du * ddv - dv * ddu) / norm**3 if norm else 0.0, norm * self.pace
+        return (du * ddv - dv * ddu) / norm**3 if norm > STANDSTILL else 0.0, norm * self.pace
 
     def at(self, ds: float) -> CurvePoint:
         p = ds * self.pace
@@ -153,7 +155,7 @@ class Cubic(Curve):
             self.x + self.cos * u - self.sin * v,
             self.y + self.sin * u + self.cos * v,
             self.h + math.atan2(dv, du),
-            (du * ddv - dv * ddu) / norm**3 if norm else 0.0,
+            (du * ddv - dv * ddu) / norm**3 if norm > STANDSTILL else 0.0,
             norm * self.pace,
         )
 

@@ -39,6 +39,10 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
     found.sort(key=lambda curve: curve.s)
     covered = found[-1].s + found[-1].length
+    if covered <= 0.0:
+        what = f"the geometry of road {road.get('id')!r} ends at s = {covered:g} m"
+        collector.report_error(plan, what, "start it at s = 0")
+        return ReferenceLine(found, length)
     if abs(covered - length) > max(0.01 * length, 0.1):
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there} and has priority"

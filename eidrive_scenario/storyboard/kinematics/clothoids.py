@@ -13,7 +13,7 @@ from eidrive_scenario.roads import Pose
 SPACING = 0.1
 """Distance between samples of curved shapes [m]."""
 MAX_POINTS = 20_000
-"""Maximum number of samples; on curves of more than 2 km their distance is larger."""
+"""Maximum number of samples of a curve, besides one per segment; beyond 2 km their distance is larger."""
 
 Course = tuple[list[float], list[Pose], tuple[float, ...] | None]
 """Samples of a curve: arc lengths [m], poses, and times [s] or None."""
@@ -35,13 +35,14 @@ def clothoid_spline(
     """Return the samples of consecutive clothoids; `here` is the start if the first segment has no position."""
     s: list[float] = [0.0]
     poses: list[Pose] = []
+    spacing = max(SPACING, sum(segment.length for segment in shape.clothoid_spline_segment) / MAX_POINTS)
     for segment in shape.clothoid_spline_segment:
         if segment.position_start is not None:
             here = resolve(segment.position_start)
         if here is None:
             here = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         here = here._replace(h=here.h + (segment.h_offset or 0.0))
-        distances, samples = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length)
+        distances, samples = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length, spacing)
         base = s[-1]
         s += [base + distance for distance in distances]
         poses += samples
@@ -62,9 +63,11 @@ def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[floa
     return tuple(np.interp(s, list(known), list(known.values())).tolist())
 
 
-def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list[float], list[Pose]]:
+def _spiral(
+    start: Pose, first: float, last: float, length: float, spacing: float = SPACING
+) -> tuple[list[float], list[Pose]]:
     """Sample a curve whose curvature changes linearly from `first` to `last` [1/m], by the midpoint rule."""
-    count = min(max(1, math.ceil(length / SPACING)), MAX_POINTS)
+    count = min(max(1, math.ceil(length / spacing)), MAX_POINTS)
     step = length / count
     s, poses, x, y = [0.0], [start], start.x, start.y
     for number in range(count):

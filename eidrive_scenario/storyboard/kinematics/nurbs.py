@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import Pose
 
 
 @dataclass(frozen=True)
 class Nurbs:
-    """A rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4).
+    """A rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 2 and 4).
+
+    Only the `order` basis functions that are not zero are evaluated, for all parameters together: the time grows
+    linearly with the number of control points and of parameters.
 
     order    degree + 1
     knots    one per control point, plus `order`
@@ -26,38 +31,55 @@ class Nurbs:
 
     def sampled(self, count: int) -> list[Pose]:
         """Return the poses at `count` + 1 equidistant parameters."""
-        coordinates = _unwrapped([pose for pose, _ in self.control])
-        poses = []
-        for number in range(count + 1):
-            basis = self._basis(number / count)
-            total = sum(value * weight for value, (_, weight) in zip(basis, self.control, strict=True))
-            rational = [value * weight / total for value, (_, weight) in zip(basis, self.control, strict=True)]
-            poses.append(
-                Pose(*(sum(b * row[axis] for b, row in zip(rational, coordinates, strict=True)) for axis in range(6)))
-            )
-        return poses
+        coordinates = np.array(_unwrapped([pose for pose, _ in self.control]))
+        weights = np.array([weight for _, weight in self.control])
+        points, basis = self._basis(count)
+        weighted = basis * weights[points]
+        # Sums over the few functions one after another: their rounding does not depend on the array
+        total = sum(weighted[:, number] for number in range(self.order))
+        rational = weighted / np.reshape(total, (-1, 1))
+        rows = sum(rational[:, number, None] * coordinates[points[:, number]] for number in range(self.order))
+        return [Pose(*row) for row in np.asarray(rows).tolist()]
 
-    def peaks(self, count: int) -> list[int]:
-        """Return per control point the number of the step, of `count`, with the largest basis function."""
-        rows = [self._basis(number / count) for number in range(count + 1)]
-        return [max(range(count + 1), key=lambda number: rows[number][index]) for index in range(len(self.control))]
+    def peaks(self, count: int) -> list[int | None]:
+        """Return per control point the number of the step, of `count`, with the largest basis function.
 
-    def _basis(self, fraction: float) -> list[float]:
-        """Return the basis functions at a fraction of the parameter range."""
-        degree, knots, count = self.order - 1, self.knots, len(self.control)
-        low, high = knots[degree], knots[count]
-        u = low + (high - low) * fraction
-        span = count - 1 if u >= high else min(max(bisect_right(knots, u) - 1, degree), count - 1)
-        values = [0.0] * (len(knots) - 1)
-        values[span] = 1.0
-        for order in range(1, degree + 1):
-            for index in range(len(knots) - order - 1):
-                left = knots[index + order] - knots[index]
-                right = knots[index + order + 1] - knots[index + 1]
-                before = (u - knots[index]) / left * values[index] if left > 0.0 else 0.0
-                after = (knots[index + order + 1] - u) / right * values[index + 1] if right > 0.0 else 0.0
-                values[index] = before + after
-        return values[:count]
+        None for a control point whose basis function is zero at all steps.
+        """
+        points, basis = self._basis(count)
+        steps = np.repeat(np.arange(count + 1), self.order)
+        order = np.lexsort((steps, -basis.ravel(), points.ravel()))
+        owners, first = np.unique(points.ravel()[order], return_index=True)
+        peaks: list[int | None] = [None] * len(self.control)
+        for owner, position in zip(owners.tolist(), order[first].tolist(), strict=True):
+            if basis.flat[position] > 0.0:
+                peaks[owner] = position // self.order
+        return peaks
+
+    def _basis(self, count: int) -> tuple[Integers, Array]:
+        """Return the control points whose basis functions may not be zero, and these functions.
+
+        Both are arrays of shape (`count` + 1, `order`), with one row for each of equidistant parameters.
+        """
+        degree, knots = self.order - 1, np.asarray(self.knots, dtype=np.float64)
+        low, high = knots[degree], knots[len(self.control)]
+        u = np.minimum(low + (high - low) * (np.arange(count + 1) / count), high)
+        # The last parameter belongs to the last span that is not empty
+        span = np.minimum(np.searchsorted(knots, u, side="right"), np.searchsorted(knots, high)) - 1
+        points = span[:, None] + np.arange(-degree, 1)
+        values = np.zeros((count + 1, self.order + 1))
+        values[:, degree] = 1.0
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for level in range(1, self.order):
+                first = degree - level
+                index = points[:, first:]
+                own, after = values[:, first:-1], values[:, first + 1 :]
+                rising = (u[:, None] - knots[index]) / (knots[index + level] - knots[index]) * own
+                end = knots[index + level + 1]
+                falling = (end - u[:, None]) / (end - knots[index + 1]) * after
+                # A function that is zero may have an empty interval
+                values[:, first:-1] = np.where(own > 0.0, rising, 0.0) + np.where(after > 0.0, falling, 0.0)
+        return points, values[:, :-1]
 
 
 def along_the_curve(poses: Sequence[Pose]) -> list[Pose]:

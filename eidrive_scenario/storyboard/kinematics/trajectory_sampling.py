@@ -104,8 +104,10 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     if times is None:
         return TrajectoryCurve(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
     meters = 1 + int(polygon_length)
-    stations = [math.floor((number + 1) / count * meters) / meters * count for number in curve.peaks(count)]
-    point_times = np.interp(np.arange(count + 1), stations, times)
+    # A control point whose basis function is zero at all samples of a long curve has no time of its own
+    peaks = [(number, time) for number, time in zip(curve.peaks(count), times, strict=True) if number is not None]
+    stations = [math.floor((number + 1) / count * meters) / meters * count for number, _ in peaks]
+    point_times = np.interp(np.arange(count + 1), stations, [time for _, time in peaks])
     return TrajectoryCurve(tuple(s), tuple(poses), tuple(point_times.tolist()), closed, given, tangents=tangents)
 
 

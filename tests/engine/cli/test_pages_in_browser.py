@@ -20,6 +20,7 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.live.live_view import LiveView
@@ -300,6 +301,40 @@ def test_live_view_fills_and_becomes_the_replay(browser: Any, eidrive: Eidrive, 
                 assert each.page.inner_text(f"#{part}") == recorded.page.inner_text(f"#{part}")
             assert not each.faults
         late.close("live-end")
+
+
+@pytest.mark.timeout(300)
+def test_names_of_javascript_are_usual_names_in_replay_report_and_live_view(
+    browser: Any, eidrive: Eidrive, tmp_path: Path
+) -> None:
+    """Objects of JavaScript inherit `constructor` and `toString`, and `__proto__` sets what they inherit from."""
+    source = resolve_scenario("coop/scenario_1")
+    text = source.read_text(encoding="utf-8").replace('"../', f'"{source.parent.parent}/')
+    for name, other in (("Ego", "__proto__"), ("Incoming", "constructor"), ("RSU", "toString")):
+        text = text.replace(f'"{name}"', f'"{other}"').replace(f"of: {name}", f"of: {other}")
+        text = text.replace(f"to: {name}", f"to: {other}")
+    path = tmp_path / "names.xosc"
+    path.write_text(text, encoding="utf-8")
+    opened: list[str] = []
+    with LiveView(speed=math.inf, wait=0.0, browser=False, announce=opened.append) as live:
+        assert run_and_save(path, out=tmp_path / "runs" / "one", observers=[live]).passed
+        pages = [Page(browser, None, 1440, site=live.address)]
+        pages[0].wait("!running && last > 0")
+        report = eidrive("report", tmp_path / "runs", "--out", tmp_path / "report.html")
+        assert report.exit_code == 0, report.output
+        pages += [Page(browser, file, 1440) for file in (tmp_path / "replays").glob("*.html")]
+        for page in pages:
+            assert page.page.evaluate("[names.slice().sort(), stations.slice().sort()]") == [
+                ["Firetruck", "__proto__", "constructor", "toString"],
+                ["__proto__", "toString"],
+            ]
+            for station in ("toString", "", "__proto__"):
+                page.page.select_option("#station", station)
+            assert page.page.evaluate("poseOf('constructor').length") == 4
+            assert "from toString" in page.page.inner_text("#known")
+            page.close("names", full=False)
+        assert len(pages) == 2
+    Page(browser, tmp_path / "report.html", 1440).close("names-report")
 
 
 def address_of(opened: list[str]) -> str:

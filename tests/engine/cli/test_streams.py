@@ -2,12 +2,22 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 from typing import IO
 
 import pytest
+from msgspec.structs import replace
+from rich.table import Table
+from rich.text import Text
+from sweep_runs import RUN, opened
+
+from eidrive_scenario import cli
+from eidrive_scenario.cli.streams import echo
+from eidrive_scenario.cli.verdicts import console
+from eidrive_scenario.files.encodable import printable
 
 FULL = Path("/dev/full")
 
@@ -35,6 +45,57 @@ def test_json_output_is_valid_in_any_encoding(passing_by: Path, tmp_path: Path) 
     for encoding in ("latin-1", "utf-8"):
         printed = eidrive("run", copy, "--json", "--no-record", PYTHONIOENCODING=encoding)
         assert json.loads(printed.stdout.decode(encoding))["scenario"] == copy.stem
+
+
+CONTROL = "a\x1b]0;x\x07\x9b31m\u202eb\x7f"
+ESCAPED = r"a\u001b]0;x\u0007\u009b31m\u202eb\u007f"
+
+
+def test_control_characters_in_messages_are_escaped(capsys: pytest.CaptureFixture[str]) -> None:
+    echo(f"{CONTROL}\n\tsecond line")
+    assert capsys.readouterr().out == f"{ESCAPED}\n\tsecond line\n"
+
+
+def test_control_characters_and_markup_in_tables_are_escaped(capsys: pytest.CaptureFixture[str]) -> None:
+    """The console of a terminal adds its own sequences for styles. rich removes the bell."""
+    out = console()
+    out._force_terminal = True
+    table = Table(box=None)
+    table.add_row(f"[red]{CONTROL}[/blue]")
+    out.print(table, Text("bold", style="bold"), soft_wrap=True)
+    text = capsys.readouterr().out
+    assert rf"[red]{ESCAPED}[/blue]".replace(r"\u0007", "") in text
+    assert not set("\x07\x9b\u202e\x7f") & set(text)
+
+
+def test_json_with_escaped_control_characters_has_the_same_values() -> None:
+    assert json.loads(printable(json.dumps({CONTROL: CONTROL}, ensure_ascii=False))) == {CONTROL: CONTROL}
+
+
+def test_commands_print_by_functions_that_escape_control_characters() -> None:
+    sources = {path.name: path.read_text(encoding="utf-8") for path in Path(cli.__file__).parent.glob("*.py")}
+    direct = {name for name, text in sources.items() if re.search(r"typer\.s?echo\(|\bprint\((?<!\.print\()", text)}
+    assert direct == {"streams.py", "short_help.py"}
+
+
+def test_control_characters_of_a_store_are_escaped(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(replace(RUN, status="aborted", error=CONTROL, command=CONTROL, point={"Speed": CONTROL}))
+    for options in (["--failures"], []):
+        printed = eidrive("results", path, *options)
+        assert printed.returncode == 0
+        assert not set("\x1b\x07\x9b\u202e\x7f") & set(printed.stdout.decode())
+
+
+def test_control_characters_of_a_scenario_are_escaped(passing_by: Path, tmp_path: Path) -> None:
+    """XML 1.0 permits C1, but not C0."""
+    copy = tmp_path / "c1.xosc"
+    copy.write_text(passing_by.read_text(encoding="utf-8").replace("Ego", "E\x9b31m\u202e"), encoding="utf-8")
+    printed = eidrive("tree", copy)
+    text = (printed.stdout + printed.stderr).decode()
+    assert r"E\u009b31m\u202e" in text
+    assert not set("\x9b\u202e") & set(text)
 
 
 def test_file_name_with_undecodable_bytes_is_invalid_input(passing_by: Path, tmp_path: Path) -> None:

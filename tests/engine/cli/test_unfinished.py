@@ -1,15 +1,20 @@
 """Interrupted and aborted runs, and readers that close their pipe."""
 
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
+from msgspec.structs import replace
+from sweep_runs import RUN, opened
 
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.recording import read_recording
+from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.simulation.command_execution import RunState
 from eidrive_scenario.simulation.run_outcome import end_reason
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -121,3 +126,54 @@ def test_output_file_locked_by_other_run_is_invalid_input(
     assert f"{table}: another run writes this file; choose another file" in result.stderr
     assert eidrive("run", passing_by, option, table).exit_code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["table"]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a recorded run, and of a store beside it."""
+    folder = tmp_path_factory.mktemp("recorded")
+    run_and_save("coop/scenario_1", settings=RunSettings(time_limit=3.0), out=folder / "run")
+    with opened(folder / "s.db") as store:
+        store.add(*(replace(RUN, key=f"{number:064}", number=number) for number in range(100)))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (("view", "run", "--out"), "a.html"),
+        (("view", "run", "--png"), "a.png"),
+        (("view", "run", "--gif"), "a.gif"),
+        (("view", "run", "--mp4"), "a.mp4"),
+        (("report", "run", "--no-replays", "--out"), "a.html"),
+        (("export", "run", "--osi"), "a.mcap"),
+        (("export", "run", "--foxglove"), "a.mcap"),
+        (("export", "run", "--mcap"), "a.mcap"),
+        (("export", "run", "--csv"), "a.csv"),
+        (("export", "run", "--parquet"), "a.parquet"),
+        (("results", "s.db", "--csv"), "a.csv"),
+        (("results", "s.db", "--parquet"), "a.parquet"),
+        (("tree", "coop/scenario_1", "--svg"), "a.svg"),
+        (("run", "coop/scenario_1", "--csv"), "a.csv"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, tuple) else value,
+)
+def test_file_that_cannot_be_written_whole_keeps_its_former_content(
+    recorded: Path, tmp_path: Path, arguments: tuple[str, ...], name: str
+) -> None:
+    """The limit of the size of files has the effect of a full disk. Only parquet needs less than 1 kB."""
+    out = tmp_path / name
+    out.write_text("former content")
+    size = 300 if "parquet" in name else 1000
+    done = subprocess.run(
+        [sys.executable, "-m", "eidrive_scenario", *arguments, out],
+        capture_output=True,
+        check=False,
+        cwd=recorded,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
+    )
+    error = done.stderr.decode()
+    assert done.returncode in (2, 3), error
+    assert "internal error" not in error
+    assert out.stem in error
+    assert out.read_text() == "former content"

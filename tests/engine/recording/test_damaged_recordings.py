@@ -6,6 +6,7 @@ The environment variable EIDRIVE_MUTANTS sets the number of damaged recordings (
 from __future__ import annotations
 
 import os
+import re
 import resource
 import zlib
 from collections import Counter
@@ -22,7 +23,7 @@ from typer.testing import CliRunner
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording import mcap_records, read_recording
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings
@@ -257,6 +258,62 @@ def test_view_of_many_decompression_bombs_is_bounded_in_memory(originals: list[P
     assert code in (0, 2)
     assert "internal error" not in error
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < MAX_BYTES
+
+
+def test_read_recording_counts_messages_of_all_channels(originals: list[Path], tmp_path: Path) -> None:
+    """Each of 40 chunks has 130,000 empty messages of channel 9, in less than 1 kB."""
+    records = split(originals[1].read_bytes())
+    place = next(place for place, (opcode, _) in enumerate(records) if opcode == CHUNK)
+    message = b"\x05" + (22).to_bytes(8, "little") + (9).to_bytes(2, "little") + bytes(20)
+    many = (CHUNK, pack(records[place][1], message * 130_000))
+    assert len(many[1]) < 1000
+    path = tmp_path / "messages.mcap"
+    path.write_bytes(join([*records[:place], *[many] * 40, *records[place:]]))
+    with work_within(2.0):
+        recording = read_recording(path)
+    assert any("maximum number or size of frames and messages" in line for line in recording.damage)
+
+
+def test_read_recording_counts_uncompressed_bytes_of_all_chunks(
+    originals: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of 40 chunks has one message of 4 MB of channel 9; a file of this size may have 64 MiB."""
+    read: list[int] = []
+    decompress = mcap_records._decompress
+
+    def counted(packed: bytes, size: int) -> bytes:
+        read.append(size)
+        return decompress(packed, size)
+
+    monkeypatch.setattr(mcap_records, "_decompress", counted)
+    records = split(originals[1].read_bytes())
+    place = next(place for place, (opcode, _) in enumerate(records) if opcode == CHUNK)
+    message = b"\x05" + (4_000_000).to_bytes(8, "little") + (9).to_bytes(2, "little") + bytes(3_999_998)
+    path = tmp_path / "large.mcap"
+    path.write_bytes(join([*records[:place], *[(CHUNK, pack(records[place][1], message))] * 40, *records[place:]]))
+    recording = read_recording(path)
+    assert any("maximum number or size of frames and messages" in line for line in recording.damage)
+    assert len(read) == 2**26 // 4_000_009
+    assert not recording.frame_count
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("time", b"1e308"), ("time", b"-1.0"), ("tick", b"9223372036854775808"), ("tick", b"-1")]
+)
+def test_frame_with_time_or_tick_out_of_range_is_refused(
+    originals: list[Path], tmp_path: Path, field: str, value: bytes
+) -> None:
+    """The seal of the forged recording is valid, and the view is the first entry of each frame."""
+    name = field.encode()
+    path = _forged(
+        tmp_path / "forged.mcap",
+        originals[1],
+        lambda text: re.sub(rb'"%b":[^,]+' % name, b'"%b":%b' % (name, value), text, count=1),
+    )
+    for options in (["--mcap", "a.mcap"], ["--osi", "a.osi.mcap"], ["--foxglove", "a.fg.mcap"], ["--csv", "a.csv"]):
+        done = CliRunner().invoke(app, ["export", str(path), options[0], str(tmp_path / options[1])])
+        assert (done.exit_code, type(done.exception)) == (2, SystemExit), options
+        assert f"{field} is out of range" in done.stderr
 
 
 def test_view_of_huge_road_network_omits_roads(originals: list[Path], tmp_path: Path) -> None:

@@ -80,6 +80,14 @@ def test_address_without_token_is_not_found(site: Site, path: str) -> None:
     raw.close()
 
 
+def test_invalid_address_is_a_bad_request(site: Site) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", site.port, timeout=PATIENCE)
+    connection.putrequest("GET", "http://[", skip_host=True)
+    connection.putheader("Host", "localhost")
+    connection.endheaders()
+    assert connection.getresponse().status == http.client.BAD_REQUEST
+
+
 def test_other_names_below_the_token_are_not_found(site: Site) -> None:
     assert site.get(site.path + "../../etc/passwd").status == 404
     assert site.get(site.path.rstrip("/") + "x/").status == 404

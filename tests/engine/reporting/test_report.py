@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,10 @@ from lxml import html
 
 from eidrive_scenario import reporting
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.reporting.report_files import report_files
 from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.simulation import RunSettings
 
 
 def result(seed: int, channel: str, passed: bool, **changes: Any) -> dict[str, Any]:
@@ -117,6 +121,17 @@ def test_report_of_result_with_invalid_warnings_is_an_error(tmp_path: Path) -> N
 def test_report_omits_null_metrics(tmp_path: Path) -> None:
     results = [result(1, "ideal", True, metrics={"ttc": None}), result(2, "ideal", True, metrics={"ttc": 1.5})]
     assert rows(write_report(results, tmp_path))[0][-1] == "1.50"
+
+
+def test_replay_of_run_folder_with_undecodable_name_is_linked(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/r\xffn"))
+    try:
+        run_and_save("coop/scenario_1", settings=RunSettings(time_limit=0.5), out=folder)
+    except OSError:
+        pytest.skip("this file system takes no such name")
+    page = report_files([tmp_path], tmp_path / "report.html")
+    assert b'href="replays/r%FFn.html"' in page.read_bytes()
+    assert (tmp_path / "replays" / f"{folder.name}.html").is_file()
 
 
 def test_report_of_invalid_or_no_result_raises_input_error(tmp_path: Path) -> None:

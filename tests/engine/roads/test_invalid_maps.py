@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from opendrive_xml import map_xml, road_xml, section_xml
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 from road_errors import road_diagnostics
 
 from eidrive_scenario.errors import RoadError
@@ -182,3 +182,28 @@ def test_advance_exactly_to_the_end_of_a_lane() -> None:
     assert place is not None
     assert place.lane == -2
     assert network.pose(place).x == pytest.approx(50.0)
+
+
+def test_road_whose_only_lane_has_a_negative_width_is_located() -> None:
+    """The middle of a right lane of -3.5 m is at t = 1.75 m."""
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section_xml(right=lane_xml(-1, -3.5)))).encode(), "a.xodr")
+    found = network.locate_at(10.0, 1.75)
+    assert found is not None
+    assert (found.road, found.lane) == ("1", -1)
+    assert found.s == pytest.approx(10.0)
+
+
+def test_cubic_with_negligible_coefficients_is_straight() -> None:
+    """u vanishes and v = p²: a straight line to the left, which starts at rest."""
+    tiny = " ".join(f'{name}="1e-308"' for name in ("bU", "cU", "dU", "bV"))
+    shape = f'<paramPoly3 pRange="arcLength" aU="0" aV="0" {tiny} cV="1" dV="0"/>'
+    network = RoadNetwork.parse(map_xml(road_xml(geometry=geometry(0.0, 0.0, 100.0, shape))).encode(), "a.xodr")
+    same_one_at_a_time(network, "1")
+    line = network.roads["1"].reference
+    assert line.at(10.0)[:4] == pytest.approx((0.0, 100.0, math.pi / 2, 0.0))
+    assert line.at(0.0).curvature == 0.0
+
+
+def test_geometry_that_ends_before_its_road_is_an_error() -> None:
+    (error,) = road_diagnostics(map_xml(road_xml(geometry=geometry(-1e9, 0.0, 100.0))))
+    assert error.endswith("the geometry of road '1' ends at s = -1e+09 m; start it at s = 0")

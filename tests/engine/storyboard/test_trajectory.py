@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from processor_time import work_within
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
@@ -169,6 +170,47 @@ def test_time_of_control_point_holds_at_peak_of_its_basis_function() -> None:
     way = sample_trajectory(trajectory(nurbs=shape), resolve)
     assert way.at_time(2.0) == pytest.approx(10.0, abs=1.0)
     assert (way.at_time(0.0), way.at_time(6.0)) == pytest.approx((0.0, 20.0))
+
+
+def test_spline_with_more_equal_knots_than_its_order_ends_before_the_last_point() -> None:
+    """Order 2: straight lines between the points at the knots 0, 1 and 2; the interval of the last point is empty."""
+    shape = model.Nurbs(
+        order=2,
+        control_point=tuple(model.ControlPoint(position=at(x, 0)) for x in (0, 10, 20, 30)),
+        knot=tuple(model.Knot(value=value) for value in (0, 0, 1, 2, 2, 2)),
+    )
+    way = sample_trajectory(trajectory(nurbs=shape), resolve)
+    assert (way.at(0.0).x, way.at(5.0).x, way.at(way.length).x) == pytest.approx((0.0, 5.0, 20.0))
+
+
+@pytest.mark.parametrize(("order", "spacing"), [(4, 1.0), (20, 0.05)])
+def test_spline_of_many_points_is_sampled_in_linear_time(order: int, spacing: float) -> None:
+    """With the knots 0, 1, 2, … point i is at the mean i + order / 2 of its inner knots: the curve is linear in its
+    parameter, from (order - 1) to (points), and so is the time i of point i.
+
+    The samples are 1 m and 0.1 m apart, so that some points of the second curve have no sample of their own.
+    """
+    points = 20_000
+    shape = model.Nurbs(
+        order=order,
+        control_point=tuple(model.ControlPoint(position=at(spacing * i, 0), time=float(i)) for i in range(points)),
+        knot=tuple(model.Knot(value=float(value)) for value in range(points + order)),
+    )
+    with work_within(4.0):
+        way = sample_trajectory(trajectory(nurbs=shape), resolve)
+    assert way.length == pytest.approx(spacing * (points - order + 1))
+    assert way.at(0.0).x == pytest.approx(spacing * (order / 2 - 1))
+    assert way.at_time(10_000.0) == pytest.approx(spacing * (10_000 - order / 2 + 1), abs=1.5)
+
+
+def test_clothoid_spline_of_many_long_segments_has_bounded_samples() -> None:
+    """400 straight segments of 100 m: 20,000 samples in total, and at most one more per segment and its start."""
+    segment = model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=100.0)
+    way = sample_trajectory(
+        trajectory(clothoid_spline=model.ClothoidSpline(clothoid_spline_segment=(segment,) * 400)), resolve
+    )
+    assert way.length == pytest.approx(40_000.0)
+    assert len(way.s) <= 20_800
 
 
 @pytest.mark.parametrize("closed", [False, True])

@@ -8,6 +8,7 @@ import pytest
 
 from eidrive_scenario.errors import ScenarioError, SettingError
 from eidrive_scenario.experiments.sweeps.jobs import plan_of
+from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings
 
 RANGE = """<DeterministicSingleParameterDistribution parameterName="{name}"><DistributionRange stepWidth="0.029">
@@ -22,6 +23,11 @@ def test_distribution_of_a_billion_runs_raises_without_a_list_of_them(distributi
     distribution.write_text(f"{text[:start]}<Deterministic>{ranges}</Deterministic>{text[end:]}")
     with pytest.raises(SettingError, match="the sweep has 1003003001 runs; expected 1 to 10000000"):
         plan_of(distribution, [{}], RunSettings(), runs=100, is_distribution=True)
+
+
+def test_number_of_runs_beyond_all_seeds_raises() -> None:
+    with pytest.raises(SettingError, match="the sweep has 100000000000000000000 runs; expected 1 to 10000000"):
+        plan_of(resolve_scenario("coop/scenario_1"), [{}], RunSettings(), runs=10**20)
 
 
 def test_distribution_of_a_distribution_names_the_kind_of_file(distribution: Path) -> None:

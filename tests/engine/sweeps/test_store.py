@@ -208,6 +208,62 @@ def test_damaged_row_raises(tmp_path: Path, column: str, value: str | bytes, rea
     assert str(path) in str(raised.value)
 
 
+def test_statuses_of_store_with_damaged_row_raise(tmp_path: Path) -> None:
+    """A sweep that continues needs only the statuses, but its results could not be read afterwards."""
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(*numbered_runs(3))
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE runs SET result = ? WHERE number = 1", ("[" * 100_000,))
+    with opened(path) as store, pytest.raises(SettingError, match="the store is damaged: the row of run 1"):
+        store.statuses()
+
+
+def test_settings_that_expand_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """65 MiB of blanks take 65 kB compressed; one run may have 64 MiB, and the four of a small file 3 MiB here."""
+    path = tmp_path / "s.db"
+    large = zlib.compress(b"{" + b" " * (65 * 2**20) + b"}")
+    for content, limit in ((large, "64 MiB"), (zlib.compress(b"{" + b" " * 2**20 + b"}"), "0 MiB")):
+        path.unlink(missing_ok=True)
+        with opened(path) as store:
+            store.add(*numbered_runs(4))
+        with closing(sqlite3.connect(path)) as connection, connection:
+            connection.execute("UPDATE runs SET settings = ?", (content,))
+        with ResultStore.read(path) as store, pytest.raises(SettingError, match=f"settings: larger than {limit}"):
+            list(store.runs())
+        monkeypatch.setattr("eidrive_scenario.experiments.sweeps.store._SMALL_SETTINGS", 3 * 2**20)
+
+
+ENDLESS = "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT x AS key FROM n"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        f"DROP TABLE runs; CREATE VIEW runs AS {ENDLESS}",
+        f"DROP TABLE meta; CREATE VIEW meta AS {ENDLESS}",
+        "CREATE TRIGGER t BEFORE INSERT ON runs BEGIN DELETE FROM runs; END",
+        "ALTER TABLE runs ADD COLUMN more AS (zeroblob(1000000000))",
+        "DROP TABLE runs",
+    ],
+)
+def test_store_with_other_tables_raises(tmp_path: Path, change: str) -> None:
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(RUN)
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(change)
+    with pytest.raises(SettingError, match=UNREADABLE), ResultStore.read(path):
+        pass
+    with pytest.raises(SettingError, match=UNREADABLE), opened(path):
+        pass
+
+
+def test_statement_that_does_not_end_is_interrupted(tmp_path: Path) -> None:
+    with opened(tmp_path / "s.db") as store, pytest.raises(SettingError, match="its content does not end"):
+        list(store._select(f"SELECT count(*) FROM ({ENDLESS})"))
+
+
 def test_damaged_versions_raise(tmp_path: Path) -> None:
     path = tmp_path / "s.db"
     with opened(path) as store:

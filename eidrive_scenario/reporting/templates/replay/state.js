@@ -1,16 +1,19 @@
 "use strict";
 const element = (id) => document.getElementById(id);
 const page = JSON.parse(element("data").textContent);
+/* Return an object for entries by names of the scenario. It inherits nothing, so that `constructor` is no entry of it. */
+const table = (entries) => Object.assign(Object.create(null), entries);
 /* Frames of the run so far; `addPart` appends frames. */
-const data = { roads: page.roads, colors: page.colors, images: page.images, times: [], ticks: [], actors: {}, poses: {},
-               stations: {}, changes: [], messages: [], timeline: [], series: {}, contact: null, decisive: null };
+const data = { roads: page.roads, colors: page.colors, images: table(page.images), times: [], ticks: [], actors: table(),
+               poses: table(), stations: table(), changes: [], messages: [], timeline: [], series: table(), contact: null,
+               decisive: null };
 const C = data.colors, INK = "#334155", SELF = "#0f172a";
 const SENDERS = ["#ea580c", "#c026d3", "#0e7490", "#4d7c0f", "#be123c", "#92400e"];
 /* Time after its outcome for which a message is drawn [s]. */
 const SHOWN = 0.15;
 /* Index of the last frame and duration [s], names of the actors and of the stations, and senders by station. */
 let last = -1, duration = 0, names = [], stations = [];
-const senders = {};
+const senders = table();
 /* Whether the run is in progress, and whether the page shows its newest frame. */
 let running = false, atEnd = false;
 
@@ -65,7 +68,7 @@ function addSeries(name, { age, expired, ...columns }, before) {
   const series = data.series[name] || (data.series[name] = {});
   for (const [key, column] of Object.entries(columns)) addColumn(series, key, column, before);
   for (const [key, bySender] of Object.entries({ age, expired })) {
-    if (bySender) series[key] = series[key] || {};
+    if (bySender) series[key] = series[key] || table();
     for (const [sender, column] of Object.entries(bySender || {})) addColumn(series[key], sender, column, before);
   }
 }
