@@ -257,7 +257,7 @@ class Motion(MotionState):
         lap = self._route.lap if self._route is not None else None
         if lap is None or self.roads is None or after.road != lap.start.road:
             return
-        way = self.roads.driving_direction(after.road, after.lane)
+        way = self.roads.driving_direction(after.road, after.lane) * (-1 if lap.against_traffic else 1)
         reached = (after.s - lap.start.s) * way >= 0.0
         if reached and (before.road != after.road or (before.s - lap.start.s) * way < 0.0):
             self._route, self._visit = lap, 0
