@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from opendrive_xml import junction_xml, lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml
@@ -20,9 +21,9 @@ TURNED = '<Orientation type="relative" h="3.141592653589793"/>'
 def merge() -> str:
     """Return roads 2, 3 and 4, which lead in lane 1 by the connecting roads 11, 12 and 13 into road 1, towards -x."""
 
-    def road(number: int, x: float, y: float, hdg: float, length: float, link: str, **more: object) -> str:
+    def road(number: int, x: float, y: float, hdg: float, length: float, link: str, **more: Any) -> str:
         lanes = section_xml(lane_xml(1, 4, link=lane_links_xml(1, 1) if "junction" in more else ""))
-        return road_xml(str(number), x=x, y=y, hdg=hdg, length=length, link=link, lanes=lanes, **more)  # type: ignore[arg-type]
+        return road_xml(str(number), x=x, y=y, hdg=hdg, length=length, link=link, lanes=lanes, **more)
 
     roads = [road(1, 0.0, 0.0, 0.0, 50.0, successor(junction="9"))]
     for number, curvature in ((11, TURN / LENGTH), (12, 0.0), (13, -TURN / LENGTH)):

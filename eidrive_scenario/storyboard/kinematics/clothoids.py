@@ -74,13 +74,24 @@ def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list
         middle = (number + 0.5) * step
         h = start.h + first * middle + 0.5 * (last - first) / length * middle * middle
         x, y = x + step * math.cos(h), y + step * math.sin(h)
-        if start.p != 0.0 or start.r != 0.0:
-            z -= step * math.tan(start.turned(h - start.h).p)
+        z -= step * math.tan(_pitch_in_plane(start, h - start.h))
         end = (number + 1) * step
         h = start.h + first * end + 0.5 * (last - first) / length * end * end
         s.append(end)
-        poses.append(start.turned(h - start.h)._replace(x=x, y=y, z=z, h=h))
+        pitch = _pitch_in_plane(start, h - start.h)
+        poses.append(start.turned(h - start.h)._replace(x=x, y=y, z=z, h=h, p=pitch))
     return s, poses
+
+
+def _pitch_in_plane(start: Pose, turn: float) -> float:
+    """Return the pitch [rad] in the plane of a pose, at a horizontal turn from its heading [rad].
+
+    The plane rises by -tan p ahead and by tan r / cos p to the left.
+    """
+    if start.p == 0.0 and start.r == 0.0:
+        return 0.0
+    rise = -math.tan(start.p) * math.cos(turn) + math.tan(start.r) / math.cos(start.p) * math.sin(turn)
+    return -math.atan(rise)
 
 
 def _linear_times(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:
