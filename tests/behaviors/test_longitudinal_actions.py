@@ -275,6 +275,13 @@ def test_speed_profile_in_follow_mode_keeps_its_last_speed_for_the_time_of_the_e
     assert scene(8, ("Ego", action)).when("action 0", "completeState") == pytest.approx(7.0)
 
 
+@pytest.mark.parametrize("limit", ["maxAcceleration", "maxAccelerationRate"])
+def test_speed_profile_with_a_limit_of_0_keeps_the_speed(scene: RunScene, limit: str) -> None:
+    played = scene(3, ("Ego", profile("follow", (2.0, 30.0), limits=f'{limit}="0"')))
+    assert played.at(3.0).speed == pytest.approx(20.0, abs=1e-4)
+    assert played.when("action 0", "completeState") is None
+
+
 @pytest.mark.parametrize(("mode", "speed_at_start"), [("position", 26.0), ("follow", 20.0)])
 def test_speed_profile_first_entry_at_time_0_is_a_step_or_the_current_speed(
     scene: RunScene, mode: str, speed_at_start: float

@@ -81,8 +81,6 @@ class SpeedProfileAction(ActionBehaviour):
             rates = (min(rates),) * 2 if forwards else (rates[1], rates[0])
             slopes = (min(slopes),) * 2 if forwards else (slopes[1], slopes[0])
         up, down = rates
-        if up <= 0.0 or down <= 0.0:
-            return
         segments = smoothed_segments(corners, up, down, *slopes)
         if segments is None or (len(corners) == 2 and segments[-1].time > corners[-1][0] + EPSILON):
             late = "entries are reached later than at their times"
@@ -131,7 +129,7 @@ class SpeedProfileAction(ActionBehaviour):
                     corners[-1] = (time, target)
                 continue
             limit = slope_limit(speed, target, faster, slower)
-            shortest = abs(target - speed) / max(limit, EPSILON)
+            shortest = abs(target - speed) / limit
             span = max(entry.time or 0.0, shortest)
             if entry.time is not None and shortest > entry.time + EPSILON:
                 late = f"entry {number + 1} takes {shortest:.2f} s instead of {entry.time:.2f} s"
@@ -143,11 +141,14 @@ class SpeedProfileAction(ActionBehaviour):
         return corners
 
     def _limit(self, name: str) -> float:
-        """Return the tighter limit of the action and of the vehicle's Performance; infinite without one."""
+        """Return the tighter limit of the action and of the vehicle's Performance; infinite without one.
+
+        A limit of 0 is replaced by a tiny one, with which the speed remains as it is.
+        """
         entity = self.actor.entity
         performance = entity.performance if isinstance(entity, model.Vehicle) else None
         limits = (getattr(limits, name, None) for limits in (self.action.dynamic_constraints, performance))
-        return min((float(limit) for limit in limits if limit is not None), default=math.inf)
+        return max(min((float(limit) for limit in limits if limit is not None), default=math.inf), EPSILON)
 
     def describe(self) -> str:
         """Describe the speeds."""

@@ -139,8 +139,11 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._put = self.actor.motion.pose
 
     def _update_backing(self) -> None:
-        """Update the direction of travel along the heading at the present place: times set the sign of the speed."""
-        if self._timing is None:
+        """Update the direction of travel along the heading at the present place.
+
+        Times set the sign of the speed themselves, and a driven vehicle moves by its own dynamics.
+        """
+        if self._timing is None and not self.actor.driven:
             self.actor.motion.set_backing(self._forwards(self._s) * self._progress.way < 0.0)
 
     def _begin(self) -> None:
