@@ -75,7 +75,7 @@ def _sampled_polyline(
     """Return a polyline with the headings and pitches of its vertices; those that the file omits follow the lines.
 
     Between two vertices without a heading, it is that of the line, and turns within ROUNDING of a corner, or half a
-    line. Elsewhere it changes linearly from vertex to vertex. So does the pitch.
+    line. From and to a vertex with a heading it changes linearly. So does the pitch.
     """
     pairs = list(pairwise(vertices))
     spans = [math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in pairs]
@@ -91,13 +91,13 @@ def _sampled_polyline(
         inset = min(ROUNDING / span, 0.5) if span > 0.0 else 0.5
         shares = (0.0, inset, 1.0 - inset, 1.0)
         ways = _over_line(headings[index], turns[index], turns[index + 1])
-        own_headings = _over_segment(a.h, b.h, ways, shares)
+        own_headings = _over_segment(a.h, b.h, ways, inset)
         climbs = _over_line(slopes[index], tilts[index], tilts[index + 1])
         own_slopes = [
             climb if h == way else _pitch(climb, h - way)
             for climb, way, h in zip(climbs, ways, own_headings, strict=True)
         ]
-        pitches = _over_segment(a.p, b.p, own_slopes, shares)
+        pitches = _over_segment(a.p, b.p, own_slopes, inset)
         first, last = _level_to(a, own_headings[0]), _level_to(b, own_headings[-1])
         is_linear = None not in (a.h, b.h) and tilts[index] == tilts[index + 1] == 0.0
         begin = 1 if index > 0 and is_linear else 0
@@ -128,16 +128,20 @@ def _over_line(line: float, turn_before: float, turn_after: float) -> list[float
     return [line - 0.5 * turn_before, line, line, line + 0.5 * turn_after]
 
 
-def _over_segment(
-    start: float | None, end: float | None, lines: Sequence[float], shares: Sequence[float]
-) -> Sequence[float]:
-    """Return an angle at shares of a segment [rad]: that of the line, or linear from or to a specified value."""
+def _over_segment(start: float | None, end: float | None, line: Sequence[float], inset: float) -> Sequence[float]:
+    """Return an angle at the points of `_over_line` [rad], which are `inset` of the segment beside its ends.
+
+    It is linear between two specified values, and between a specified value and that of the line at the other corner.
+    """
     if start is None and end is None:
-        return lines
-    first = lines[0] if start is None else start
-    last = lines[-1] if end is None else end
-    turn = wrap_angle(last - first)
-    return [first, *(first + share * turn for share in shares[1:-1]), last]
+        return line
+    if start is not None and end is not None:
+        turn = wrap_angle(end - start)
+        return [start, start + inset * turn, start + (1.0 - inset) * turn, end]
+    if start is not None:
+        return [start, start + inset / (1.0 - inset) * wrap_angle(line[2] - start), *line[2:]]
+    assert end is not None
+    return [*line[:2], end + inset / (1.0 - inset) * wrap_angle(line[1] - end), end]
 
 
 def _pitch(climb: float, turn: float) -> float:

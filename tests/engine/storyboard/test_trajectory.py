@@ -224,11 +224,16 @@ def climbing(h: float | None = None, p: float | None = None) -> Any:
 
 @pytest.mark.element("Polyline")
 def test_polyline_vertices_without_heading_have_the_tangent() -> None:
-    """Only the last of four vertices has a heading: 1 rad from the tangent, which is half of it 5 m before."""
+    """Only the last of four vertices has a heading: 1 rad from the tangent, to which it turns from 2 m after the third.
+
+    With a heading at the first vertex along its line, the actor points along the line until 2 m before the corner.
+    """
     way = polyline((0, 0, None, None), (10, 0, None, None), (10, 10, None, None), (10, 20, None, math.pi / 2 + 1.0))
-    expected = {5.0: 0.0, 10.0: math.pi / 4, 15.0: math.pi / 2, 20.0: math.pi / 2, 25.0: math.pi / 2 + 0.5}
+    expected = {5.0: 0.0, 10.0: math.pi / 4, 15.0: math.pi / 2, 20.0: math.pi / 2, 26.0: math.pi / 2 + 0.5}
     assert {s: way.at(s).h for s in expected} == pytest.approx(expected)
     assert way.at(30.0).h == pytest.approx(math.pi / 2 + 1.0)
+    corner = polyline((0, 0, None, 0.0), (10, 0, None, None), (10, 10, None, None))
+    assert [corner.at(s).h for s in (4.0, 7.9, 9.0, 10.0)] == pytest.approx([0.0, 0.0, math.pi / 8, math.pi / 4])
     first = polyline((0, 0, None, math.pi / 2), (0, 20, None, None), (0, 40, None, None))
     assert [first.at(s).h for s in (0.0, 10.0, 20.0, 40.0)] == pytest.approx([math.pi / 2] * 4)
 
