@@ -45,11 +45,15 @@ def _curve_of(course: Course, closed: bool) -> TrajectoryCurve:
 
 
 class PolylineVertex(NamedTuple):
-    """Vertex of a polyline: pose, and the heading and pitch that the file specifies [rad]; None without one."""
+    """Vertex of a polyline: pose, and the heading and pitch that the file specifies [rad]; None without one.
+
+    `is_oriented` is true if the file specifies any angle.
+    """
 
     pose: Pose
     h: float | None
     p: float | None
+    is_oriented: bool
 
 
 def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> TrajectoryCurve:
@@ -64,9 +68,9 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Trajecto
 
 def _vertex(position: model.Position, resolve: Resolve) -> PolylineVertex:
     pose = resolve(position)
-    return PolylineVertex(
-        pose, pose.h if specifies(position, "h") else None, pose.p if specifies(position, "p") else None
-    )
+    h = pose.h if specifies(position, "h") else None
+    p = pose.p if specifies(position, "p") else None
+    return PolylineVertex(pose, h, p, is_oriented=h is not None or p is not None or specifies(position, "r"))
 
 
 def _sampled_polyline(
@@ -151,7 +155,7 @@ def _pitch(climb: float, turn: float) -> float:
 
 def _level_to(vertex: PolylineVertex, heading: float) -> Pose:
     """Return the pose of a vertex with the roll of its surface at a heading; a specified orientation is kept."""
-    if vertex.h is not None or vertex.p is not None:
+    if vertex.is_oriented:
         return vertex.pose
     return vertex.pose.turned(wrap_angle(heading - vertex.pose.h))
 
@@ -199,8 +203,8 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     return TrajectoryCurve(tuple(s), tuple(poses), tuple(point_times.tolist()), closed, given, tangents=tangents)
 
 
-def specifies(position: model.Position, angle: Literal["h", "p"]) -> bool:
-    """True if a position specifies its heading `h` or its pitch `p`."""
+def specifies(position: model.Position, angle: Literal["h", "p", "r"]) -> bool:
+    """True if a position specifies its heading `h`, its pitch `p` or its roll `r`."""
     frame = position.chosen()
     orientation = frame if isinstance(frame, model.WorldPosition) else getattr(frame, "orientation", None)
     return getattr(orientation, angle, None) is not None

@@ -262,6 +262,21 @@ def test_specified_pitch_of_polyline_is_kept() -> None:
     assert [climbing(p=0.1).at(s).p for s in (0.0, 20.0, 40.0, 90.0)] == pytest.approx([0.1] * 4)
 
 
+@pytest.mark.parametrize(("roll", "expected"), [(0.1, 0.1), (None, -0.1)])
+def test_roll_of_polyline_is_the_specified_one_or_that_of_its_surface(roll: float | None, expected: float) -> None:
+    """The surface rises to the left of the x axis, which is to the right of a trajectory towards -x."""
+
+    def on_bank(position: model.Position) -> Pose:
+        frame = position.world_position
+        assert frame is not None
+        return Pose(frame.x, frame.y, 0.0, 0.0, 0.0, 0.1)
+
+    places = (model.WorldPosition(x=x, y=0.0, r=roll) for x in (0.0, -20.0))
+    vertices = tuple(model.Vertex(position=model.Position(world_position=place)) for place in places)
+    way = sample_trajectory(trajectory(polyline=model.Polyline(vertex=vertices)), on_bank)
+    assert way.at(10.0)[3:] == pytest.approx((math.pi, 0.0, expected))
+
+
 def quarter_circle(*headings: float | None) -> Any:
     points = zip(((10, 0, 1.0), (10, 10, math.sqrt(0.5)), (0, 10, 1.0)), headings, strict=True)
     shape = model.Nurbs(
