@@ -6,8 +6,16 @@ import math
 from typing import Any
 
 import pytest
-from opendrive_xml import junction_xml, lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml
-from opendrive_xml import successor_xml as successor
+from opendrive_xml import (
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 from storyboard_xml import init_xml, lane_position_xml, private_xml, teleport_xml
 from whole_run import Run
 
@@ -25,14 +33,14 @@ def merge() -> str:
         lanes = section_xml(lane_xml(1, 4, link=lane_links_xml(1, 1) if "junction" in more else ""))
         return road_xml(str(number), x=x, y=y, hdg=hdg, length=length, link=link, lanes=lanes, **more)
 
-    roads = [road(1, 0.0, 0.0, 0.0, 50.0, successor(junction="9"))]
+    roads = [road(1, 0.0, 0.0, 0.0, 50.0, successor_xml(junction="9"))]
     for number, curvature in ((11, TURN / LENGTH), (12, 0.0), (13, -TURN / LENGTH)):
-        link = predecessor_xml("1") + successor(str(number - 9))
+        link = predecessor_xml("1") + successor_xml(str(number - 9))
         roads.append(road(number, 50.0, 0.0, 0.0, LENGTH, link, curvature=curvature, junction="9"))
         turn = curvature * LENGTH
         x, y = (math.sin(turn) / curvature, (1 - math.cos(turn)) / curvature) if curvature else (LENGTH, 0.0)
         roads.append(road(number - 9, 50.0 + x, y, turn, 200.0, predecessor_xml(junction="9")))
-    return map_xml(*roads, rest=junction_xml("9", "1", {"11": 1, "12": 1, "13": 1}))
+    return map_xml(*roads, rest=junction_xml("9", "1", {"11": 1, "12": 1, "13": 1}, to=1))
 
 
 def assign(*places: tuple[int, float], inside: str = "") -> str:
