@@ -269,7 +269,7 @@ def test_speed_profile_with_overlapping_corners_keeps_acceleration_and_rate(scen
     assert played.when("action 0", "completeState") == pytest.approx(1.9)
 
 
-def test_speed_profile_in_follow_mode_keeps_its_last_speed_for_the_time_of_the_entry(scene: RunScene) -> None:
+def test_speed_profile_in_follow_mode_keeps_its_last_speed_until_its_time(scene: RunScene) -> None:
     """Two entries of equal slope, 1 m/s², then the same speed for 3 s."""
     action = profile("follow", (2.0, 22.0), (2.0, 24.0), (3.0, 24.0), rates=RATES)
     assert scene(8, ("Ego", action)).when("action 0", "completeState") == pytest.approx(7.0)
@@ -283,7 +283,7 @@ def test_speed_profile_with_a_limit_of_0_keeps_the_speed(scene: RunScene, limit:
 
 
 @pytest.mark.parametrize(("mode", "speed_at_start"), [("position", 26.0), ("follow", 20.0)])
-def test_speed_profile_first_entry_at_time_0_is_a_step_or_the_current_speed(
+def test_speed_profile_first_entry_at_time_0_depends_on_the_mode(
     scene: RunScene, mode: str, speed_at_start: float
 ) -> None:
     played = scene(3, ("Ego", profile(mode, (0.0, 26.0), (2.0, 28.0))))

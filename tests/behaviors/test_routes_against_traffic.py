@@ -90,7 +90,7 @@ def test_route_against_traffic_of_an_actor_along_the_traffic_needs_turned_waypoi
             play()
 
 
-def test_route_of_a_wrong_way_driver_with_the_traffic_stays_with_the_traffic(run: Run) -> None:
+def test_route_with_the_traffic_of_a_wrong_way_driver_is_unchanged(run: Run) -> None:
     """The waypoints lead from road 4 to road 1, and Ego drives the other way: the route is no reason for a warning."""
     init = init_xml("Ego", teleport_xml(lane_position_xml(1, 190.0, 4, TURNED)))
     played = run(

@@ -190,7 +190,7 @@ def test_above_max_speed_applies_to_negative_speeds(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("turned", ["waypoint", "actor", ""])
-def test_no_route_accepts_a_route_against_the_traffic_of_a_wrong_way_driver(folder: Path, turned: str) -> None:
+def test_no_route_accepts_a_route_of_a_wrong_way_driver(folder: Path, turned: str) -> None:
     """The route of the example leads back; its waypoints, or the position of its actor, may face that way."""
     _, example = EXAMPLES["no-route"]
     orientation = '<Orientation type="relative" h="3.141592653589793"/>'
