@@ -30,7 +30,7 @@ from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep, Motion
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.random_routes import random_route, uniform_branch_selector
-from eidrive_scenario.storyboard.kinematics.route import build_route
+from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile
@@ -95,6 +95,7 @@ __all__ = [
     "describe_rule",
     "distance",
     "entity_box",
+    "faces_traffic",
     "facing",
     "has_times",
     "is_agent_controller",

@@ -262,18 +262,22 @@ class RoadNetwork(RoadAttributes):
         end: LaneLocation,
         via: Sequence[LaneLocation] = (),
         costs: Sequence[Cost | None] | None = None,
+        *,
+        against_traffic: bool = False,
     ) -> Route:
         """Return the cheapest route over lanes from start to end. Raise RouteError if there is none.
 
-        `costs` holds one cost function for each leg: to each location of `via`, and to the end. None means the length,
-        which is also the default.
+        With `against_traffic` it leads against the driving direction of the lanes. `costs` holds one cost function for
+        each leg: to each location of `via`, and to the end. None means the length, which is also the default.
         """
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
-        parts = [
-            Route(self.tables, self._find_lanes(a, b, cost), a, b)
-            for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
-        ]
+        parts = []
+        for (a, b), cost in zip(pairwise(stops), wanted, strict=True):
+            ends = (b, a) if against_traffic else (a, b)
+            lanes = self._find_lanes(*ends, cost)
+            ordered = lanes[::-1] if against_traffic else lanes
+            parts.append(Route(self.tables, ordered, a, b, against_traffic=against_traffic))
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)
 
     def _find_lanes(self, start: LaneLocation, end: LaneLocation, cost: Cost | None) -> tuple[LaneKey, ...]:

@@ -159,7 +159,7 @@ class Storyboard:
         self.context.commands.trailers = {front.name: back.name for front, back in towed_pairs}
         for front, back in towed_pairs:
             if front.present and (not back.present or self.context.view.tick < 0):
-                back.motion.set_speed(front.motion.speed)
+                back.motion.set_speed(front.motion.speed_along_heading)
                 self.context.add_actor(back.name, ResolvedPosition(pose_behind(front, back, straight=True)))
         return towed_pairs
 

@@ -8,6 +8,9 @@ from storyboard_xml import global_xml, private_xml, speed_xml
 from street_scene import after
 from whole_run import Run
 
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import Simulation
+
 DELETE = global_xml('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
 TO_OTHER_S_LANE = private_xml(
     '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" dynamicsDimension="time" '
@@ -109,6 +112,28 @@ def test_entity_deleted_and_added_at_one_instant_is_moved(run: Run) -> None:
     both = (("Ego", DELETE, after(0.475)), ("Ego", back, after(0.475)))
     x = run(1, *both, others=others, driven=False).x("Other")
     assert x[10:13] == pytest.approx([155.0, 300.0, 300.0])
+
+
+@pytest.mark.element("AddEntityAction", "DeleteEntityAction")
+def test_adding_a_present_or_deleting_an_absent_entity_warns_without_effect(run: Run) -> None:
+    """Other goes on from x = 150 at 10 m/s; its deletion at 0.5 s leaves nothing to delete at 0.7 s."""
+    back = global_xml(
+        '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
+        "</Position></AddEntityAction></EntityAction>"
+    )
+    steps = (("Ego", back, after(0.225)), ("Ego", DELETE, after(0.475)), ("Ego", DELETE, after(0.675)))
+    seen: list[float] = []
+
+    def watch(_: Simulation, frame: Frame) -> None:
+        row = frame.view.rows.get("Other")
+        if row is not None:
+            seen.append(float(frame.view.position[row, 0]))
+
+    played = run(1, *steps, others={"Other": (-2, 150.0, 10.0)}, driven=False, during=watch)
+    assert seen == pytest.approx([150.0 + 0.5 * tick for tick in range(11)])
+    texts = [str(one) for one in played.result.warnings]
+    assert any("AddEntityAction: no effect: entity 'Other' is present" in text for text in texts)
+    assert any("DeleteEntityAction: no effect: entity 'Other' is absent" in text for text in texts)
 
 
 SPEED_UP = speed_xml(20, 1)

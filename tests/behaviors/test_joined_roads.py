@@ -127,3 +127,27 @@ def test_lane_change_relative_to_entity_beyond_head_to_head_roads(run: Run, coun
     played = run(3, ("Ego", change), driven=False, others={"Other": (-1, 10.0, 0.0)}, street=head_to_head(), init=init)
     row = played.frames[-1].view.rows["Ego"]
     assert float(played.frames[-1].view.position[row, 1]) == pytest.approx(2.0 - 4.0 * lane + 4.0 * count)
+
+
+@pytest.mark.element("RelativeLanePosition", "RelativeRoadPosition")
+@pytest.mark.parametrize(
+    ("lane", "position", "expected"),
+    [
+        # Ego in lane -1 towards +x at (150, -2): ahead and left are those of road 1, also on road 2
+        (-1, '<RelativeLanePosition entityRef="Ego" ds="100" dLane="0" offset="0.5"/>', (250.0, -1.5)),
+        (-1, '<RelativeLanePosition entityRef="Ego" ds="100" dLane="-1" offset="0.5"/>', (250.0, -5.5)),
+        (-1, '<RelativeLanePosition entityRef="Ego" dsLane="100" dLane="-1" offset="0.5"/>', (250.0, -5.5)),
+        (-1, '<RelativeRoadPosition entityRef="Ego" ds="100" dt="0.5"/>', (250.0, -1.5)),
+        # Ego in lane 1 towards -x at (150, 2): behind it on road 2, by the axes of road 1 or by its own
+        (1, '<RelativeLanePosition entityRef="Ego" ds="100" dLane="-1" offset="0.5"/>', (250.0, -1.5)),
+        (1, '<RelativeLanePosition entityRef="Ego" dsLane="-100" dLane="1" offset="0.5"/>', (250.0, -2.5)),
+        (1, '<RelativeRoadPosition entityRef="Ego" ds="100" dt="0.5"/>', (250.0, 2.5)),
+    ],
+)
+def test_relative_position_on_the_next_road_keeps_the_frame_of_its_reference(
+    run: Run, lane: int, position: str, expected: tuple[float, float]
+) -> None:
+    init = put("Ego", 1, lane, 150.0) + init_xml("Other", teleport_xml(position))
+    played = run(0.1, driven=False, others={"Other": (-1, 10.0, 0.0)}, street=head_to_head(), init=init)
+    view = played.frames[0].view
+    assert tuple(view.position[view.rows["Other"], :2]) == pytest.approx(expected)

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 from recorded_scene import RunScene
-from storyboard_xml import speed_xml
+from storyboard_xml import lane_position_xml, speed_xml, teleport_xml
 from street_scene import NOTHING, after
 from trajectories import CORNER, follow_points
 from whole_run import Run
@@ -28,6 +28,9 @@ def change(target: str, shape: str = "linear", dimension: str = "time", value: f
 
 def lane(number: int | str) -> str:
     return f'<AbsoluteTargetLane value="{number}"/>'
+
+
+FOLLOW = ("dynamicsShape", 'followingMode="follow" dynamicsShape')
 
 
 def beside(count: int, entity: str = "Ego") -> str:
@@ -271,3 +274,74 @@ def test_lateral_transition_continues_from_the_place_of_a_teleport(scene: RunSce
     assert rows[moved].y == pytest.approx(-3.0)
     assert all(-1e-9 <= two.y - one.y < 0.2 for one, two in pairwise(rows[moved:]))
     assert rows[-1].y == pytest.approx(2.0 if change else -0.5, abs=1e-6)
+
+
+@pytest.mark.element("LaneChangeAction")
+@pytest.mark.parametrize(
+    ("speed", "action", "warning"),
+    [
+        (1.0, change(lane(-2), value=2.0), "takes longer than requested: the lateral speed is at most the forward"),
+        (0.0, change(lane(-2), value=2.0), "waits while the actor stands"),
+        (20.0, change(lane(-2), "cubic", value=1.0).replace(*FOLLOW), "maxSteering and maxDeceleration limit"),
+        (20.0, change(lane(-2), value=2.0), None),
+        (0.0, change(lane(-2), dimension="distance", value=20.0), None),
+        (20.0, change(lane(-2), "step", value=0.0).replace(*FOLLOW), None),
+    ],
+)
+def test_lane_change_delayed_by_a_limit_warns(run: Run, speed: float, action: str, warning: str | None) -> None:
+    played = run(4.0, ("Ego", action), driven=False, ego=(-1, 100.0, speed))
+    texts = [str(one) for one in played.result.warnings if "LaneChangeAction" in str(one)]
+    assert len(texts) == (warning is not None)
+    assert warning is None or warning in texts[0]
+
+
+def keep_beside(distance: str, limits: str = "") -> str:
+    return f"""<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" continuous="true" {distance}
+      coordinateSystem="road">{limits}</LateralDistanceAction></LateralAction></PrivateAction>"""
+
+
+def keep_apart(displacement: str) -> str:
+    return f"""<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Other" continuous="true"
+      freespace="false" distance="20" coordinateSystem="road" displacement="{displacement}"/></LongitudinalAction>
+      </PrivateAction>"""
+
+
+@pytest.mark.element("LateralDistanceAction", "LongitudinalDistanceAction")
+@pytest.mark.parametrize(
+    ("action", "before", "behind"),
+    [
+        (
+            keep_beside('freespace="false" distance="3" displacement="leftToReferencedEntity"'),
+            (None, 1.0),
+            (None, -5.0),
+        ),
+        (
+            keep_beside('freespace="false" distance="3" displacement="rightToReferencedEntity"'),
+            (None, -5.0),
+            (None, 1.0),
+        ),
+        (keep_beside('freespace="false" distance="3"'), (None, 1.0), (None, 1.0)),
+        (
+            # 1 m between boxes of 2 m at up to 4 m/s
+            keep_beside(
+                'freespace="true" distance="1" displacement="leftToReferencedEntity"',
+                '<DynamicConstraints maxSpeed="4"/>',
+            ),
+            (None, 1.0),
+            (None, -5.0),
+        ),
+        (keep_apart("trailingReferencedEntity"), (130.0, None), (170.0, None)),
+        (keep_apart("leadingReferencedEntity"), (170.0, None), (130.0, None)),
+    ],
+)
+def test_displacement_follows_the_heading_of_the_reference_in_each_step(
+    scene: RunScene, action: str, before: tuple[float | None, ...], behind: tuple[float | None, ...]
+) -> None:
+    """Other stands at (150, -2) and turns around at 3 s."""
+    turned = lane_position_xml(-1, 150.0, inside='<Orientation type="relative" h="3.141592653589793"/>')
+    steps = (("Ego", action), ("Other", teleport_xml(turned), after(2.95)))
+    played = scene(6, *steps, ego=(-1, 100.0, 8.0), other=(-1, 150.0, 0.0))
+    for time, expected in ((3.0, before), (6.0, behind)):
+        place = played.at(time)
+        for value, wanted in zip((place.x, place.y), expected, strict=True):
+            assert wanted is None or value == pytest.approx(wanted, abs=1e-6)

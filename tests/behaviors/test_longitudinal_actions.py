@@ -6,6 +6,7 @@ Ego drives at 20 m/s from x = 100 in steps of 0.1 s.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from eidrive_behaviors.actions.speed import duration_over
@@ -122,13 +123,21 @@ def test_speed_action_of_driven_vehicle_sets_the_goal(scene: RunScene) -> None:
     assert played.when("action 0", "completeState") is None
 
 
-def profile(mode: str, *entries: tuple[float | None, float], rates: str = "") -> str:
+RATES = 'maxAccelerationRate="4" maxDecelerationRate="4"'
+
+
+def profile(
+    mode: str,
+    *entries: tuple[float | None, float],
+    rates: str = "",
+    limits: str = 'maxAcceleration="5" maxDeceleration="4"',
+) -> str:
     rows = "".join(
         f'<SpeedProfileEntry {"" if time is None else f"time={chr(34)}{time}{chr(34)}"} speed="{value}"/>'
         for time, value in entries
     )
-    limits = f'<DynamicConstraints maxAcceleration="5" maxDeceleration="4" {rates}/>'
-    return f"""<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="{mode}">{limits}{rows}
+    constraints = f"<DynamicConstraints {limits} {rates}/>"
+    return f"""<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="{mode}">{constraints}{rows}
       </SpeedProfileAction></LongitudinalAction></PrivateAction>"""
 
 
@@ -154,9 +163,9 @@ def test_speed_step_beside_profile_sets_the_start_of_the_profile(scene: RunScene
 
 @pytest.mark.element("SpeedProfileAction")
 def test_speed_profile_in_position_mode_is_linear(scene: RunScene) -> None:
-    played = scene(4, ("Ego", profile("position", (1.0, 30.0), (2.0, 20.0))))
-    assert [played.at(t).speed for t in (0.5, 1.0, 2.0, 3.0)] == pytest.approx([25, 30, 25, 20])
-    assert played.when("action 0", "completeState") == pytest.approx(3.0)
+    played = scene(6, ("Ego", profile("position", (2.0, 30.0), (2.5, 20.0))))
+    assert [played.at(t).speed for t in (1.0, 2.0, 3.0, 4.5)] == pytest.approx([25, 30, 26, 20])
+    assert played.when("action 0", "completeState") == pytest.approx(4.5)
 
 
 def test_speed_profile_entry_without_time_uses_the_limits(scene: RunScene) -> None:
@@ -202,10 +211,109 @@ def test_speed_profile_limits_of_the_action_precede_the_vehicle(scene: RunScene,
 
 
 def test_speed_profile_is_limited_to_the_maximum_speed(scene: RunScene) -> None:
-    played = scene(3, ("Ego", profile("position", (1.0, 90.0))))
-    assert played.at(2.0).speed == 70.0
-    played = scene(3, ("Ego", profile("position", (1.0, 90.0), rates='maxSpeed="30"')))
+    played = scene(11, ("Ego", profile("position", (10.0, 90.0))))
+    assert played.at(10.0).speed == 70.0
+    played = scene(3, ("Ego", profile("position", (2.0, 90.0), rates='maxSpeed="30"')))
     assert played.at(2.0).speed == 30.0
+
+
+@pytest.mark.element("SpeedProfileAction")
+@pytest.mark.parametrize(
+    ("mode", "entry", "limits", "rates", "samples", "end"),
+    [
+        # 10 m/s more at 1 m/s²
+        ("position", (2.0, 30.0), 'maxAcceleration="1"', None, {5.0: 25.0, 9.0: 29.0}, 10.0),
+        ("follow", (2.0, 30.0), 'maxAcceleration="1"', None, {5.0: 25.0, 9.0: 29.0}, 10.0),
+        # the Performance allows 10 m/s² only
+        ("position", (0.5, 30.0), 'maxAcceleration="40"', None, {0.5: 25.0}, 1.0),
+        ("position", (None, 30.0), 'maxAcceleration="40"', None, {0.5: 25.0}, 1.0),
+        # 1 m/s² after 0.5 s and 0.25 m/s; it falls within 1 s and 0.5 m/s
+        ("follow", (2.0, 30.0), 'maxAcceleration="1"', (2, 1), {0.5: 20.25, 5.0: 24.75, 9.7: 29.45}, 10.75),
+        # -2 m/s² after 0.5 s, by 0.5 m/s
+        ("follow", (1.0, 10.0), 'maxDeceleration="2"', (4, 4), {0.5: 19.5, 3.0: 14.5, 5.0: 10.5}, 5.5),
+        # the rates alone allow 1 m/s² only after 1 s, and 0 after 1 s more
+        ("follow", (1.0, 21.0), 'maxAcceleration="5"', (1, 1), {1.0: 20.5}, 2.0),
+    ],
+)
+def test_speed_profile_entry_beyond_the_limits_is_reached_later(
+    scene: RunScene,
+    mode: str,
+    entry: tuple[float | None, float],
+    limits: str,
+    rates: tuple[float, float] | None,
+    samples: dict[float, float],
+    end: float,
+) -> None:
+    given = f'maxAccelerationRate="{rates[0]}" maxDecelerationRate="{rates[1]}"' if rates else ""
+    played = scene(12, ("Ego", profile(mode, entry, limits=limits, rates=given)))
+    assert {time: played.at(time).speed for time in samples} == pytest.approx(samples)
+    assert played.when("action 0", "completeState") == pytest.approx(end, abs=0.051)
+    assert played.at(12.0).speed == entry[1]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_speed_profile_with_overlapping_corners_keeps_acceleration_and_rate(scene: RunScene, sign: float) -> None:
+    """Entries of 5 m/s² every 0.2 s leave no space for corners at 4 m/s³.
+
+    In steps of 0.1 s, 0.4, 0.8, … 4.0, … 0.4 m/s² make 4 m/s in 19 steps, the fewest at 4 m/s³.
+    """
+    entries = [(0.2, sign * (20.0 + number)) for number in (1, 2, 3, 4)] + [(1.0, sign * 24.0)]
+    action = profile("follow", *entries, rates='maxAccelerationRate="4" maxDecelerationRate="4"')
+    played = scene(4, ("Ego", action), ego=(-1, 300.0, sign * 20.0))
+    speeds = [row["Ego"].speed * sign for row in played.rows]
+    accelerations = [0.0, *((after - before) / 0.1 for before, after in pairwise(speeds))]
+    assert max(accelerations) <= 5.0
+    assert min(accelerations) >= -1e-9
+    assert max(abs(after - before) for before, after in pairwise(accelerations)) <= 0.4 + 1e-9
+    assert speeds[-1] == pytest.approx(24.0)
+    assert played.when("action 0", "completeState") == pytest.approx(1.9)
+
+
+def test_speed_profile_in_follow_mode_keeps_its_last_speed_until_its_time(scene: RunScene) -> None:
+    """Two entries of equal slope, 1 m/s², then the same speed for 3 s."""
+    action = profile("follow", (2.0, 22.0), (2.0, 24.0), (3.0, 24.0), rates=RATES)
+    assert scene(8, ("Ego", action)).when("action 0", "completeState") == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize("limit", ["maxAcceleration", "maxAccelerationRate"])
+def test_speed_profile_with_a_limit_of_0_keeps_the_speed(scene: RunScene, limit: str) -> None:
+    played = scene(3, ("Ego", profile("follow", (2.0, 30.0), limits=f'{limit}="0"')))
+    assert played.at(3.0).speed == pytest.approx(20.0, abs=1e-4)
+    assert played.when("action 0", "completeState") is None
+
+
+@pytest.mark.parametrize(("mode", "speed_at_start"), [("position", 26.0), ("follow", 20.0)])
+def test_speed_profile_first_entry_at_time_0_depends_on_the_mode(
+    scene: RunScene, mode: str, speed_at_start: float
+) -> None:
+    played = scene(3, ("Ego", profile(mode, (0.0, 26.0), (2.0, 28.0))))
+    assert [played.at(t).speed for t in (1.0, 2.0)] == pytest.approx([0.5 * (speed_at_start + 28.0), 28.0])
+
+
+@pytest.mark.element("SpeedAction", "SpeedProfileAction")
+@pytest.mark.parametrize(
+    ("action", "warning"),
+    [
+        (speed(absolute(40.0), value=1.0), "takes 2.00 s instead of 1.00 s: maxAcceleration is 10 m/s²"),
+        (speed(absolute(0.0), value=1.0), "takes 2.00 s instead of 1.00 s: maxDeceleration is 10 m/s²"),
+        # half the distance at the mean speed of 30 m/s
+        (speed(absolute(40.0), dimension="distance", value=30.0), "takes 2.00 s instead of 1.00 s: maxAcceleration"),
+        (speed(absolute(40.0), "cubic", "rate", 20.0), "takes 3.00 s instead of 1.50 s: maxAcceleration"),
+        (speed(absolute(80.0), value=10.0), "the target speed is reduced to 70 m/s (got 80 m/s)"),
+        (profile("position", (2.0, 30.0), (1.0, 22.0)), "entry 2 takes 2.00 s instead of 1.00 s: maxDeceleration"),
+        (profile("follow", (1.0, 24.0), rates=RATES), "limited to 4 and 4 m/s³"),
+        (profile("follow", (1.0, 24.0), (1.0, 20.0), rates=RATES), "limited to 4 and 4 m/s³"),
+        (speed(absolute(40.0), value=2.0), None),
+        (speed(absolute(40.0), "step"), None),
+        (profile("position", (2.0, 30.0), (2.5, 20.0)), None),
+        (profile("follow", (2.0, 24.0), rates=RATES), None),
+    ],
+)
+def test_speed_change_delayed_by_a_limit_warns_once(run: Run, action: str, warning: str | None) -> None:
+    warnings = [str(one) for one in run(1.0, ("Ego", action), driven=False).result.warnings]
+    texts = [text for text in warnings if "SpeedAction" in text or "SpeedProfileAction" in text]
+    assert len(texts) == (warning is not None)
+    assert warning is None or warning in texts[0]
 
 
 def keep(attributes: str, limits: str = "") -> str:

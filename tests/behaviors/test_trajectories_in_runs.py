@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import pytest
 from recorded_scene import RunScene
-from storyboard_xml import speed_xml, teleport_xml
-from street_scene import after
+from storyboard_xml import element_state_xml, init_xml, speed_xml, teleport_xml
+from street_scene import NOTHING, after
 from trajectories import curve, follow, on_road, world
 from whole_run import RecordedRun, Run
 
@@ -254,3 +254,93 @@ def test_longitudinal_distance_without_limits_applies_at_once_on_trajectory(run:
     for time in (0.6, 1.0, 2.0):
         gap = row(played, time, "Other")[0] - row(played, time)[0]
         assert (gap, row(played, time)[3]) == pytest.approx((20.0, 10.0), abs=1e-6)
+
+
+AGAINST = curve(world(100.0, -2.0, math.pi), world(140.0, -2.0, math.pi))
+"""40 m towards +x with headings towards -x."""
+COLLISION = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
+</TriggeringEntities><EntityCondition><TimeToCollisionCondition freespace="false" rule="lessThan" value="2"
+coordinateSystem="entity" relativeDistanceType="longitudinal"><TimeToCollisionConditionTarget>
+<EntityRef entityRef="Other"/></TimeToCollisionConditionTarget></TimeToCollisionCondition></EntityCondition>
+</ByEntityCondition>"""
+
+
+@pytest.mark.element("FollowTrajectoryAction")
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize("order", ["teleport speed follow", "speed follow"])
+def test_positive_speed_with_headings_against_the_curve_is_a_negative_speed(run: Run, mode: str, order: str) -> None:
+    """Tail first from x = 100 at 10 m/s; beyond the end at 4 s as well. 60 m ahead, TTC falls below 2 s after 4 s."""
+    parts = {
+        "teleport": teleport_xml(world(100.0, -2.0, math.pi)),
+        "speed": speed_xml(10.0),
+        "follow": follow(AGAINST, mode),
+    }
+    played = run(
+        5.0,
+        ("Ego", NOTHING, COLLISION),
+        driven=False,
+        others={"Other": (-1, 160.0, 0.0)},
+        init=init_xml("Ego", *(parts[name] for name in order.split())),
+    )
+    for time in (0.0, 1.0, 3.95, 4.5):
+        assert row(played, time) == pytest.approx((100.0 + 10.0 * time, -2.0, math.pi, -10.0), abs=1e-6)
+    assert played.begun("event 0") == pytest.approx([4.05])
+
+
+def test_speed_change_on_a_trajectory_with_headings_against_it_continues_its_motion(run: Run) -> None:
+    """From 10 to 20 m/s within 2 s: 5 m/s more after 1 s, and back to the lane with that speed."""
+    way = curve(world(100.0, -2.0, math.pi), world(900.0, -2.0, math.pi))
+    played = run(
+        4.0,
+        ("Ego", speed_xml(20.0, 2.0), after(0.975)),
+        driven=False,
+        init=init_xml("Ego", teleport_xml(world(100.0, -2.0)), speed_xml(10.0), follow(way)),
+    )
+    assert [row(played, time)[3] for time in (0.5, 2.0, 3.0, 4.0)] == pytest.approx([-10.0, -15.0, -20.0, -20.0])
+    assert row(played, 4.0)[0] > row(played, 3.0)[0] > row(played, 1.0)[0]
+
+
+def test_headings_that_turn_against_the_curve_change_the_sign_of_the_speed(run: Run) -> None:
+    """A turn by 180° within 2 m, and back: the motion towards +x continues."""
+    places = [(100.0, 0.0), (120.0, 0.0), (122.0, math.pi), (140.0, math.pi), (142.0, 0.0), (900.0, 0.0)]
+    way = curve(*(world(x, -2.0, h) for x, h in places))
+    played = drive(run, teleport_xml(world(100.0, -2.0, 0.0)), speed_xml(10.0), follow(way), end=5.0)
+    for time, speed in ((1.0, 10.0), (3.0, -10.0), (5.0, 10.0)):
+        assert row(played, time)[0] == pytest.approx(100.0 + 10.0 * time)
+        assert row(played, time)[3] == speed
+
+
+def test_absent_reversing_actor_outside_of_lanes_moves_tail_first_to_the_end(run: Run) -> None:
+    away = curve(world(100.0, -60.0), world(110.0, -60.0))
+    steps = (("Walker", follow(away)), ("Walker", speed_xml(-1.0), completion("action 0")))
+    init = init_xml("Walker", speed_xml(-5.0))
+    played = run(4.0, *steps, driven=False, more=WALKER, init=init)
+    assert row(played, 1.0, "Walker") == pytest.approx((105.0, -60.0, math.pi, -5.0), abs=1e-6)
+    assert played.begun("event 1") == pytest.approx([2.0])
+    assert row(played, 3.0, "Walker")[3] == -1.0
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+def test_trajectory_ends_at_its_start_with_a_warning(run: Run, mode: str) -> None:
+    """Ego faces along the curve from 10 m after its start at -5 m/s."""
+    action = follow(AHEAD, mode).replace(
+        "<FollowTrajectoryAction>", '<FollowTrajectoryAction initialDistanceOffset="10">'
+    )
+    steps = (("Ego", action), ("Ego", speed_xml(-1.0), completion("action 0")))
+    played = run(4.0, *steps, driven=False, ego=(-1, 160.0, -5.0))
+    assert played.begun("event 1") == pytest.approx([2.0])
+    assert row(played, 4.0) == pytest.approx((148.0, -2.0, 0.0, -1.0), abs=0.06)
+    assert sum("ends at the start of the trajectory" in str(one) for one in played.result.warnings) == 1
+
+
+def completion(name: str) -> str:
+    return element_state_xml("action", name, "completeState")
+
+
+@pytest.mark.element("FollowTrajectoryAction")
+def test_actor_on_a_climbing_trajectory_is_pitched(run: Run) -> None:
+    points = ((100.0, 0.0), (120.0, 0.0), (160.0, 20.0), (200.0, 20.0))
+    way = curve(*(f'<WorldPosition x="{x}" y="-2" z="{z}"/>' for x, z in points))
+    played = drive(run, teleport_xml(world(100.0, -2.0)), speed_xml(10.0), follow(way), end=8.0)
+    pitches = played.of("Ego", "pitch")
+    assert [pitches[round(time / 0.05)] for time in (1.0, 4.0, 8.0)] == pytest.approx([0.0, -math.atan(0.5), 0.0])

@@ -9,7 +9,7 @@ from eidrive_scenario.api.actions import ActionBehaviour, model, resolve_positio
 
 
 class AddEntityAction(ActionBehaviour):
-    """Addition of the entity of the enclosing EntityAction to the world. A present entity is moved."""
+    """Addition of the entity of the enclosing EntityAction to the world; no effect on a present entity."""
 
     action: model.AddEntityAction
     parent_element: model.EntityAction
@@ -17,6 +17,10 @@ class AddEntityAction(ActionBehaviour):
     def update(self) -> Status:
         """Add the entity at its position."""
         name = self.parent_element.entity_ref
+        if self.context.actors[name].present:
+            message = f"no effect: entity {name!r} is present"
+            self.context.warn(*self.error(message, "delete it first, or use a TeleportAction").diagnostics)
+            return Status.SUCCESS
         self.context.add_actor(name, resolve_position(self.action.position, self.context, name))
         return Status.SUCCESS
 
@@ -33,7 +37,11 @@ class DeleteEntityAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Remove the entity."""
-        self.context.remove_actor(self.parent_element.entity_ref)
+        name = self.parent_element.entity_ref
+        if not self.context.actors[name].present:
+            message = f"no effect: entity {name!r} is absent"
+            self.context.warn(*self.error(message, "add it first").diagnostics)
+        self.context.remove_actor(name)
         return Status.SUCCESS
 
     def describe(self) -> str:

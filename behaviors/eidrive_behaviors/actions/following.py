@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api.actions import TrajectoryCurve, model, turning_wheelbase
+from eidrive_scenario.api.actions import ActionBehaviour, TrajectoryCurve, model, turning_wheelbase
 from eidrive_scenario.api.common import Pose, wrap_angle
 
 TINY = 1e-9
@@ -182,6 +182,23 @@ class PathPursuit:
 def _distance(pose: Pose, x: float, y: float) -> float:
     """Return the horizontal distance of a position from a pose [m]."""
     return math.hypot(pose.x - x, pose.y - y)
+
+
+class DelayWarning:
+    """Warning that a limit delays a motion beyond the extent that the file requests; at most one per action.
+
+    A repeated action starts from other states, so that its later delays differ in their numbers only.
+    """
+
+    def __init__(self, behaviour: ActionBehaviour) -> None:
+        self._behaviour: ActionBehaviour | None = behaviour
+
+    def add(self, late: str, limit: str) -> None:
+        """Add the warning to the result of the run, with the delay and the limit that causes it."""
+        behaviour, self._behaviour = self._behaviour, None
+        if behaviour is not None:
+            hint = "allow more time or distance, or change the limit"
+            behaviour.context.warn(*behaviour.error(f"{late}: {limit}", hint).diagnostics)
 
 
 def is_follow_mode(dynamics: model.TransitionDynamics) -> bool:

@@ -7,7 +7,7 @@ import math
 from msgspec.structs import replace
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, largest_curvature
+from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, is_follow_mode, largest_curvature
 from eidrive_behaviors.actions.lane_paths import LanePath, lane_path
 from eidrive_behaviors.actions.speed import describe_dynamics
 from eidrive_scenario.api.actions import (
@@ -26,6 +26,8 @@ from eidrive_scenario.api.common import EPSILON, LaneLocation, ScenarioError
 
 STANDING = 1e-6
 """Minimum speed of a lateral motion [m/s]. A slower actor waits."""
+FORWARD_LIMIT = "the lateral speed is at most the forward speed"
+VEHICLE_LIMIT = "maxSteering and maxDeceleration limit the lateral acceleration"
 SHIFTED = 1e-3
 """Offset change above which the offset refers to a neighboring lane after the lane has ended [m]."""
 NEAR = 0.2
@@ -69,6 +71,7 @@ class LaneChangeAction(ActionBehaviour):
         self._lane = 0
         self._path: LanePath | None = None
         self._limited_offset: RateLimitedValue | None = None
+        self._delay_warning = DelayWarning(self)
 
     def initialise(self) -> None:
         """Find the target lane and express the actor's position as an offset from its center."""
@@ -110,6 +113,8 @@ class LaneChangeAction(ActionBehaviour):
             self.actor.motion.set_lateral_step(LateralStep(self._transition.target, 0.0, shortens_distance=False))
             return Status.SUCCESS
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
+            if self.context.dt > 0.0 and self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
+                self._delay_warning.add("waits while the actor stands", FORWARD_LIMIT)
             return Status.RUNNING
         self._switch_reference_lane()
         wanted = self._next_offset(way)
@@ -118,10 +123,13 @@ class LaneChangeAction(ActionBehaviour):
             followed = self._limit_to_vehicle(self._limited_offset, wanted)
             wanted, rate = followed, rate if followed == wanted else None
         most = STEEPEST * way
-        if abs(wanted - self._offset) > most:
+        steep = abs(wanted - self._offset) > most
+        if steep:
             wanted, rate = self._offset + math.copysign(most, wanted - self._offset), None
         self._offset = wanted
         arrived = self._transition.done and abs(wanted - self._transition.target) < EPSILON
+        if self._transition.done and not arrived and self._transition.extent > 0.0:
+            self._delay_warning.add("takes longer than requested", FORWARD_LIMIT if steep else VEHICLE_LIMIT)
         self.actor.motion.set_lateral_step(LateralStep(wanted, 0.0 if arrived else None, distance=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
 

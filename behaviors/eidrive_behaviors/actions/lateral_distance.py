@@ -28,9 +28,9 @@ REACHED = 0.01
 class LateralDistanceAction(ActionBehaviour):
     """Lateral distance of `distance` meters to an entity, on the side of `displacement` (any: the current side).
 
-    Left and right refer to the heading of the reference entity. With limits the lateral speed is at most the forward
-    speed. Without an acceleration limit the actor moves sideways at `maxSpeed`; without any limit it moves at once.
-    With an acceleration limit it follows like a critically damped spring with the stiffness of
+    Left and right refer to the heading of the reference entity in each step. With limits the lateral speed is at most
+    the forward speed. Without an acceleration limit the actor moves sideways at `maxSpeed`; without any limit it moves
+    at once. With an acceleration limit it follows like a critically damped spring with the stiffness of
     LongitudinalDistanceAction, 0.4 times the limit. Free space is measured between the sides of both boxes, as if both
     were parallel to the lane.
 
@@ -43,20 +43,12 @@ class LateralDistanceAction(ActionBehaviour):
     action: model.LateralDistanceAction
 
     def initialise(self) -> None:
-        """Select the side."""
+        """Reset the rate; without a displacement select the current side."""
         check_other_entity(self, self.action.entity_ref)
         self._rate = 0.0
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
-        displacement = self.action.displacement
-        frame = resolve_coordinate_system(self.action.coordinate_system)
-        left = same_way(self.context, self.actor.name, self.action.entity_ref, frame)
-        if displacement is model.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY:
-            self._side = left
-        elif displacement is model.LateralDisplacement.RIGHT_TO_REFERENCED_ENTITY:
-            self._side = -left
-        else:
-            self._side = -1.0 if self._lateral_gap() > 0.0 else 1.0
+        self._nearest_side = -1.0 if self._lateral_gap() > 0.0 else 1.0
 
     def update(self) -> Status:
         """Set the offset at the end of the step."""
@@ -67,7 +59,7 @@ class LateralDistanceAction(ActionBehaviour):
         check_presence(self, self.action.entity_ref)
         if self.actor.driven or self.action.entity_ref not in self.context.view or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
-        error = self._side * self._wanted_gap() + self._lateral_gap()
+        error = self._side() * self._wanted_gap() + self._lateral_gap()
         if math.isnan(error):
             return Status.RUNNING
         sideways = self._lateral_displacement(error, dt)
@@ -99,6 +91,16 @@ class LateralDistanceAction(ActionBehaviour):
             rate = self._rate + min(max(pull, -limit), limit) * dt
         self._rate = min(max(rate, -top), top)
         return way
+
+    def _side(self) -> float:
+        """Return +1.0 for a place to the left of the reference entity as the actor faces, -1.0 for one to its right."""
+        displacement = self.action.displacement
+        if displacement in (None, model.LateralDisplacement.ANY):
+            return self._nearest_side
+        left = displacement is model.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY
+        frame = resolve_coordinate_system(self.action.coordinate_system)
+        way = same_way(self.context, self.actor.name, self.action.entity_ref, frame)
+        return way if left else -way
 
     def _lateral_gap(self) -> float:
         """Return the lateral distance from the own center to that of the other entity, positive to the left [m]."""

@@ -19,8 +19,8 @@ REACHED = 0.1
 class LongitudinalDistanceAction(ActionBehaviour):
     """Distance of `distance` meters, or of `timeGap` seconds of the other's speed, behind or ahead of an entity.
 
-    Trailing is behind the other entity with respect to its heading, leading is ahead of it, also if both face each
-    other.
+    Trailing is behind the other entity with respect to its heading in each step, leading is ahead of it, also if both
+    face each other.
 
     Without acceleration limits the actor moves to the wanted distance at once and assumes the speed of the other
     entity. With limits it follows like a critically damped spring, whose stiffness is proportional to the limit, within
@@ -32,14 +32,10 @@ class LongitudinalDistanceAction(ActionBehaviour):
     action: model.LongitudinalDistanceAction
 
     def initialise(self) -> None:
-        """Reset the acceleration and select the side of the other entity."""
+        """Reset the acceleration; without a displacement select the current side of the other entity."""
         check_other_entity(self, self.action.entity_ref)
         self._acceleration = 0.0
-        displacement = self.action.displacement
-        self._side = -1.0 if displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY else 1.0
-        self._side *= self._same_way()
-        if displacement is model.LongitudinalDisplacement.ANY:
-            self._side = -1.0 if self._gap() < 0.0 else 1.0
+        self._nearest_side = -1.0 if self._gap() < 0.0 else 1.0
 
     def update(self) -> Status:
         """Set the speed for the step."""
@@ -101,10 +97,18 @@ class LongitudinalDistanceAction(ActionBehaviour):
         frame = resolve_coordinate_system(self.action.coordinate_system)
         return same_way(self.context, self.actor.name, self.action.entity_ref, frame)
 
+    def _side(self) -> float:
+        """Return +1.0 if the other entity is to be ahead of the actor, -1.0 if it is to be behind it."""
+        displacement = self.action.displacement
+        if displacement is model.LongitudinalDisplacement.ANY:
+            return self._nearest_side
+        leading = displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY
+        return -self._same_way() if leading else self._same_way()
+
     def _wanted(self) -> float:
         if self.action.time_gap is not None:
-            return self._side * self.action.time_gap * abs(self.context.speed(self.action.entity_ref))
-        return self._side * (self.action.distance or 0.0)
+            return self._side() * self.action.time_gap * abs(self.context.speed(self.action.entity_ref))
+        return self._side() * (self.action.distance or 0.0)
 
     def describe(self) -> str:
         """Describe distance and entity."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from msgspec.structs import replace
@@ -16,12 +18,14 @@ from eidrive_scenario.api.actions import (
     Goal,
     ResolvedPosition,
     build_route,
+    faces_traffic,
+    facing,
     model,
     random_route,
     resolve_position,
     uniform_branch_selector,
 )
-from eidrive_scenario.api.common import EidriveError, Route, RouteError, generator
+from eidrive_scenario.api.common import EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
 
 POINTS_APART = 2.0
 """Maximum spacing of the points of a path that is handed to a controller [m]."""
@@ -33,7 +37,7 @@ class AssignRouteAction(ActionBehaviour):
     """Assignment of a route over the lanes. It selects the branch at junctions.
 
     An active controller receives the points of the route. A closed route continues from its last waypoint to the first
-    one.
+    one. An actor that faces against the driving direction of its lane, or reverses, may have a route against it.
     """
 
     immediate = True
@@ -48,16 +52,35 @@ class AssignRouteAction(ActionBehaviour):
         def place(position: model.Position) -> ResolvedPosition:
             return resolve_position(position, self.context, self.actor.name)
 
+        build = partial(build_route, route, roads, place, seed=seed, again=True)
         try:
-            path = build_route(route, roads, place, here, seed=seed, again=True)
+            path = build(here)
         except EidriveError:
-            if here is None:
-                raise
-            path = build_route(route, roads, place, seed=seed, again=True)
-            message = f"no way leads from {self.actor.name!r} to route {route.name!r}"
-            self.context.warn(*self.error(message, "start the action on the way to its first waypoint").diagnostics)
+            if here is not None and (path_of_waypoints := self._attempt(build)) is not None:
+                path = path_of_waypoints
+                message = f"no way leads from {self.actor.name!r} to route {route.name!r}"
+                self.context.warn(*self.error(message, "start the action on the way to its first waypoint").diagnostics)
+            else:
+                wrong_way = self._attempt(partial(build, here, against_traffic=True))
+                if wrong_way is None or not self._may_drive_against_traffic(place(route.waypoint[0].position)):
+                    raise
+                path = wrong_way
+                warn_of_wrong_way(self, f"route {route.name!r}")
         assign_route(self, path)
         return Status.SUCCESS
+
+    @staticmethod
+    def _attempt(build: Callable[[], Route]) -> Route | None:
+        """Return a route, or None if there is none."""
+        try:
+            return build()
+        except EidriveError:
+            return None
+
+    def _may_drive_against_traffic(self, first: ResolvedPosition) -> bool:
+        """Whether the actor moves against the driving direction of its lane, or its first waypoint faces against it."""
+        roads = self.context.roads
+        return roads is not None and (moves_against_traffic(self) or faces_traffic(roads, first))
 
     def describe(self) -> str:
         """Describe the route."""
@@ -78,7 +101,7 @@ class AcquirePositionAction(ActionBehaviour):
         here = self.context.location(self.actor.name)
         if self.context.roads is not None and here is not None and place.location is not None:
             try:
-                route = self.context.roads.route(here, place.location)
+                route = self._route(self.context.roads, here, place.location)
             except RouteError as error:
                 raise self.error(error.diagnostics[0].message, error.diagnostics[0].hint) from None
             assign_route(self, route)
@@ -93,6 +116,17 @@ class AcquirePositionAction(ActionBehaviour):
             message = f"{self.actor.name!r} is not on a road: it does not turn to the position"
             self.context.warn(*self.error(message, "place the entity on a lane").diagnostics)
         return Status.SUCCESS
+
+    def _route(self, roads: RoadNetwork, here: LaneLocation, there: LaneLocation) -> Route:
+        """Return the route to a location, if need be against the traffic. Raise RouteError if there is none."""
+        try:
+            return roads.route(here, there)
+        except RouteError:
+            if not moves_against_traffic(self):
+                raise
+            route = roads.route(here, there, against_traffic=True)
+            warn_of_wrong_way(self, "the way to the position")
+            return route
 
     def describe(self) -> str:
         """Describe the position."""
@@ -154,6 +188,22 @@ class PreferredLaneLayerAction(ActionBehaviour):
     def describe(self) -> str:
         """Describe the lane layer."""
         return f"prefer {self.action.layer.value} lanes"
+
+
+def moves_against_traffic(behaviour: ActionBehaviour) -> bool:
+    """Return True if the actor faces against the driving direction of its lane, or has a negative speed."""
+    context, name = behaviour.context, behaviour.actor.name
+    here = context.location(name) if behaviour.actor.present else None
+    return here is not None and (context.speed(name) < 0.0 or facing(context, name, here) < 0)
+
+
+def warn_of_wrong_way(behaviour: ActionBehaviour, way: str) -> None:
+    """Add a warning to the result: a route leads against the driving direction of its lanes."""
+    what = (
+        f"{way} leads against the driving direction: {behaviour.actor.name!r} drives it in the lanes of its waypoints"
+    )
+    hint = "for a drive with the traffic, reverse the waypoints or move them to other lanes"
+    behaviour.context.warn(*behaviour.error(what, hint).diagnostics)
 
 
 def assign_route(behaviour: ActionBehaviour, route: Route) -> None:

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
-from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter
+from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, is_follow_mode, speed_limiter
 from eidrive_behaviors.actions.reference_entities import check_presence
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
@@ -46,6 +46,7 @@ class SpeedAction(ActionBehaviour):
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         self._limiter: RateLimitedValue | None = None
         self._start = 0.0
+        self._delay_warning = DelayWarning(self)
 
     @property
     def _continuous(self) -> bool:
@@ -64,21 +65,35 @@ class SpeedAction(ActionBehaviour):
         self._start = start = self._current_speed()
         target = self._target()
         self._transition = self._build_transition(start, target)
+        self._warn_of_limits(start, target)
         vehicle = self.actor.entity
         if is_follow_mode(self._dynamics) and isinstance(vehicle, model.Vehicle):
             self._limiter = speed_limiter(vehicle, start, backwards=start + target < 0.0)
 
     def _build_transition(self, start: float, target: float) -> TransitionProfile:
-        limit = slope_limit(start, target, *self.actor.limits()[1:])
+        transition = self._requested_transition(start, target)
+        transition.limit_rate(slope_limit(start, target, *self.actor.limits()[1:]))
+        return transition
+
+    def _requested_transition(self, start: float, target: float) -> TransitionProfile:
+        """Return the transition of the file, regardless of the vehicle."""
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
-            transition = TransitionProfile.from_rate(shape, start, target, value)
-        elif self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE:
-            transition = TransitionProfile(shape, start, target, duration_over(start, target, value))
-        else:
-            transition = TransitionProfile(shape, start, target, value)
-        transition.limit_rate(limit)
-        return transition
+            return TransitionProfile.from_rate(shape, start, target, value)
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE:
+            return TransitionProfile(shape, start, target, duration_over(start, target, value))
+        return TransitionProfile(shape, start, target, value)
+
+    def _warn_of_limits(self, start: float, target: float) -> None:
+        """Add a warning to the result if the Performance delays the transition, or reduces its target."""
+        extent, requested = self._transition.extent, self._requested_transition(start, target).extent
+        top, faster, slower = self.actor.limits()
+        if extent > requested + EPSILON:
+            late = f"takes {extent:.2f} s instead of {requested:.2f} s"
+            self._delay_warning.add(late, describe_slope_limit(start, target, faster, slower))
+        if self._absolute is not None and abs(self._absolute.value) > top:
+            message = f"the target speed is reduced to {top:g} m/s (got {self._absolute.value:g} m/s)"
+            self.context.warn(*self.error(message, "increase maxSpeed of the Performance").diagnostics)
 
     def update(self) -> Status:
         """Set the speed at the end of the step."""
@@ -169,6 +184,13 @@ def slope_limit(start: float, target: float, faster: float, slower: float) -> fl
     if start * target < 0.0:
         return min(faster, slower)
     return faster if abs(target) > abs(start) else slower
+
+
+def describe_slope_limit(start: float, target: float, faster: float, slower: float) -> str:
+    """Describe the limit that `slope_limit` returns."""
+    accelerates = faster <= slower if start * target < 0.0 else abs(target) > abs(start)
+    limit = slope_limit(start, target, faster, slower)
+    return f"{'maxAcceleration' if accelerates else 'maxDeceleration'} is {limit:g} m/s²"
 
 
 def duration_over(start: float, target: float, distance: float) -> float:

@@ -11,9 +11,10 @@ from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
+from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue
 from eidrive_behaviors.actions.reference_entities import check_presence
-from eidrive_behaviors.actions.speed import slope_limit
-from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, model
+from eidrive_behaviors.actions.speed import describe_slope_limit, slope_limit
+from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, model
 from eidrive_scenario.api.common import EPSILON
 
 
@@ -31,42 +32,80 @@ class SpeedSegment:
         t = time - self.time
         return self.speed + self.slope * t + 0.5 * self.bend * t * t
 
+    def slope_at(self, time: float) -> float:
+        """Return the slope at a time [m/s²]."""
+        return self.slope + self.bend * (time - self.time)
+
 
 class SpeedProfileAction(ActionBehaviour):
     """Sequence of entry speeds, each reached after its `time` or as fast as the limits allow.
 
-    In the following mode `position` the speed is linear between entries. In `follow` the acceleration starts at zero
-    and its change respects the rate limits: corners of the profile become parabolas. A profile whose corners are too
-    close for that is driven linearly. The limits of the action precede those of the vehicle's Performance. With an
-    entity, speeds are relative to its speed at the start.
+    The limits are those of the action and of the vehicle's Performance, whichever is tighter. An entry that they do not
+    allow in its time is reached later. In the following mode `position` the speed is linear between entries. In
+    `follow` the acceleration is zero at both ends and its change respects the rate limits: corners of the profile
+    become parabolas. Where corners are too close for that, the speed follows the linear profile as fast as the limits
+    allow. A first entry at time 0 is a step in `position`, and the current speed in `follow`. With an entity, speeds
+    are relative to its speed at the start.
     """
 
     domains = Domain.LONGITUDINAL
     action: model.SpeedProfileAction
+
+    def __init__(
+        self,
+        action: model.SpeedProfileAction,
+        context: ActionContext,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
+    ) -> None:
+        super().__init__(action, context, actor=actor, parent=parent)
+        self._delay_warning = DelayWarning(self)
 
     def initialise(self) -> None:
         """Build the profile from the current speed."""
         start = self.actor.motion.speed
         corners = self._corners(start)
         self._segments = linear_segments(corners)
+        self._limiter: RateLimitedValue | None = None
         if self.action.following_mode is model.FollowingMode.FOLLOW:
-            up, down = self._limit("max_acceleration_rate"), self._limit("max_deceleration_rate")
-            if min(speed for _, speed in corners) < 0.0:
-                up, down = (down, up) if max(speed for _, speed in corners) <= 0.0 else (min(up, down),) * 2
-            if 0.0 < up < math.inf and 0.0 < down < math.inf:
-                self._segments = smoothed_segments(corners, up, down) or self._segments
+            self._smooth(corners)
         self._elapsed = 0.0
+
+    def _smooth(self, corners: list[tuple[float, float]]) -> None:
+        """Limit the change of the acceleration: by parabolic corners, or by a limiter where these would overlap."""
+        rates = self._limit("max_acceleration_rate"), self._limit("max_deceleration_rate")
+        slopes = self._limit("max_acceleration"), self._limit("max_deceleration")
+        if min(speed for _, speed in corners) < 0.0:
+            forwards = max(speed for _, speed in corners) > 0.0
+            rates = (min(rates),) * 2 if forwards else (rates[1], rates[0])
+            slopes = (min(slopes),) * 2 if forwards else (slopes[1], slopes[0])
+        up, down = rates
+        segments = smoothed_segments(corners, up, down, *slopes)
+        if segments is None or (len(corners) == 2 and segments[-1].time > corners[-1][0] + EPSILON):
+            late = "entries are reached later than at their times"
+            self._delay_warning.add(late, f"the rates of the acceleration are limited to {up:g} and {down:g} m/s³")
+        if segments is None:
+            start = corners[0][1]
+            self._limiter = RateLimitedValue(start, 0.0, up=up, down=down, lowest=-slopes[1], highest=slopes[0])
+        else:
+            self._segments = segments
 
     def update(self) -> Status:
         """Set the speed at the end of the step."""
-        self._elapsed += self.context.dt
+        dt = self.context.dt
+        self._elapsed += dt
         index = max(0, bisect_right([piece.time for piece in self._segments], self._elapsed + EPSILON) - 1)
-        done = index == len(self._segments) - 1
-        speed = self._segments[-1].speed if done else self._segments[index].at(self._elapsed)
+        segment, last = self._segments[index], self._segments[-1]
+        done = segment is last
+        speed, slope = (last.speed, 0.0) if done else (segment.at(self._elapsed), segment.slope_at(self._elapsed))
+        if self._limiter is not None and dt > 0.0:
+            speed = self._limiter.advance(speed, dt)
+            slope = self._limiter.rate
+            done = done and abs(speed - last.speed) < EPSILON
         if self.actor.driven:
             warn_of_reverse(self, speed)
-            slope = 0.0 if done else self._segments[index].slope
-            self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=slope))
+            self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=0.0 if done else slope))
         else:
             self.actor.motion.set_speed(speed)
         return Status.SUCCESS if done else Status.RUNNING
@@ -79,27 +118,37 @@ class SpeedProfileAction(ActionBehaviour):
         if name is not None:
             check_presence(self, name)
         base = self.context.speed(name) if name is not None else 0.0
-        top = self._limit("max_speed")
+        top, faster = self._limit("max_speed"), self._limit("max_acceleration")
+        slower = self._limit("max_deceleration")
         corners = [(0.0, start)]
         for number, entry in enumerate(self.action.speed_profile_entry):
             time, speed = corners[-1]
             target = min(max(entry.speed + base, -top), top)
-            span = entry.time
-            if span is None:
-                limit = slope_limit(speed, target, self._limit("max_acceleration"), self._limit("max_deceleration"))
-                span = abs(target - speed) / limit if math.isfinite(limit) and limit > 0.0 else 0.0
+            if number == 0 and entry.time is not None and entry.time < EPSILON:
+                if self.action.following_mode is model.FollowingMode.POSITION:
+                    corners[-1] = (time, target)
+                continue
+            limit = slope_limit(speed, target, faster, slower)
+            shortest = abs(target - speed) / limit
+            span = max(entry.time or 0.0, shortest)
+            if entry.time is not None and shortest > entry.time + EPSILON:
+                late = f"entry {number + 1} takes {shortest:.2f} s instead of {entry.time:.2f} s"
+                self._delay_warning.add(late, describe_slope_limit(speed, target, faster, slower))
             if span > EPSILON:
                 corners.append((time + span, target))
-            elif number > 0 or self.action.following_mode is model.FollowingMode.POSITION:
+            else:
                 corners[-1] = (time, target)
         return corners
 
     def _limit(self, name: str) -> float:
-        """Return a limit of the action, else of the vehicle's Performance; infinite if neither specifies it."""
+        """Return the tighter limit of the action and of the vehicle's Performance; infinite without one.
+
+        A limit of 0 is replaced by a tiny one, with which the speed remains as it is.
+        """
         entity = self.actor.entity
         performance = entity.performance if isinstance(entity, model.Vehicle) else None
-        stated = (getattr(limits, name, None) for limits in (self.action.dynamic_constraints, performance))
-        return next((float(limit) for limit in stated if limit is not None), math.inf)
+        limits = (getattr(limits, name, None) for limits in (self.action.dynamic_constraints, performance))
+        return max(min((float(limit) for limit in limits if limit is not None), default=math.inf), EPSILON)
 
     def describe(self) -> str:
         """Describe the speeds."""
@@ -114,12 +163,21 @@ def linear_segments(corners: list[tuple[float, float]]) -> list[SpeedSegment]:
     return [*segments, SpeedSegment(corners[-1][0], corners[-1][1], 0.0)]
 
 
-def smoothed_segments(corners: list[tuple[float, float]], up: float, down: float) -> list[SpeedSegment] | None:
-    """Return the profile with parabolic corners and slope changes of `up` and `down` [m/s³]; None if they overlap."""
+def smoothed_segments(
+    corners: list[tuple[float, float]],
+    up: float,
+    down: float,
+    rise: float = math.inf,
+    fall: float = math.inf,
+) -> list[SpeedSegment] | None:
+    """Return the profile with parabolic corners and slope changes of `up` and `down` [m/s³]; None if they overlap.
+
+    The lines between the corners are within the limits `rise` and `fall` of the slope [m/s²].
+    """
     if len(corners) < 2:
         return linear_segments(corners)
     if len(corners) == 2:
-        return _smoothed_change(corners[0], corners[1], up, down)
+        return _smoothed_change(corners[0], corners[1], up, down, rise, fall)
     lines = linear_segments(corners)
     segments: list[SpeedSegment] = []
     time, speed, slope = 0.0, corners[0][1], 0.0
@@ -130,42 +188,46 @@ def smoothed_segments(corners: list[tuple[float, float]], up: float, down: float
             start = time
         else:
             gap = line.slope - slope
-            meet = time if abs(gap) < EPSILON else time + (speed - line.at(time)) / gap
+            meet = max(time, line.time) if abs(gap) < EPSILON else time + (speed - line.at(time)) / gap
             start = meet - 0.5 * span
         if start < time - EPSILON:
             return None
         speed += slope * (start - time)
-        segments.append(SpeedSegment(start, speed, slope, bend))
-        speed += slope * span + 0.5 * bend * span * span
+        if span > 0.0:
+            segments.append(SpeedSegment(start, speed, slope, bend))
+        speed += 0.5 * (slope + line.slope) * span
         time, slope = start + span, line.slope
         segments.append(SpeedSegment(time, speed, slope))
+    segments[-1] = SpeedSegment(time, corners[-1][1], 0.0)
     return segments
 
 
 def _smoothed_change(
-    first: tuple[float, float], last: tuple[float, float], up: float, down: float
+    first: tuple[float, float], last: tuple[float, float], up: float, down: float, rise: float, fall: float
 ) -> list[SpeedSegment]:
     """Return one speed change without acceleration at its ends, in the given time or the shortest possible one.
 
     The slope changes at j1 at the start and at j2 at the end, with a segment of constant slope a between. The speed
-    change is a (T - a/2 (1/j1 + 1/j2)).
+    change is a (T - a/2 (1/j1 + 1/j2)); the shorter T, the larger is a, up to the limit of the slope, or the value at
+    which the segment between vanishes.
     """
     change, span = last[1] - first[1], last[0] - first[0]
     sign = math.copysign(1.0, change)
-    start, end = (up, down) if change > 0.0 else (down, up)
+    start, end, limit = (up, down, rise) if change > 0.0 else (down, up, fall)
     inverse = 0.5 * (1.0 / start + 1.0 / end)
     discriminant = span * span - 4.0 * inverse * abs(change)
-    slope = (
-        (span - math.sqrt(discriminant)) / (2.0 * inverse) if discriminant > 0.0 else math.sqrt(abs(change) / inverse)
-    )
-    if discriminant <= 0.0:
-        span = slope * 2.0 * inverse
+    slope = 2.0 * abs(change) / (span + math.sqrt(max(discriminant, 0.0)))
+    largest = min(limit, math.sqrt(abs(change) / inverse) if inverse > 0.0 else math.inf)
+    if slope > largest:
+        slope = largest
+        span = abs(change) / slope + inverse * slope
     t1, t2 = slope / start, span - slope / end
-    v1 = first[1] + sign * 0.5 * start * t1 * t1
+    v1 = first[1] + sign * 0.5 * slope * t1
     v2 = v1 + sign * slope * (t2 - t1)
-    return [
+    segments = [
         SpeedSegment(0.0, first[1], 0.0, sign * start),
         SpeedSegment(t1, v1, sign * slope),
         SpeedSegment(t2, v2, sign * slope, -sign * end),
         SpeedSegment(span, last[1], 0.0),
     ]
+    return [piece for piece, after in pairwise(segments) if after.time > piece.time] + segments[-1:]

@@ -39,10 +39,12 @@ class FollowTrajectoryAction(ActionBehaviour):
     following mode `follow` the speed then changes linearly between the vertices. After the end the actor keeps its
     speed and is matched to a lane.
 
-    The heading is that of the file, else that of the curve. A negative speed moves backwards: an actor that faces along
-    the curve goes back on it, and straight on beyond its start. An actor that faces against the curve at the start of
-    the action moves tail first to the end. Its direction is that of its heading, of the headings of the file, or of the
-    lane in which an absent actor appears. The order of position and speed in Init has no effect.
+    The heading is that of the file, else that of the curve. A positive speed moves along the curve; where the headings
+    of the file are against it, the actor moves tail first, and its speed along the heading is negative. A negative
+    speed moves backwards: an actor that faces along the curve goes back on it, and the action ends at the start. An
+    actor that faces against the curve at the start of the action moves tail first to the end. Its direction is that of
+    the headings of the file, of its heading, or of the lane in which an absent actor appears; outside of lanes such an
+    actor faces against the curve. The order of position and speed in Init has no effect.
 
     In the mode `position` the actor is set onto the trajectory. With `follow` a vehicle drives there from its position
     and leaves the curve where its front wheels cannot turn far enough. Until it is back on the curve it catches up with
@@ -132,8 +134,17 @@ class FollowTrajectoryAction(ActionBehaviour):
             self._put = None
 
     def _enter(self, pose: Pose) -> None:
+        self._update_backing()
         self.context.add_actor(self.actor.name, ResolvedPosition(pose))
         self._put = self.actor.motion.pose
+
+    def _update_backing(self) -> None:
+        """Update the direction of travel along the heading at the present place.
+
+        Times set the sign of the speed themselves, and a driven vehicle moves by its own dynamics.
+        """
+        if self._timing is None and not self.actor.driven:
+            self.actor.motion.set_backing(self._forwards(self._s) * self._progress.way < 0.0)
 
     def _begin(self) -> None:
         """Prepare the first step from the actor's current pose."""
@@ -166,18 +177,25 @@ class FollowTrajectoryAction(ActionBehaviour):
             heading = pose.h if self._layout.given else self._heading
             if heading is None:
                 heading = self._heading_by_lane()
-            self._progress.way = -1 if heading is not None and math.cos(heading - tangent) < 0.0 else 1
+            self._progress.way = -1 if heading is None or math.cos(heading - tangent) < 0.0 else 1
 
     def _heading_by_lane(self) -> float | None:
-        """Return the heading of the lane or road of the first vertex [rad]; None for other positions."""
+        """Return the driving direction of the lane of the first vertex [rad]; None outside of lanes."""
         first = next(one for one in self._trajectory.walk() if isinstance(one, model.Position))
-        on_lane = isinstance(first.chosen(), model.LanePosition | model.RoadPosition)
-        return self._resolve_pose(first).h if on_lane else None
+        here, roads = resolve_position(first, self.context, self.actor.name).location, self.context.roads
+        return roads.pose(here).h if roads is not None and here is not None and roads.on_road(here) else None
 
     def terminate(self, new_status: Status) -> None:
-        """Remove the progress along the trajectory, so that no distance refers to it any more."""
-        if self._followed is not None and self.actor.progress is self._followed:
-            self.actor.set_progress(None)
+        """Remove the progress along the trajectory, so that no distance refers to it any more.
+
+        From now on, the speed of the actor refers to its heading.
+        """
+        if self._followed is not None:
+            motion = self.actor.motion
+            motion.set_speed(motion.speed_along_heading)
+            motion.set_backing(False)
+            if self.actor.progress is self._followed:
+                self.actor.set_progress(None)
         self._followed = None
 
     def update(self) -> Status:
@@ -196,7 +214,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         way = self._progress.way
         if self._timing is None:
             after = self._s + way * motion.speed * dt
-            done = not layout.closed and after > max(self._s, layout.length - EPSILON)
+            done = not layout.closed and self._leaves(self._s, after)
         else:
             clock = self._clock(dt)
             after = layout.at_time(clock, self._speeds)
@@ -207,6 +225,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 after += self._overrun(clock) * self._timing.scale * abs(motion.speed)
         before, self._s = self._s, after
         self._progress.move(self.context.view.tick, before, after)
+        self._update_backing()
         pose = self._pose(after)
         if dt == 0.0 or not self.actor.present:
             self._enter(pose)
@@ -215,6 +234,15 @@ class FollowTrajectoryAction(ActionBehaviour):
             motion.move_to(pose, land=done, jump=self._teleports, rail=rail)
         self._teleports = False
         return Status.SUCCESS if done else Status.RUNNING
+
+    def _leaves(self, before: float, after: float) -> bool:
+        """Return True if a step on an open trajectory reaches its end, or moves back to its start, with a warning."""
+        at_start = after < min(before, EPSILON)
+        if at_start:
+            what = f"ends at the start of the trajectory, not at its end: {self.actor.name!r} moves back on it"
+            hint = "with a negative speed, place the actor facing against the trajectory to reverse to its end"
+            self.context.warn(*self.error(what, hint).diagnostics)
+        return at_start or after > max(before, self._layout.length - EPSILON)
 
     def _pose_after_distance(self, before: float, distance: float) -> Pose:
         """Return the pose after a step of another length, as a distance action without limits requests it."""
@@ -250,7 +278,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
         self._progress.move(self.context.view.tick, before, pursuit.s)
-        done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - EPSILON)
+        done = not (layout.closed and self._run is None) and self._leaves(before, pursuit.s)
         motion.move_to(
             pose,
             land=done,

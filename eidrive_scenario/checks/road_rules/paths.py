@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
 from eidrive_scenario.checks.rule import at
@@ -15,12 +16,13 @@ from eidrive_scenario.openscenario.model import (
     Position,
     Route,
     RouteRef,
+    TeleportAction,
     Trajectory,
     Vehicle,
     Waypoint,
 )
-from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.kinematics.route import build_route
+from eidrive_scenario.roads import Pose, RoadNetwork
+from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 
@@ -109,11 +111,38 @@ def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
         positions = [waypoint.position for waypoint in route.waypoint]
         if any(id(position) in context.unresolved or context.place(position) is None for position in positions):
             continue
+        build = partial(build_route, route, context.roads, context.place, again=True)  # type: ignore[arg-type]
         try:
-            build_route(route, context.roads, context.place, again=True)  # type: ignore[arg-type]
+            build()
         except InputError as error:
-            for diagnostic in error.diagnostics:
-                yield at(route, diagnostic.message, diagnostic.hint)
+            if not (_has_wrong_way_driver(context, context.roads, route) and _is_drivable(build)):
+                for diagnostic in error.diagnostics:
+                    yield at(route, diagnostic.message, diagnostic.hint)
+
+
+def _is_drivable(build: Callable[..., object]) -> bool:
+    """Return True if a route can be driven against the traffic."""
+    try:
+        build(against_traffic=True)
+    except InputError:
+        return False
+    return True
+
+
+def _has_wrong_way_driver(context: RoadLintContext, roads: RoadNetwork, route: Route) -> bool:
+    """Return True if the first waypoint, or a position to which an actor of the route is teleported, faces traffic."""
+    drivers = {
+        name
+        for action, actors in context.performances
+        if any(isinstance(one, AssignRouteAction) and _route_of(context, one) is route for one in action.walk())
+        for name in actors
+    }
+    positions = [route.waypoint[0].position]
+    for action, actors in context.performances:
+        if drivers.intersection(actors):
+            positions += [one.position for one in action.walk() if isinstance(one, TeleportAction)]
+    resolved = [context.place(position) for position in positions if id(position) not in context.unresolved]
+    return any(faces_traffic(roads, place) for place in resolved if place is not None)
 
 
 def _routes(context: RoadLintContext) -> Iterator[Route]:
@@ -121,12 +150,17 @@ def _routes(context: RoadLintContext) -> Iterator[Route]:
     routes = []
     for element in context.elements:
         if isinstance(element, AssignRouteAction | RouteRef):
-            entry = element.route or (
-                context.scenario.entries.get(element.catalog_reference) if element.catalog_reference else None
-            )
-            if isinstance(entry, Route):
-                routes.append(entry)
+            route = _route_of(context, element)
+            if route is not None:
+                routes.append(route)
     yield from {id(route): route for route in routes}.values()
+
+
+def _route_of(context: RoadLintContext, element: AssignRouteAction | RouteRef) -> Route | None:
+    """Return the route of an element, possibly from a catalog; None if it is missing."""
+    reference = element.catalog_reference
+    entry = element.route or (context.scenario.entries.get(reference) if reference else None)
+    return entry if isinstance(entry, Route) else None
 
 
 def _vehicles(context: RoadLintContext, actors: tuple[str, ...]) -> bool:

@@ -47,7 +47,8 @@ class Leg(msgspec.Struct, frozen=True):
 class Route:
     """Route from `start` to `end` over `lanes`; distances along it count from the start [m].
 
-    A closed route ends at its start and is repeated. `lap` is the closed route that follows this one.
+    A closed route ends at its start and is repeated. `lap` is the closed route that follows this one. With
+    `against_traffic` it leads against the driving direction of its lanes.
     """
 
     tables: RoadTables = field(repr=False)
@@ -56,6 +57,7 @@ class Route:
     end: LaneLocation
     closed: bool = False
     lap: Route | None = field(default=None, repr=False)
+    against_traffic: bool = False
 
     @property
     def roads(self) -> Mapping[str, Road]:
@@ -81,7 +83,7 @@ class Route:
             road = self.roads[group[0].road]
             section = road.sections[group[0].section]
             s, s_end = section.s, section.end
-            if driving_direction(road, group[0].lane) < 0:
+            if (driving_direction(road, group[0].lane) < 0) != self.against_traffic:
                 s, s_end = s_end, s
             if number == 0:
                 s = self.start.s
@@ -313,4 +315,5 @@ def concatenate_routes(routes: Sequence[Route]) -> Route:
     lanes = list(routes[0].lanes)
     for route in routes[1:]:
         lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)
-    return Route(routes[0].tables, tuple(lanes), routes[0].start, routes[-1].end)
+    first = routes[0]
+    return Route(first.tables, tuple(lanes), first.start, routes[-1].end, against_traffic=first.against_traffic)

@@ -140,7 +140,7 @@ class RuntimeContext:
     def speed(self, name: str) -> float:
         """Return the speed along the heading in this view [m/s]; of an actor outside of the view, its set speed."""
         row = self.view.rows.get(name)
-        return self.view.states[row].speed if row is not None else self.actors[name].motion.speed
+        return self.view.states[row].speed if row is not None else self.actors[name].motion.speed_along_heading
 
     def _build_traffic(self) -> BackgroundTraffic:
         """Build the background traffic. Raise SimulationError without a road network."""
@@ -168,7 +168,7 @@ class RuntimeContext:
         row = self.view.rows.get(name)
         if row is None:
             pose = actor.motion.pose
-            return CentralObject(pose.x, pose.y, pose.h, actor.motion.speed)
+            return CentralObject(pose.x, pose.y, pose.h, actor.motion.speed_along_heading)
         state = self.view.states[row]
         return CentralObject(state.x, state.y, state.yaw, state.speed)
 

@@ -41,7 +41,7 @@ def clothoid_spline(
             here = resolve(segment.position_start)
         if here is None:
             here = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        here = here._replace(h=here.h + (segment.h_offset or 0.0))
+        here = here.turned(segment.h_offset or 0.0)
         distances, samples = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length, spacing)
         base = s[-1]
         s += [base + distance for distance in distances]
@@ -66,19 +66,35 @@ def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[floa
 def _spiral(
     start: Pose, first: float, last: float, length: float, spacing: float = SPACING
 ) -> tuple[list[float], list[Pose]]:
-    """Sample a curve whose curvature changes linearly from `first` to `last` [1/m], by the midpoint rule."""
+    """Sample a curve whose curvature changes linearly from `first` to `last` [1/m], by the midpoint rule.
+
+    It lies in the plane of the start pose, so that a curve that starts on a slope climbs.
+    """
     count = min(max(1, math.ceil(length / spacing)), MAX_POINTS)
     step = length / count
-    s, poses, x, y = [0.0], [start], start.x, start.y
+    s, poses, x, y, z = [0.0], [start], start.x, start.y, start.z
     for number in range(count):
         middle = (number + 0.5) * step
         h = start.h + first * middle + 0.5 * (last - first) / length * middle * middle
         x, y = x + step * math.cos(h), y + step * math.sin(h)
+        z -= step * math.tan(_pitch_in_plane(start, h - start.h))
         end = (number + 1) * step
         h = start.h + first * end + 0.5 * (last - first) / length * end * end
         s.append(end)
-        poses.append(start._replace(x=x, y=y, h=h))
+        pitch = _pitch_in_plane(start, h - start.h)
+        poses.append(start.turned(h - start.h)._replace(x=x, y=y, z=z, h=h, p=pitch))
     return s, poses
+
+
+def _pitch_in_plane(start: Pose, turn: float) -> float:
+    """Return the pitch [rad] in the plane of a pose, at a horizontal turn from its heading [rad].
+
+    The plane rises by -tan p ahead and by tan r / cos p to the left.
+    """
+    if start.p == 0.0 and start.r == 0.0:
+        return 0.0
+    rise = -math.tan(start.p) * math.cos(turn) + math.tan(start.r) / math.cos(start.p) * math.sin(turn)
+    return -math.atan(rise)
 
 
 def _linear_times(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:

@@ -55,8 +55,12 @@ class Motion(MotionState):
         self._teleport = False
 
     def set_speed(self, speed: float) -> None:
-        """Set the speed along the heading [m/s] from the current step on."""
+        """Set the speed [m/s] from the current step on."""
         self._speed = speed
+
+    def set_backing(self, backs: bool) -> None:
+        """Set whether a positive speed moves the actor against its heading, as on a trajectory with such headings."""
+        self._backs = backs
 
     def set_route(self, route: Route | None, branch_selector: BranchSelector | None = None) -> None:
         """Set the route, and the selector of branches at junctions that the route does not cover."""
@@ -124,7 +128,7 @@ class Motion(MotionState):
 
     def set_towed_state(self, pose: Pose, front: Motion) -> None:
         """Set the pose of a trailer. It has the speed of its towing vehicle, and teleports with it."""
-        self._pose, self._speed, self._teleported = pose, front.speed, front.teleported
+        self._pose, self._speed, self._teleported = pose, front.speed_along_heading, front.teleported
 
     def clear_teleported(self) -> None:
         """Clear `teleported`, as a view shows the new pose."""
@@ -174,12 +178,13 @@ class Motion(MotionState):
             self._move_freely(distance)
         x, y, z, h, p, r = self._pose
         across = distance == 0.0 or target is not None or lane_distance is not None
-        return Placement(x, y, z, h, p, r, self._speed, target is not None and self._teleported, across)
+        speed = self.speed_along_heading
+        return Placement(x, y, z, h, p, r, speed, target is not None and self._teleported, across)
 
     def placement(self) -> Placement:
         """Return the current placement."""
         x, y, z, h, p, r = self._pose
-        return Placement(x, y, z, h, p, r, self._speed, True)
+        return Placement(x, y, z, h, p, r, self.speed_along_heading, True)
 
     def _move_along_lane(self, distance: float, steering: LateralStep | None, dt: float) -> None:
         assert self.roads is not None
@@ -252,7 +257,7 @@ class Motion(MotionState):
         lap = self._route.lap if self._route is not None else None
         if lap is None or self.roads is None or after.road != lap.start.road:
             return
-        way = self.roads.driving_direction(after.road, after.lane)
+        way = self.roads.driving_direction(after.road, after.lane) * (-1 if lap.against_traffic else 1)
         reached = (after.s - lap.start.s) * way >= 0.0
         if reached and (before.road != after.road or (before.s - lap.start.s) * way < 0.0):
             self._route, self._visit = lap, 0

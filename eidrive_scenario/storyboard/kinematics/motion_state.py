@@ -29,6 +29,7 @@ class MotionState:
         self._location: LaneLocation | None = None
         self._heading = 0.0
         self._speed = 0.0
+        self._backs = False
         self._route: Route | None = None
         self._branch_selector: BranchSelector | None = None
         self._end_of_road = False
@@ -53,8 +54,13 @@ class MotionState:
 
     @property
     def speed(self) -> float:
-        """Speed along the heading [m/s]."""
+        """Speed that actions set [m/s]: along the heading, or along a trajectory with other headings."""
         return self._speed
+
+    @property
+    def speed_along_heading(self) -> float:
+        """Speed along the heading [m/s], as views and frames have it."""
+        return 0.0 - self._speed if self._backs else self._speed
 
     @property
     def route(self) -> Route | None:

@@ -83,11 +83,12 @@ class Nurbs:
 
 
 def along_the_curve(poses: Sequence[Pose]) -> list[Pose]:
-    """Return the same positions with headings along the curve."""
+    """Return the same positions with headings and pitches along the curve."""
     last, aligned = len(poses) - 1, []
     for number, pose in enumerate(poses):
         a, b = poses[max(0, number - 1)], poses[min(last, number + 1)]
-        aligned.append(pose._replace(h=math.atan2(b.y - a.y, b.x - a.x), p=0.0, r=0.0))
+        pitch = math.atan2(a.z - b.z, math.hypot(b.x - a.x, b.y - a.y))
+        aligned.append(pose._replace(h=math.atan2(b.y - a.y, b.x - a.x), p=pitch, r=0.0))
     return aligned
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
@@ -32,12 +34,13 @@ def build_route(
     *,
     seed: int = 0,
     again: bool = False,
+    against_traffic: bool = False,
 ) -> Route:
     """Return the route through the waypoints, from `start` if given. Raise ScenarioError if there is none.
 
     The strategy of each waypoint determines the route to it; the random strategy depends on the seed and the name of
     the route. With `again` a closed route returns to its first waypoint. From `start` a route leads to that waypoint,
-    and the closed route is its lap.
+    and the closed route is its lap. With `against_traffic` it leads against the driving direction of the lanes.
     """
     if roads is None:
         message = f"route {route.name!r}: the scenario has no road network"
@@ -54,7 +57,8 @@ def build_route(
         places.append(here)
     costs = [_cost(route, number, roads, seed) for number in range(len(places))]
     try:
-        return _connect_waypoints(places, roads, costs, start, closed=again and route.closed)
+        connect = partial(roads.route, against_traffic=against_traffic)
+        return _connect_waypoints(places, connect, costs, start, closed=again and route.closed)
     except RouteError as error:
         (cause,) = error.diagnostics
         kind = "closed route" if again and route.closed else "route"
@@ -64,9 +68,15 @@ def build_route(
         raise ScenarioError(Diagnostic(message, hint, route.source, route.line)) from error
 
 
+def faces_traffic(roads: RoadNetwork, place: ResolvedPosition) -> bool:
+    """Return True if a pose faces against the driving direction of its lane."""
+    here = place.location
+    return here is not None and math.cos(place.pose.h - roads.pose(here).h) < 0.0
+
+
 def _connect_waypoints(
     places: Sequence[LaneLocation],
-    roads: RoadNetwork,
+    connect: Callable[..., Route],
     costs: Sequence[Cost | None],
     start: LaneLocation | None,
     *,
@@ -74,12 +84,12 @@ def _connect_waypoints(
 ) -> Route:
     if not closed:
         if start is not None:
-            return roads.route(start, places[-1], places[:-1], costs)
-        return roads.route(places[0], places[-1], places[1:-1], costs[1:])
-    lap = replace(roads.route(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
+            return connect(start, places[-1], places[:-1], costs)
+        return connect(places[0], places[-1], places[1:-1], costs[1:])
+    lap = replace(connect(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
     if start is None or (start[:2] == places[0][:2] and abs(start.s - places[0].s) < AT_WAYPOINT):
         return lap
-    return replace(roads.route(start, places[0], costs=costs[:1]), lap=lap)
+    return replace(connect(start, places[0], costs=costs[:1]), lap=lap)
 
 
 def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cost | None:

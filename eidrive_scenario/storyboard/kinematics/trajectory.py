@@ -89,15 +89,11 @@ class TrajectoryCurve:
     def _directions(self) -> tuple[float, ...]:
         """Direction of each segment [rad]; one of no length has that of the next, otherwise of the previous segment."""
         _, vectors, lengths = self._segments
-        found: list[float | None] = [
+        known = [
             math.atan2(y, x) if length > 0.0 else None
             for (x, y), length in zip(vectors.tolist(), lengths.tolist(), strict=True)
         ]
-        for order in (range(len(found) - 2, -1, -1), range(1, len(found))):
-            for index in order:
-                if found[index] is None:
-                    found[index] = found[index + (1 if order.step < 0 else -1)]
-        return tuple(pose.h if h is None else h for h, pose in zip(found, self.poses, strict=False))
+        return tuple(pose.h if h is None else h for h, pose in zip(fill_gaps(known), self.poses, strict=False))
 
     def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
         """Return the arc length at a time [m]: at constant speed between points, or by the `speeds` at the points."""
@@ -237,6 +233,16 @@ class TrajectoryProgress:
     def at(self, tick: int) -> float:
         """Return the arc length in the view of a tick [m]."""
         return self._after if tick > self._tick else self._before
+
+
+def fill_gaps(values: Sequence[float | None]) -> list[float | None]:
+    """Replace missing values by the next one, otherwise by the previous one; they remain missing without any."""
+    filled = list(values)
+    for order in (range(len(filled) - 2, -1, -1), range(1, len(filled))):
+        for index in order:
+            if filled[index] is None:
+                filled[index] = filled[index - order.step]
+    return filled
 
 
 def blend(a: Pose, b: Pose, share: float) -> Pose:

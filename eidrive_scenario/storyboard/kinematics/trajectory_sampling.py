@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import accumulate, pairwise
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.clothoids import MAX_POINTS, SPACING, Course, clothoid, clothoid_spline
 from eidrive_scenario.storyboard.kinematics.nurbs import Nurbs, along_the_curve
-from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, blend
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, blend, fill_gaps
 
 ROUNDING = 2.0
 """Maximum distance from a corner of a polyline at which the heading turns [m]."""
@@ -43,45 +44,127 @@ def _curve_of(course: Course, closed: bool) -> TrajectoryCurve:
     return TrajectoryCurve(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
 
 
+class PolylineVertex(NamedTuple):
+    """Vertex of a polyline: pose, and the heading and pitch that the file specifies [rad]; None without one.
+
+    `is_oriented` is true if the file specifies any angle.
+    """
+
+    pose: Pose
+    h: float | None
+    p: float | None
+    is_oriented: bool
+
+
 def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> TrajectoryCurve:
-    vertices = [resolve(vertex.position) for vertex in shape.vertex]
+    vertices = [_vertex(vertex.position, resolve) for vertex in shape.vertex]
     times = [vertex.time for vertex in shape.vertex]
-    if closed and math.hypot(vertices[0].x - vertices[-1].x, vertices[0].y - vertices[-1].y) > 1e-3:
+    first, last = vertices[0].pose, vertices[-1].pose
+    if closed and math.hypot(first.x - last.x, first.y - last.y) > 1e-3:
         vertices.append(vertices[0])
         times.append(None)
-    point_times = _times(times)
-    if any(has_heading(vertex.position) for vertex in shape.vertex):
-        s = [0.0]
-        for a, b in pairwise(vertices):
-            s.append(s[-1] + math.hypot(b.x - a.x, b.y - a.y))
-        return TrajectoryCurve(tuple(s), tuple(vertices), point_times, closed, given=True)
-    return _rounded_polyline(vertices, point_times, closed)
+    return _sampled_polyline(vertices, _times(times), closed)
 
 
-def _rounded_polyline(vertices: Sequence[Pose], times: tuple[float, ...] | None, closed: bool) -> TrajectoryCurve:
-    """Return a polyline with tangential headings, which turn linearly within ROUNDING of a corner, or half a line."""
-    spans = [math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(vertices)]
-    lines = [
-        math.atan2(b.y - a.y, b.x - a.x) if span > 0.0 else a.h
-        for (a, b), span in zip(pairwise(vertices), spans, strict=True)
-    ]
-    closing_turn = wrap_angle(lines[0] - lines[-1]) if closed else 0.0
-    turns = [closing_turn, *(wrap_angle(b - a) for a, b in pairwise(lines)), closing_turn]
-    s, poses, stations = [0.0], [vertices[0]._replace(h=lines[0] - 0.5 * turns[0])], [0.0]
-    for index, ((a, b), span, line) in enumerate(zip(pairwise(vertices), spans, lines, strict=True)):
+def _vertex(position: model.Position, resolve: Resolve) -> PolylineVertex:
+    pose = resolve(position)
+    h = pose.h if specifies(position, "h") else None
+    p = pose.p if specifies(position, "p") else None
+    return PolylineVertex(pose, h, p, is_oriented=h is not None or p is not None or specifies(position, "r"))
+
+
+def _sampled_polyline(
+    vertices: Sequence[PolylineVertex], times: tuple[float, ...] | None, closed: bool
+) -> TrajectoryCurve:
+    """Return a polyline with the headings and pitches of its vertices; those that the file omits follow the lines.
+
+    Between two vertices without a heading, it is that of the line, and turns within ROUNDING of a corner, or half a
+    line. From and to a vertex with a heading it changes linearly. So does the pitch.
+    """
+    pairs = list(pairwise(vertices))
+    spans = [math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in pairs]
+    headings = _along_lines(
+        [math.atan2(b.pose.y - a.pose.y, b.pose.x - a.pose.x) for a, b in pairs], spans, vertices[0].pose.h
+    )
+    slopes = _along_lines(
+        [math.atan2(a.pose.z - b.pose.z, span) for (a, b), span in zip(pairs, spans, strict=True)], spans, 0.0
+    )
+    turns, tilts = _corner_turns(headings, closed), _corner_turns(slopes, closed)
+    s, poses, stations = [], [], [0.0]
+    for index, ((a, b), span) in enumerate(zip(pairs, spans, strict=True)):
         inset = min(ROUNDING / span, 0.5) if span > 0.0 else 0.5
-        if index > 0:
-            s.append(stations[-1])
-            poses.append(a._replace(h=line - 0.5 * turns[index]))
-        for share, turn in ((inset, 0.0), (1.0 - inset, 0.0), (1.0, 0.5 * turns[index + 1])):
+        shares = (0.0, inset, 1.0 - inset, 1.0)
+        ways = _over_line(headings[index], turns[index], turns[index + 1])
+        own_headings = _over_segment(a.h, b.h, ways, inset)
+        climbs = _over_line(slopes[index], tilts[index], tilts[index + 1])
+        own_slopes = [
+            climb if h == way else _pitch(climb, h - way)
+            for climb, way, h in zip(climbs, ways, own_headings, strict=True)
+        ]
+        pitches = _over_segment(a.p, b.p, own_slopes, inset)
+        first, last = _level_to(a, own_headings[0]), _level_to(b, own_headings[-1])
+        is_linear = None not in (a.h, b.h) and tilts[index] == tilts[index + 1] == 0.0
+        begin = 1 if index > 0 and is_linear else 0
+        for number in ((0, 3) if is_linear else (0, 1, 2, 3))[begin:]:
+            share = shares[number]
             s.append(stations[-1] + share * span)
-            poses.append(blend(a, b, share)._replace(h=line + turn))
+            pose = first if number == 0 else last if is_linear else blend(first, last, share)
+            poses.append(pose._replace(h=own_headings[number], p=pitches[number]))
         stations.append(stations[-1] + span)
-    return TrajectoryCurve(tuple(s), tuple(poses), times, closed, stations=tuple(stations))
+    given = any(vertex.h is not None for vertex in vertices)
+    return TrajectoryCurve(tuple(s), tuple(poses), times, closed, given, stations=tuple(stations))
+
+
+def _along_lines(angles: Sequence[float], spans: Sequence[float], without: float) -> list[float]:
+    """Return the angles of lines [rad]; a line of no length has that of the next, otherwise of the previous line."""
+    known = [angle if span > 0.0 else None for angle, span in zip(angles, spans, strict=True)]
+    return [without if angle is None else angle for angle in fill_gaps(known)]
+
+
+def _corner_turns(lines: Sequence[float], closed: bool) -> list[float]:
+    """Return the change of an angle at each vertex [rad]; 0 at the ends of an open polyline."""
+    closing_turn = wrap_angle(lines[0] - lines[-1]) if closed else 0.0
+    return [closing_turn, *(wrap_angle(b - a) for a, b in pairwise(lines)), closing_turn]
+
+
+def _over_line(line: float, turn_before: float, turn_after: float) -> list[float]:
+    """Return an angle at the start of a line, after its first corner, before its second one, and at its end [rad]."""
+    return [line - 0.5 * turn_before, line, line, line + 0.5 * turn_after]
+
+
+def _over_segment(start: float | None, end: float | None, line: Sequence[float], inset: float) -> Sequence[float]:
+    """Return an angle at the points of `_over_line` [rad], which are `inset` of the segment beside its ends.
+
+    It is linear between two specified values, and between a specified value and that of the line at the other corner.
+    """
+    if start is None and end is None:
+        return line
+    if start is not None and end is not None:
+        turn = wrap_angle(end - start)
+        return [start, start + inset * turn, start + (1.0 - inset) * turn, end]
+    if start is not None:
+        return [start, start + inset / (1.0 - inset) * wrap_angle(line[2] - start), *line[2:]]
+    assert end is not None
+    return [*line[:2], end + inset / (1.0 - inset) * wrap_angle(line[1] - end), end]
+
+
+def _pitch(climb: float, turn: float) -> float:
+    """Return the pitch of an actor on a slope [rad] with the pitch `climb` for one that points along it."""
+    return math.atan(math.tan(climb) * math.cos(turn)) if climb != 0.0 else 0.0
+
+
+def _level_to(vertex: PolylineVertex, heading: float) -> Pose:
+    """Return the pose of a vertex with the roll of its surface at a heading; a specified orientation is kept."""
+    if vertex.is_oriented:
+        return vertex.pose
+    return vertex.pose.turned(wrap_angle(heading - vertex.pose.h))
 
 
 def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurve:
     """Return a rational B-spline with the headings of its control points (1.3.1, 6.9), or tangential without any.
+
+    Where only some control points have a heading, their deviations from the tangent at the largest basis function are
+    blended with 0 for the others.
 
     The curve passes through its first and last control points only. The standard does not define where on the curve
     the time of another control point holds. As in esmini (NurbsShape) it holds where the basis function is largest, on
@@ -94,11 +177,22 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     polygon_length = sum(math.hypot(b.x - a.x, b.y - a.y) for (a, _), (b, _) in pairwise(control))
     count = min(max(2, math.ceil(polygon_length / SPACING)), MAX_POINTS)
     poses = curve.sampled(count)
-    given = any(has_heading(point.position) for point in shape.control_point)
     smooth = along_the_curve(poses)
     tangents = tuple(pose.h for pose in smooth)
+    has_headings = [specifies(point.position, "h") for point in shape.control_point]
+    given = any(has_headings)
     if not given:
         poses = smooth
+    elif not all(has_headings):
+        peaks = [tangents[number] for number in curve.peaks(count)]
+        turned = [
+            (pose._replace(h=wrap_angle(pose.h - tangent) if has_heading else 0.0), weight)
+            for (pose, weight), tangent, has_heading in zip(control, peaks, has_headings, strict=True)
+        ]
+        turns = Nurbs(shape.order, curve.knots, turned).sampled(count)
+        poses = [pose._replace(h=h + turn.h) for pose, h, turn in zip(poses, tangents, turns, strict=True)]
+    if given and not any(specifies(point.position, "p") for point in shape.control_point):
+        poses = [pose._replace(p=_pitch(along.p, pose.h - along.h)) for pose, along in zip(poses, smooth, strict=True)]
     s = [0.0, *accumulate(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(poses))]
     times = _times([point.time for point in shape.control_point])
     if times is None:
@@ -111,13 +205,11 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     return TrajectoryCurve(tuple(s), tuple(poses), tuple(point_times.tolist()), closed, given, tangents=tangents)
 
 
-def has_heading(position: model.Position) -> bool:
-    """True if a position specifies a heading."""
+def specifies(position: model.Position, angle: Literal["h", "p", "r"]) -> bool:
+    """True if a position specifies its heading `h`, its pitch `p` or its roll `r`."""
     frame = position.chosen()
-    if isinstance(frame, model.WorldPosition):
-        return frame.h is not None
-    orientation = getattr(frame, "orientation", None)
-    return orientation is not None and orientation.h is not None
+    orientation = frame if isinstance(frame, model.WorldPosition) else getattr(frame, "orientation", None)
+    return getattr(orientation, angle, None) is not None
 
 
 def _times(point_times: Sequence[float | None]) -> tuple[float, ...] | None:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.roads.model.location import PositionError
 from eidrive_scenario.storyboard.context.protocols import ConditionContext, PositionCache
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.route import build_route
+from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.positions.geographic import geo_position
@@ -89,7 +92,15 @@ def _route(frame: model.RoutePosition, context: ConditionContext, actor: str | N
     roads = roads_of(frame, context)
     within = frame.in_route_position.chosen()
     route = frame.route_ref.route or context.catalog_entry(frame.route_ref.catalog_reference, model.Route, frame)
-    path = build_route(route, roads, lambda position: resolve_position(position, context, actor), seed=context.seed)
+    build = partial(
+        build_route, route, roads, lambda position: resolve_position(position, context, actor), seed=context.seed
+    )
+    try:
+        path = build()
+    except ScenarioError:
+        if not faces_traffic(roads, resolve_position(route.waypoint[0].position, context, actor)):
+            raise
+        path = build(against_traffic=True)
     if isinstance(within, model.PositionOfCurrentEntity):
         here = road_origin(within, context)
         return in_lane(roads, here.road, here.lane, here.s, here.offset, frame.orientation)
@@ -112,7 +123,7 @@ def _trajectory(frame: model.TrajectoryPosition, context: ConditionContext, acto
     at, tangent = layout.at(frame.s), layout.tangent(frame.s)
     offset = frame.t or 0.0
     x, y = at.x - offset * math.sin(tangent), at.y + offset * math.cos(tangent)
-    h, p, r = angles(frame.orientation, at._replace(h=tangent))
+    h, p, r = angles(frame.orientation, at.turned(wrap_angle(tangent - at.h))._replace(h=tangent))
     return on_ground(context, Pose(x, y, at.z, h, p, r), z_given=True)
 
 

@@ -22,12 +22,13 @@ def road_position(frame: model.RoadPosition, context: ConditionContext, actor: s
 def relative_road_position(
     frame: model.RelativeRoadPosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
-    """Resolve a position at `ds` along the reference line from an entity, and `dt` to its left."""
+    """Resolve a position in the frame of the road of an entity: `ds` along the reference line, `dt` along t."""
     roads, origin = roads_of(frame, context), road_origin(frame, context)
     here = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
     if here is None:
         raise position_error(frame, f"beyond the end of the road: {frame.ds:g} m from entity {frame.entity_ref!r}")
-    return in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
+    sign = roads.driving_direction(origin.road, origin.lane) * roads.driving_direction(here.road, here.lane)
+    return in_road(roads, here.road, here.s, here.t + frame.dt * sign, frame.orientation)
 
 
 def lane_position(frame: model.LanePosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
@@ -47,24 +48,27 @@ def lane_position(frame: model.LanePosition, context: ConditionContext, actor: s
 def relative_lane_position(
     frame: model.RelativeLanePosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
-    """Resolve a position relative to the lane of an entity.
+    """Resolve a position relative to the lane of an entity, with all offsets in one frame.
 
-    `ds` counts along the reference line, `dsLane` along the lane in the direction of the entity, lanes to its left.
+    With `dsLane` it is that of the entity: ahead in its lane, lanes and lateral offset to its left. With `ds` it is
+    that of the road: along the reference line, lanes and lateral offset in the direction of t.
     """
     roads, origin = roads_of(frame, context), road_origin(frame, context)
     route = context.actors[frame.entity_ref].motion.route
     ahead = facing(context, frame.entity_ref, origin)
     if frame.ds_lane is not None:
+        axis = ahead
         there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead, route=route)
     else:
+        axis = roads.driving_direction(origin.road, origin.lane)
         there = along_reference(roads, origin, frame.ds or 0.0, route)
     if there is None:
         raise position_error(frame, f"beyond the end of the road of entity {frame.entity_ref!r}")
-    sign = ahead * roads.driving_direction(there.road, there.lane)
+    sign = axis * roads.driving_direction(there.road, there.lane)
     lane = count_lanes(there.lane, frame.d_lane * sign)
     if lane not in roads.lane_ids(there.road, there.s):
         raise position_error(frame, f"unknown lane {lane} of road {there.road!r} at s = {there.s:.1f}")
-    place = in_lane(roads, there.road, lane, there.s, frame.offset or 0.0, frame.orientation)
+    place = in_lane(roads, there.road, lane, there.s, (frame.offset or 0.0) * sign, frame.orientation)
     if frame.orientation is None and ahead < 0:
         return place._replace(pose=place.pose.turned(math.pi))
     return place

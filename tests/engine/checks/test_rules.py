@@ -189,6 +189,17 @@ def test_above_max_speed_applies_to_negative_speeds(folder: Path) -> None:
     assert "above-max-speed" not in violated_rules(folder, speed_xml(-60, 2))
 
 
+@pytest.mark.parametrize("turned", ["waypoint", "actor", ""])
+def test_no_route_accepts_a_route_of_a_wrong_way_driver(folder: Path, turned: str) -> None:
+    """The route of the example leads back; its waypoints, or the position of its actor, may face that way."""
+    _, example = EXAMPLES["no-route"]
+    orientation = '<Orientation type="relative" h="3.141592653589793"/>'
+    if turned == "waypoint":
+        example = re.sub(r"(<LanePosition[^>]*)/>", rf"\1>{orientation}</LanePosition>", example)
+    place = lane_position_xml(-1, 100.0, inside=orientation if turned == "actor" else "")
+    assert ("no-route" in violated_rules(folder, example, init_xml("Ego", teleport_xml(place)))) == (not turned)
+
+
 def test_run_rules_ignored_rule_yields_nothing(folder: Path) -> None:
     diagnostics_of(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")

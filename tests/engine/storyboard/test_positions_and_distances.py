@@ -100,7 +100,11 @@ def relative(h: Any) -> Any:
         (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds_lane=-10), 90, 2, math.pi),
         (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds=10), 90, 2, math.pi),
         (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds=-10), 70, 2, math.pi),
-        (model.RelativeLanePosition(entity_ref="B", d_lane=1, ds=10, offset=0.5), 90, -1.5, 0.0),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=-1, ds=10, offset=0.5), 90, -1.5, 0.0),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds=10, offset=0.5), 90, 2.5, math.pi),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=1, ds_lane=10, offset=0.5), 70, -2.5, 0.0),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds_lane=10, offset=0.5), 70, 1.5, math.pi),
+        (model.RelativeLanePosition(entity_ref="A", d_lane=-1, ds_lane=10, offset=0.5), 60, -5.5, 0.0),
     ],
 )
 def test_position_types_resolve_to_expected_pose(on_street: Any, frame: Any, x: Any, y: Any, h: Any) -> None:

@@ -241,3 +241,125 @@ def test_speed_at_a_time_is_the_mean_between_points() -> None:
     way = polyline((0, 0, 1.0, None), (30, 0, 4.0, None), (30, 0, 6.0, None), (70, 0, 8.0, None))
     assert [way.speed_at(time) for time in (0.5, 1.0, 3.9, 5.0, 7.0, 9.0)] == [0.0, 10.0, 10.0, 0.0, 20.0, 20.0]
     assert polyline((0, 0, None, None), (3, 0, None, None)).speed_at(1.0) == 0.0
+
+
+SLOPE = math.atan(0.5)
+"""Angle of a climb of 50 % [rad]."""
+
+
+def posed(x: float, y: float, z: float, h: float | None = None, p: float | None = None) -> model.Position:
+    return model.Position(world_position=model.WorldPosition(x=x, y=y, z=z, h=h, p=p))
+
+
+def resolve_with_pitch(position: model.Position) -> Pose:
+    frame = position.world_position
+    assert frame is not None
+    return Pose(frame.x, frame.y, frame.z or 0.0, frame.h or 0.0, frame.p or 0.0, 0.0)
+
+
+def climbing(h: float | None = None, p: float | None = None) -> Any:
+    """Return 20 m on the level, 40 m with a climb of 50 %, and 40 m on the level."""
+    points = ((0.0, 0.0), (20.0, 0.0), (60.0, 20.0), (100.0, 20.0))
+    vertices = tuple(model.Vertex(position=posed(x, 0.0, z, h, p)) for x, z in points)
+    return sample_trajectory(trajectory(polyline=model.Polyline(vertex=vertices)), resolve_with_pitch)
+
+
+@pytest.mark.element("Polyline")
+def test_polyline_vertices_without_heading_have_the_tangent() -> None:
+    """Only the last of four vertices has a heading: 1 rad from the tangent, to which it turns from 2 m after the third.
+
+    With a heading at the first vertex along its line, the actor points along the line until 2 m before the corner.
+    """
+    way = polyline((0, 0, None, None), (10, 0, None, None), (10, 10, None, None), (10, 20, None, math.pi / 2 + 1.0))
+    expected = {5.0: 0.0, 10.0: math.pi / 4, 15.0: math.pi / 2, 20.0: math.pi / 2, 26.0: math.pi / 2 + 0.5}
+    assert {s: way.at(s).h for s in expected} == pytest.approx(expected)
+    assert way.at(30.0).h == pytest.approx(math.pi / 2 + 1.0)
+    corner = polyline((0, 0, None, 0.0), (10, 0, None, None), (10, 10, None, None))
+    assert [corner.at(s).h for s in (4.0, 7.9, 9.0, 10.0)] == pytest.approx([0.0, 0.0, math.pi / 8, math.pi / 4])
+    first = polyline((0, 0, None, math.pi / 2), (0, 20, None, None), (0, 40, None, None))
+    assert [first.at(s).h for s in (0.0, 10.0, 20.0, 40.0)] == pytest.approx([math.pi / 2] * 4)
+
+
+def test_repeated_vertex_keeps_the_tangent() -> None:
+    way = polyline((0, 0, None, None), (0, 20, None, None), (0, 20, None, None), (0, 40, None, None))
+    assert [way.at(s).h for s in (10.0, 19.0, 20.0, 21.0, 30.0)] == pytest.approx([math.pi / 2] * 5)
+
+
+@pytest.mark.element("Polyline")
+@pytest.mark.parametrize(
+    ("h", "climb"),
+    [(None, -SLOPE), (0.0, -SLOPE), (math.pi, SLOPE), (math.pi / 2, 0.0), (math.pi / 3, -math.atan(0.25))],
+)
+def test_pitch_of_polyline_is_its_slope_along_the_heading(h: float | None, climb: float) -> None:
+    """Nose up is negative. The pitch changes linearly within 2 m before and after a vertex."""
+    way = climbing(h)
+    expected = {10.0: 0.0, 40.0: climb, 57.9: climb, 80.0: 0.0}
+    assert {s: way.at(s).p for s in expected} == pytest.approx(expected, abs=1e-9)
+    if h in (None, 0.0):
+        assert [way.at(s).p for s in (20.0, 21.0, 60.0)] == pytest.approx([climb / 2, 0.75 * climb, climb / 2])
+    assert way.at(40.0).z == pytest.approx(10.0)
+
+
+def test_specified_pitch_of_polyline_is_kept() -> None:
+    assert [climbing(p=0.1).at(s).p for s in (0.0, 20.0, 40.0, 90.0)] == pytest.approx([0.1] * 4)
+
+
+@pytest.mark.parametrize(("roll", "expected"), [(0.1, 0.1), (None, -0.1)])
+def test_roll_of_polyline_is_the_specified_one_or_that_of_its_surface(roll: float | None, expected: float) -> None:
+    """The surface rises to the left of the x axis, which is to the right of a trajectory towards -x."""
+
+    def on_bank(position: model.Position) -> Pose:
+        frame = position.world_position
+        assert frame is not None
+        return Pose(frame.x, frame.y, 0.0, 0.0, 0.0, 0.1)
+
+    places = (model.WorldPosition(x=x, y=0.0, r=roll) for x in (0.0, -20.0))
+    vertices = tuple(model.Vertex(position=model.Position(world_position=place)) for place in places)
+    way = sample_trajectory(trajectory(polyline=model.Polyline(vertex=vertices)), on_bank)
+    assert way.at(10.0)[3:] == pytest.approx((math.pi, 0.0, expected))
+
+
+def quarter_circle(*headings: float | None) -> Any:
+    points = zip(((10, 0, 1.0), (10, 10, math.sqrt(0.5)), (0, 10, 1.0)), headings, strict=True)
+    shape = model.Nurbs(
+        order=3,
+        control_point=tuple(model.ControlPoint(weight=w, position=at(x, y, h)) for (x, y, w), h in points),
+        knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
+    )
+    return sample_trajectory(trajectory(nurbs=shape), resolve)
+
+
+@pytest.mark.element("Nurbs")
+@pytest.mark.parametrize("deviation", [0.0, 0.4])
+def test_control_points_without_heading_have_the_tangent(deviation: float) -> None:
+    """Half way the first of three rational basis functions is 0.25 / (0.5 + 0.5 √0.5) = 0.2929."""
+    way = quarter_circle(math.pi / 2 + deviation, None, None)
+    length = way.length
+    expected = {0.0: math.pi / 2 + deviation, 0.5 * length: 3 * math.pi / 4 + 0.2929 * deviation, length: math.pi}
+    assert {s: way.at(s).h for s in expected} == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.element("Nurbs")
+@pytest.mark.parametrize(("h", "pitch"), [(None, -SLOPE), (0.0, -SLOPE), (math.pi, SLOPE)])
+def test_pitch_of_climbing_spline_is_its_slope(h: float | None, pitch: float) -> None:
+    shape = model.Nurbs(
+        order=3,
+        control_point=tuple(model.ControlPoint(position=posed(2.0 * z, 0.0, z, h)) for z in (0.0, 5.0, 10.0)),
+        knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
+    )
+    way = sample_trajectory(trajectory(nurbs=shape), resolve_with_pitch)
+    assert [way.at(s).p for s in (0.0, 7.0, 20.0)] == pytest.approx([pitch] * 3)
+    assert way.at(10.0).z == pytest.approx(5.0)
+
+
+@pytest.mark.element("Clothoid")
+def test_clothoid_on_a_slope_stays_in_its_plane() -> None:
+    """The start climbs 50 % towards +x. A half circle leads back down: beside the start it is as high as there."""
+    start = posed(0.0, 0.0, 0.0, 0.0, -SLOPE)
+    ahead = model.Clothoid(curvature=0.0, length=20.0, curvature_prime=0.0, position=start)
+    straight = sample_trajectory(trajectory(clothoid=ahead), resolve_with_pitch)
+    assert straight.at(20.0)[:5] == pytest.approx((20.0, 0.0, 10.0, 0.0, -SLOPE))
+    turn = model.Clothoid(curvature=0.1, length=10.0 * math.pi, curvature_prime=0.0, position=start)
+    around = sample_trajectory(trajectory(clothoid=turn), resolve_with_pitch)
+    assert around.at(around.length)[:5] == pytest.approx((0.0, 20.0, 0.0, math.pi, SLOPE), abs=1e-2)
+    assert around.at(0.5 * around.length)[:5] == pytest.approx((10.0, 10.0, 5.0, math.pi / 2, 0.0), abs=1e-2)
