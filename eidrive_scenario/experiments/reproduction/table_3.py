@@ -26,7 +26,7 @@ from eidrive_scenario.experiments.reproduction.layout import (
     result_sections,
 )
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
-from eidrive_scenario.experiments.statistics.paired import paired_difference
+from eidrive_scenario.experiments.statistics.paired import PairedVerdicts
 from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.simulation import RunSettings
 
@@ -80,19 +80,20 @@ def compare(episodes: Sequence[Episode], scenario: str, detector: str) -> list[d
     rows: list[dict[str, Value]] = []
     for higher, lower, equal in COMPARISONS:
         free = [
-            [float(not collided(episode)) for episode in select(episodes, scenario, f"{detector} {senders}")]
+            [not collided(episode) for episode in select(episodes, scenario, f"{detector} {senders}")]
             for senders in (lower, higher)
         ]
-        found = paired_difference(*free)
+        verdicts = PairedVerdicts.of(*free)
+        low, high = verdicts.interval()
         rows.append(
             {
                 "scenario": scenario,
                 "detector": detector,
                 "statement": f"{higher} {'>=' if equal else '>'} {lower}",
-                "difference": found.mean,
-                "low": found.low,
-                "high": found.high,
-                "holds": found.mean >= 0.0 if equal else found.mean > 0.0,
+                "difference": verdicts.difference,
+                "low": low,
+                "high": high,
+                "holds": verdicts.difference >= 0.0 if equal else verdicts.difference > 0.0,
                 "paper_difference": TABLE_3[scenario, higher].rate - TABLE_3[scenario, lower].rate,
             }
         )
