@@ -130,7 +130,7 @@ def test_rows_of_a_written_table_are_in_the_page(tmp_path: Path) -> None:
 MEASURED = re.compile(r"[Ss]eeds 1 to \d+|\b(six|\d+) seeds\b")
 """Texts about outcomes over seeds."""
 NOT_EXECUTED = {"docs/first_scenario.md", "docs/reinforcement_learning.md"}
-"""Pages that a test of their own executes."""
+"""Pages that a separate test executes."""
 
 
 @pytest.mark.parametrize("page", ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))])
