@@ -1,9 +1,11 @@
-"""Commands of the documentation, executed in a clean environment: `python tests/document_commands.py [PAGE…]`.
+"""Commands and claims of the documentation, executed in a clean environment: `python tests/document_commands.py …`.
 
 `document_commands.yaml` lists the code blocks of each page in their order, with what is checked or why a block is not
-executed. Exit codes beside a command ("# … exit code 1"), and the lines below it in a block with `$`, are the promises
-of the page itself. By default the commands run in a new environment with a wheel of this checkout, whose dependencies
-are those of this Python. The exit status is 1 if a promise is not kept, a block is not listed, or a listed one is gone.
+executed, and its claims about outcomes: sentences and tables, each with the commands that show it, or with the test of
+the suite that does. Exit codes beside a command ("# … exit code 1"), and the lines below it in a block with `$`, are
+the promises of the page itself. By default the commands run in a new environment with a wheel of this checkout, whose
+dependencies are those of this Python. The exit status is 1 if a promise is not kept, a block is not listed, or a listed
+block, claim or test is gone.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ _EXIT_CODE = re.compile(r"#.*exit code (\d)")
 _COMMANDS = ("", "console", "bash", "sh", "shell")
 """Languages of blocks that may be commands. Each of them is listed, as are all blocks that are executed."""
 _KEYS = frozenset({"start", "skip", "output", "file", "before", "setup", "run", "lines", "slow", "needs", "python"})
-_LINE_KEYS = frozenset({"skip", "exit", "files", "prints"})
+_CLAIM_KEYS = frozenset({"claim", "skip", "test", "setup", "run", "slow", "needs"})
+_LINE_KEYS = frozenset({"skip", "exit", "files", "prints", "lacks", "rows"})
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class Step:
     shown   lines of the page that the output contains
     files   files that exist afterwards
     prints  regular expressions that the output matches
+    lacks   regular expressions that it does not match
+    rows    files with Markdown tables whose rows are in the page
     """
 
     command: str
@@ -64,16 +69,20 @@ class Step:
     shown: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     prints: tuple[str, ...] = ()
+    lacks: tuple[str, ...] = ()
+    rows: tuple[str, ...] = ()
 
 
 @dataclass
 class PageCheck:
     """Steps of a page, and the messages about blocks that are listed wrongly.
 
+    text     text of the page
     files    texts that are written before the step with this index
     skipped  commands that are not executed, with reasons
     """
 
+    text: str = ""
     steps: list[Step] = field(default_factory=list)
     files: dict[int, list[tuple[str, str]]] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
@@ -105,16 +114,19 @@ def check_page(page: str, listed: Any, *, slow: bool) -> PageCheck:
     listed  entry of the page: blocks, or the test that executes the page
     slow    whether blocks that take long are included
     """
-    check = PageCheck()
+    check = PageCheck((ROOT / page).read_text(encoding="utf-8"))
     if isinstance(listed, str):
         if not (ROOT / listed).is_file():
             check.errors.append(f"{page}: no such test: {listed}")
         check.skipped.append(f"{page}: executed by {listed}")
         return check
-    entries = {str(entry.get("start")): entry for entry in listed}
+    claims = [entry for entry in listed if "claim" in entry]
+    entries = {str(entry.get("start")): entry for entry in listed if "claim" not in entry}
     for entry in listed:
-        unknown = sorted(set(entry) - _KEYS)
-        check.errors += [f"{page}: {entry.get('start')}: unknown key {name!r}" for name in unknown]
+        unknown = sorted(set(entry) - (_CLAIM_KEYS if "claim" in entry else _KEYS))
+        for given in (*entry.get("lines", {}).values(), *entry.get("run", ())):
+            unknown += sorted(set(given) - _LINE_KEYS - {"command"})
+        check.errors += [f"{page}: {_title(entry)}: unknown key {name!r}" for name in unknown]
     found = blocks_of(ROOT / page)
     check.errors += [
         f"{page}: the block with the first line {start!r} is not in the page"
@@ -127,17 +139,51 @@ def check_page(page: str, listed: Any, *, slow: bool) -> PageCheck:
             _add_block(check, page, block, entry, slow=slow)
         elif block.kind in _COMMANDS:
             check.errors.append(f"{page}: the block with the first line {block.start!r} is not in {LIST.name}")
+    for entry in claims:
+        _add_claim(check, page, entry, slow=slow)
     return check
 
 
-def _add_block(check: PageCheck, page: str, block: Block, entry: Mapping[str, Any], *, slow: bool) -> None:
-    reason = entry.get("skip") or entry.get("output")
+def _title(entry: Mapping[str, Any]) -> str:
+    return str(entry.get("claim", entry.get("start")))
+
+
+def _add_claim(check: PageCheck, page: str, entry: Mapping[str, Any], *, slow: bool) -> None:
+    claim, stated = _title(entry), entry["claim"]
+    for text in stated if isinstance(stated, list) else [stated]:
+        if _in_one_line(text) not in _in_one_line(check.text):
+            check.errors.append(f"{page}: the claim {text!r} is not in the page")
+    if "test" in entry:
+        file, _, name = str(entry["test"]).partition("::")
+        path = ROOT / file
+        if not path.is_file() or f"def {name}(" not in path.read_text(encoding="utf-8"):
+            check.errors.append(f"{page}: no such test: {entry['test']}")
+    reason = f"executed by {entry['test']}" if "test" in entry else _reason(entry, slow=slow)
+    if reason:
+        check.skipped.append(f"{page}: {claim}: {reason}")
+    elif not entry.get("run"):
+        check.errors.append(f"{page}: the claim {claim!r} has no command, test or reason")
+    else:
+        check.steps += [Step(command) for command in entry.get("setup", ())]
+        check.steps += [_promised(str(one["command"]), one, ()) for one in entry["run"]]
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _reason(entry: Mapping[str, Any], *, slow: bool) -> str | None:
+    """Return the reason for which an entry is not executed, or None."""
     missing = [name for name in entry.get("needs", ()) if not _is_installed(name)]
     if missing:
-        reason = f"{', '.join(missing)} is not installed"
-    elif entry.get("slow") and not slow:
-        reason = "slow"
-    if reason:
+        return f"{', '.join(missing)} is not installed"
+    if entry.get("slow") and not slow:
+        return "slow"
+    return entry.get("skip") or entry.get("output")
+
+
+def _add_block(check: PageCheck, page: str, block: Block, entry: Mapping[str, Any], *, slow: bool) -> None:
+    if reason := _reason(entry, slow=slow):
         check.skipped.append(f"{page}: {block.start}: {reason}")
         return
     if "file" in entry:
@@ -183,7 +229,8 @@ def _promised(line: str, given: Mapping[str, Any], shown: Sequence[str]) -> Step
     written = _EXIT_CODE.search(line)
     exits = given.get("exit", int(written[1]) if written else 0)
     codes = tuple(exits) if isinstance(exits, list) else (exits,)
-    return Step(line, codes, tuple(shown), tuple(given.get("files", ())), tuple(given.get("prints", ())))
+    listed = (tuple(given.get(key, ())) for key in ("files", "prints", "lacks", "rows"))
+    return Step(line, codes, tuple(shown), *listed)
 
 
 def run_page(check: PageCheck, folder: Path, environment: Mapping[str, str]) -> list[str]:
@@ -207,12 +254,13 @@ def run_page(check: PageCheck, folder: Path, environment: Mapping[str, str]) -> 
             check=False,
         )
         errors += [
-            f"{step.command}: {one}\n{done.stdout[-2000:]}{done.stderr[-2000:]}" for one in _broken(step, done, folder)
+            f"{step.command}: {one}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+            for one in _broken(step, done, folder, check.text)
         ]
     return errors
 
 
-def _broken(step: Step, done: subprocess.CompletedProcess[str], folder: Path) -> Iterator[str]:
+def _broken(step: Step, done: subprocess.CompletedProcess[str], folder: Path, page: str) -> Iterator[str]:
     if done.returncode not in step.exits:
         yield f"exit code {done.returncode} (expected {' or '.join(map(str, step.exits))})"
     printed = " ".join(done.stdout.split())
@@ -222,9 +270,24 @@ def _broken(step: Step, done: subprocess.CompletedProcess[str], folder: Path) ->
     for pattern in step.prints:
         if not re.search(pattern, done.stdout + done.stderr):
             yield f"does not print {pattern!r}"
-    for name in step.files:
+    for pattern in step.lacks:
+        if found := re.search(pattern, done.stdout + done.stderr):
+            yield f"prints {found[0]!r}"
+    for name in (*step.files, *step.rows):
         if not any(folder.glob(name)):
             yield f"does not write {name}"
+    stated = set(_rows(page))
+    for name in step.rows:
+        for path in folder.glob(name):
+            rows = list(_rows(path.read_text(encoding="utf-8")))
+            yield from (f"{name} has the row {row}, which is not in the page" for row in rows if row not in stated)
+            if not rows:
+                yield f"{name} has no table"
+
+
+def _rows(text: str) -> Iterator[str]:
+    """Yield the rows of the Markdown tables of a text, without their rulers."""
+    return (_in_one_line(line) for line in text.splitlines() if line.startswith("|") and not set(line) <= set("|-: "))
 
 
 def environment_of(python: Path) -> dict[str, str]:

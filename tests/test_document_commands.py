@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
 import pytest
-from document_commands import LIST, PageCheck, Step, check_page, environment_of, pages, read_list, run_page
+from document_commands import LIST, ROOT, PageCheck, Step, check_page, environment_of, pages, read_list, run_page
 
 LISTED = read_list()
 EXECUTED = sorted(page for page, listed in LISTED.items() if not isinstance(listed, str))
@@ -77,3 +78,65 @@ def test_skipped_slow_and_optional_blocks_state_their_reason(tmp_path: Path) -> 
     check = checked(tmp_path, text, {"start": "a", "skip": "network"}, {"start": "b", "needs": ["no_such_module"]})
     assert check.steps == []
     assert [line.split(": ", 1)[1] for line in check.skipped] == ["a: network", "b: no_such_module is not installed"]
+
+
+def test_claim_is_executed_after_the_blocks(tmp_path: Path) -> None:
+    text = "Both fail: 2 of\n2 runs.\n\n```\necho block\n```\n"
+    claim = {
+        "claim": "2 of 2 runs",
+        "setup": ["touch a"],
+        "run": [{"command": "ls; false", "exit": 1, "lacks": ["^a"]}],
+    }
+    check = checked(tmp_path, text, claim, {"start": "echo block"})
+    assert check.errors == []
+    assert [step.command for step in check.steps] == ["echo block", "touch a", "ls; false"]
+    errors = run_page(check, tmp_path, environment_of(Path(sys.executable)))
+    assert [error.splitlines()[0] for error in errors] == ["ls; false: prints 'a'"]
+
+
+def test_claim_that_is_gone_or_has_no_evidence_is_an_error(tmp_path: Path) -> None:
+    claims = (
+        {"claim": "all runs pass", "run": [{"command": "true", "print": ["a"]}]},
+        {"claim": "Some runs fail"},
+        {"claim": "Some runs", "test": "tests/test_document_commands.py::test_no_such_test"},
+        {"claim": "runs fail", "test": "tests/test_document_commands.py::test_every_page_with_commands_is_listed"},
+    )
+    check = checked(tmp_path, "Some runs fail.\n", *claims)
+    assert [error.partition(": ")[2] for error in check.errors] == [
+        "all runs pass: unknown key 'print'",
+        "the claim 'all runs pass' is not in the page",
+        "the claim 'Some runs fail' has no command, test or reason",
+        "no such test: tests/test_document_commands.py::test_no_such_test",
+    ]
+
+
+def test_rows_of_a_written_table_are_in_the_page(tmp_path: Path) -> None:
+    text = "| a | b |\n|---|---|\n| x | 1 of 2 |\n| y | 2 of 2 |\n"
+    run = [
+        {
+            "command": "printf '| a | b |\\n|---|---|\\n| x |  1 of 2 |\\n| z | 0 of 2 |\\n' > t.md",
+            "rows": ["t.md", "u.md"],
+        }
+    ]
+    errors = run_page(
+        checked(tmp_path, text, {"claim": "1 of 2", "run": run}), tmp_path, environment_of(Path(sys.executable))
+    )
+    assert [error.splitlines()[0].rpartition("t.md: ")[2] for error in errors] == [
+        "does not write u.md",
+        "t.md has the row | z | 0 of 2 |, which is not in the page",
+    ]
+
+
+MEASURED = re.compile(r"[Ss]eeds 1 to \d+|\b(six|\d+) seeds\b")
+"""Texts about outcomes over seeds."""
+NOT_EXECUTED = {"docs/first_scenario.md", "docs/reinforcement_learning.md"}
+"""Pages that a separate test executes."""
+
+
+@pytest.mark.parametrize("page", ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))])
+def test_every_page_with_outcomes_over_seeds_has_claims(page: str) -> None:
+    """A table of such outcomes is a claim, which is executed, or has a reason for which it is not."""
+    if page in NOT_EXECUTED or not MEASURED.search((ROOT / page).read_text(encoding="utf-8")):
+        return
+    listed = LISTED.get(page, ())
+    assert any("claim" in entry for entry in listed if not isinstance(entry, str)), f"{page}: add claims to {LIST.name}"

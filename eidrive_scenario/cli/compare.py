@@ -44,6 +44,8 @@ def compare(
 
 def lines_of(found: Comparison) -> list[str]:
     """Return the comparison as text."""
+    from eidrive_scenario.experiments.statistics.samples import interval_text
+
     counts, pairs = found.verdicts, found.verdicts.pairs
     rates = [(counts.both + only) / pairs for only in (counts.only_first, counts.only_second)]
     low, high = found.interval
@@ -56,8 +58,8 @@ def lines_of(found: Comparison) -> list[str]:
         f"McNemar's exact test: p = {found.p_value:.3g}",
     ]
     for name, one in found.metrics.items():
-        interval = f"{found.confidence:.0%}: {one.low:+.4g} to {one.high:+.4g}"
-        lines.append(f"{name}: B - A {one.mean:+.4g} ({interval}; {one.pairs} pairs)")
+        interval = interval_text(one.low, one.high, "+.4g")
+        lines.append(f"{name}: B - A {one.mean:+.4g} ({found.confidence:.0%}: {interval}; {one.pairs} pairs)")
     if found.is_not_worse:
         lines.append(f"B is not worse than A by {found.margin:.1%} or more (p = {found.p_worse:.3g})")
     elif found.is_worse:

@@ -49,11 +49,11 @@ def match_by_share(
 ) -> Matches:
     """Match detections with objects that they overlap by shares (N, M), by any overlap measure.
 
-    In descending order of score, each detection takes the free object with the largest overlap if that is at least
+    In the order of `matching_order`, each detection takes the free object with the largest overlap if that is at least
     `least`. A detection that takes an ignored object does not count. Detections that are `harmless` (N,) do not count
     if they match no object.
     """
-    order = np.argsort(-scores, kind="stable")
+    order = matching_order(shares, scores)
     correct, counted = np.zeros(len(order), dtype=bool), np.ones(len(order), dtype=bool)
     found = np.zeros(len(ignored), dtype=bool)
     taken = np.full(len(order), -1)
@@ -75,46 +75,64 @@ def match_by_share(
     return Matches(scores[order], correct, counted, found, taken)
 
 
+def matching_order(shares: Array, scores: Array) -> Integers:
+    """Return the rows of detections by descending score, and of one score by descending overlap with any object."""
+    return np.lexsort((-shares.max(axis=1, initial=0.0), -scores))
+
+
 def average_precision(matches: Sequence[Matches], objects: int) -> float:
     """Return the area under precision over recall, from all points sorted by score; NaN without objects.
 
     The precision at each recall is the maximum at that recall or a greater one (Everingham et al., The PASCAL VOC
-    challenge: a retrospective, 2015, section 4.2).
+    challenge: a retrospective, 2015, section 4.2). Detections of one score enter together, as a threshold admits all or
+    none of them: so does KITTI's evaluation, and the area does not depend on the order of images. The scripts of PASCAL
+    VOC, COCO and nuScenes let them enter in the order of the images.
     """
-    recall, precision = precision_recall(matches, objects)
-    if objects == 0:
-        return float("nan")
-    return _area(recall, precision)
+    scores, correct = _sorted_by_score(matches)
+    return area_in_order(correct, objects, scores)
 
 
-def area_in_order(correct: Bools, objects: int) -> float:
+def area_in_order(correct: Bools, objects: int, scores: Array | None = None) -> float:
     """Return the area under precision over recall of detections in the given order; NaN without objects.
 
-    OpenCOOD evaluates detections in the order of the frames, sorted by score within a frame only, unless a global sort
-    is selected.
+    Neighbors with equal `scores` enter together, and without scores each detection alone. OpenCOOD evaluates detections
+    in the order of the frames, sorted by score within a frame only, unless a global sort is selected.
     """
-    return _area(*_precision_recall(correct, objects)) if objects else float("nan")
-
-
-def _area(recall: Array, precision: Array) -> float:
+    if objects == 0:
+        return float("nan")
+    recall, precision = _precision_recall(correct, objects, _last_of_equal(scores, len(correct)))
     envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    steps = np.diff(recall, prepend=0.0)
-    return float((steps * envelope).sum())
+    return float((np.diff(recall, prepend=0.0) * envelope).sum())
 
 
-def _precision_recall(correct: Bools, objects: int) -> tuple[Array, Array]:
-    right = np.cumsum(correct)
-    return right / max(objects, 1), right / np.arange(1, len(correct) + 1)
+def _precision_recall(correct: Bools, objects: int, ends: Integers) -> tuple[Array, Array]:
+    """Return recall and precision of the first detections up to each of the rows `ends` (K,)."""
+    right = np.cumsum(correct)[ends]
+    return right / max(objects, 1), right / (ends + 1)
 
 
-def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, Array]:
-    """Return recall and precision (K,) over the detections of the whole set, best score first."""
+def _last_of_equal(scores: Array | None, count: int) -> Integers:
+    """Return the rows (K,) of sorted detections after which the score changes; all rows without scores."""
+    if scores is None:
+        return np.arange(count)
+    return np.flatnonzero(np.append(np.diff(scores) != 0, True)[:count])
+
+
+def _sorted_by_score(matches: Sequence[Matches]) -> tuple[Array, Bools]:
+    """Return scores and correctness (N,) of the counted detections of the whole set, best score first."""
     if not matches:
-        return np.empty(0), np.empty(0)
+        return np.empty(0), np.empty(0, dtype=bool)
     counted = np.concatenate([entry.counted for entry in matches])
     scores = np.concatenate([entry.scores for entry in matches])[counted]
     correct = np.concatenate([entry.correct for entry in matches])[counted]
-    return _precision_recall(correct[np.argsort(-scores, kind="stable")], objects)
+    order = np.argsort(-scores, kind="stable")
+    return scores[order], correct[order]
+
+
+def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, Array]:
+    """Return recall and precision (K,) at each of the K different scores of the whole set, best score first."""
+    scores, correct = _sorted_by_score(matches)
+    return _precision_recall(correct, objects, _last_of_equal(scores, len(correct)))
 
 
 def best_confidence(matches: Sequence[Matches], objects: int) -> float:
@@ -122,12 +140,13 @@ def best_confidence(matches: Sequence[Matches], objects: int) -> float:
 
     Raise ValueError if no detection is correct.
     """
-    recall, precision = precision_recall(matches, objects)
+    scores, correct = _sorted_by_score(matches)
+    ends = _last_of_equal(scores, len(correct))
+    recall, precision = _precision_recall(correct, objects, ends)
     if not len(recall) or recall[-1] == 0.0:
         raise ValueError("matches: no detection is correct (expected at least one)")
-    scores = np.concatenate([entry.scores[entry.counted] for entry in matches])
     f1 = 2.0 * precision * recall / np.maximum(precision + recall, 1e-12)
-    return float(np.sort(scores)[::-1][int(np.argmax(f1))])
+    return float(scores[ends[int(np.argmax(f1))]])
 
 
 def recall_at(matches: Sequence[Matches], objects: int, score: float) -> float:

@@ -15,7 +15,7 @@ from eidrive_scenario.experiments.published import TABLE_2, Published
 from eidrive_scenario.experiments.repetitions import Job
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, paired_difference
 from eidrive_scenario.experiments.statistics.proportions import Proportion, wilson
-from eidrive_scenario.experiments.statistics.samples import Summary, summarize
+from eidrive_scenario.experiments.statistics.samples import Summary, interval_text, summarize
 from eidrive_scenario.simulation import RunResult, RunSettings
 
 EGO, HIDDEN = "Ego", "Incoming"
@@ -170,7 +170,8 @@ def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> Publis
     difference = _paired(smaller, larger)
     evidence = (
         f"{larger.arm.name} {larger.center.mean:.2f} m, {smaller.arm.name} {smaller.center.mean:.2f} m; "
-        f"difference per seed {difference.mean:+.2f} m, 95 % interval [{difference.low:+.2f}, {difference.high:+.2f}]"
+        f"difference per seed {difference.mean:+.2f} m, 95 % interval [m]: "
+        f"{interval_text(difference.low, difference.high, '+.2f')}"
     )
     return PublishedClaim(scenario, statement, difference.mean > 0, evidence)
 

@@ -148,6 +148,7 @@ def _record(
     from eidrive_scenario.simulation.recorded_outcome import (
         CONTEXT,
         RunRecorder,
+        axle_metadata,
         criteria_context_text,
         trailer_metadata,
     )
@@ -163,6 +164,7 @@ def _record(
         "command": command,
         CONTEXT: criteria_context_text(scenario),
         **trailer_metadata(scenario),
+        **axle_metadata(scenario),
     }
     text = scenario.text if scenario.text is not None else _text(source)
     attachments = _attachments(text, scenario)

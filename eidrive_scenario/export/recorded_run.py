@@ -13,7 +13,13 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.recorded_outcome import RecordedOutcome, recorded_outcome, recorded_trailers
+from eidrive_scenario.simulation.recorded_outcome import (
+    AxleCenters,
+    RecordedOutcome,
+    recorded_axles,
+    recorded_outcome,
+    recorded_trailers,
+)
 from eidrive_scenario.world.weather import Weather
 
 Part = TypeVar("Part")
@@ -39,6 +45,11 @@ class RecordedRun:
     def towed(self) -> Mapping[str, str]:
         """Vehicle categories of the trailers and semitrailers of the scenario, by name."""
         return recorded_trailers(self.recording)
+
+    @property
+    def axles(self) -> Mapping[str, AxleCenters]:
+        """Axles of the vehicles of the scenario, by name."""
+        return recorded_axles(self.recording)
 
     @property
     def weather(self) -> Weather | None:

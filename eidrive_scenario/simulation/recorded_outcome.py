@@ -12,7 +12,7 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import Vehicle
+from eidrive_scenario.openscenario.model import Axle, Vehicle
 from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
@@ -32,6 +32,21 @@ CONTEXT = "criteria_context"
 
 TRAILERS = "trailers"
 """Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
+
+
+AXLES = "axles"
+"""Entry of the metadata with the axles of the vehicles of the scenario, by name."""
+
+
+@dataclass(frozen=True)
+class AxleCenters:
+    """Centers of the axles of a vehicle: x and z from the reference point [m].
+
+    front  None without a front axle, as of trailers
+    """
+
+    rear: tuple[float, float]
+    front: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -147,6 +162,31 @@ def trailer_metadata(scenario: Scenario) -> dict[str, str]:
         if isinstance(entity, Vehicle) and entity.vehicle_category in towed
     }
     return {TRAILERS: canonical_json(found)} if found else {}
+
+
+def axle_metadata(scenario: Scenario) -> dict[str, str]:
+    """Return the entry `AXLES` of the metadata of a run; empty without vehicles."""
+    vehicles = {name: entity.axles for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
+    found = {
+        name: AxleCenters(_center(axles.rear_axle), None if axles.front_axle is None else _center(axles.front_axle))
+        for name, axles in vehicles.items()
+    }
+    return {AXLES: canonical_json(codec(Mapping[str, AxleCenters]).encode(found))} if found else {}
+
+
+def _center(axle: Axle) -> tuple[float, float]:
+    return axle.position_x, axle.position_z
+
+
+def recorded_axles(recording: Recording) -> Mapping[str, AxleCenters]:
+    """Return the axles of vehicles by name. Those of an older or damaged recording are unknown."""
+    try:
+        found: Mapping[str, AxleCenters] = codec(Mapping[str, AxleCenters]).decode(
+            load_json(recording.metadata[AXLES].encode())
+        )
+    except (AttributeError, LookupError, TypeError, ValueError):
+        return {}
+    return found
 
 
 def recorded_trailers(recording: Recording) -> Mapping[str, str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.experiments.average_precision import match_by_share
+from eidrive_scenario.experiments.average_precision import match_by_share, matching_order
 from eidrive_scenario.geometry import iou_bev, points_in_box
 from eidrive_scenario.world.view import WorldView
 
@@ -122,7 +122,7 @@ def sample_codes(found: Detections, truth: Truth, center: Array) -> tuple[Codes,
     detection beyond the last range, or of an object there, has the class len(RANGES) and does not count.
     """
     shares, confidence = iou_bev(found.boxes, truth.boxes), found.confidence
-    order = np.argsort(-confidence, kind="stable")
+    order = matching_order(shares, confidence)
     own_place = range_class(found.boxes, center)[order]
     codes: Codes = np.zeros(len(found), dtype=np.uint16)
     hidden = np.zeros(len(OVERLAPS), dtype=np.int64)

@@ -1,19 +1,19 @@
-"""Average precision and recall over the records of several runs, with bootstrap intervals over the runs."""
+"""Average precision and recall over the records of several runs, with jackknife intervals over the runs."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.arrays import Bools
 from eidrive_scenario.experiments.average_precision import area_in_order
 from eidrive_scenario.experiments.cooperative_perception.samples import OVERLAPS, RANGES, PerceptionRecord
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.experiments.statistics.samples import jackknife_interval
 
-RESAMPLES = 400
-"""Number of bootstrap samples of the runs."""
 _SECOND = 3 * len(OVERLAPS)
 
 
@@ -21,7 +21,7 @@ _SECOND = 3 * len(OVERLAPS)
 class Precision:
     """Average precision with its 95 % interval.
 
-    low, high  percentile bootstrap over the runs
+    low, high  jackknife over the runs; NaN for a single one
     local      average precision of detections in the order of the frames, sorted within a frame only
     objects    number of true objects
     """
@@ -35,7 +35,7 @@ class Precision:
 
 @dataclass(frozen=True)
 class HiddenRecall:
-    """Share of the objects hidden to the ego that are found, at any score, with its bootstrap interval."""
+    """Share of the objects hidden to the ego that are found, at any score, with its 95 % interval over the runs."""
 
     value: float
     low: float
@@ -74,49 +74,55 @@ class Pool:
         return self._precision(self._codes >> _SECOND & 1 == 1, kept, [sum(record.hit) for record in self._records])
 
     def _precision(self, correct: Bools, kept: Bools, objects: Sequence[int]) -> Precision:
+        local = area_in_order(correct[kept], sum(objects))
         order = np.flatnonzero(kept)
         order = order[np.argsort(-self._scores[order], kind="stable")]
-        local = area_in_order(correct[kept], sum(objects))
-        value = area_in_order(correct[order], sum(objects))
-        low, high = _interval(correct[order], self._run[order], np.array(objects))
-        return Precision(value, low, high, local, sum(objects))
+        right, scores, run = correct[order], self._scores[order], self._run[order]
+        value = area_in_order(right, sum(objects), scores)
+        left_out = [
+            area_in_order(right[run != number], sum(objects) - count, scores[run != number])
+            for number, count in enumerate(objects)
+        ]
+        return Precision(value, *_limits(value, left_out), local, sum(objects))
 
     def hidden_recall(self, overlap: int) -> HiddenRecall:
         """Return the recall of hidden objects at an overlap of OVERLAPS; NaN without such objects."""
-        found = np.array([tally.hidden[overlap] if tally.hidden else 0 for tally in self._tallies])
-        total = np.array([record.hidden for record in self._records])
-        if not total.sum():
+        pairs = [
+            (tally.hidden[overlap] if tally.hidden else 0, record.hidden)
+            for tally, record in zip(self._tallies, self._records, strict=True)
+            if record.hidden
+        ]
+        found, total = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
+        if not total:
             return HiddenRecall(float("nan"), float("nan"), float("nan"), 0, 0)
-        weights = _weights(len(total))
-        shares = (weights @ found) / np.maximum(weights @ total, 1)
-        low, high = np.percentile(shares, (2.5, 97.5)).tolist()
-        return HiddenRecall(float(found.sum() / total.sum()), low, high, int(found.sum()), int(total.sum()))
+        value = found / total
+        left_out = [(found - part) / (total - whole) if whole < total else float("nan") for part, whole in pairs]
+        return HiddenRecall(value, *_limits(value, left_out), found, total)
+
+
+def _limits(value: float, left_out: Sequence[float]) -> tuple[float, float]:
+    """Return the limits of a value between 0 and 1 from those without each of the runs.
+
+    They are NaN for a single run, or if the value is not defined without one of the runs.
+    """
+    if len(left_out) < 2 or any(map(math.isnan, left_out)):
+        return float("nan"), float("nan")
+    if value in (0.0, 1.0):
+        # The runs do not differ, so that only their number says how rare the other outcome may be
+        share = wilson(int(value) * len(left_out), len(left_out))
+        return share.low, share.high
+    if min(left_out) > 0.0 and max(left_out) < 1.0:
+        # On this scale the limits are nearer to symmetric, and between 0 and 1
+        logits = [math.log(one / (1.0 - one)) for one in (value, *left_out)]
+        interval = jackknife_interval(logits[0], logits[1:])
+        return _share(interval.low), _share(interval.high)
+    interval = jackknife_interval(value, left_out)
+    return max(interval.low, 0.0), min(interval.high, 1.0)
+
+
+def _share(logit: float) -> float:
+    return 0.5 + 0.5 * math.tanh(0.5 * logit)
 
 
 def _total(counts: Sequence[int], place: int | None) -> int:
     return sum(counts) if place is None else counts[place]
-
-
-def _weights(runs: int) -> Integers:
-    """Return how often each run is in each bootstrap sample (RESAMPLES, runs); equal for all conditions."""
-    return generator(0, "perception bootstrap").multinomial(runs, [1.0 / runs] * runs, size=RESAMPLES)
-
-
-def _interval(correct: Bools, run: Integers, objects: Integers) -> tuple[float, float]:
-    """Return the 95 % percentile bootstrap interval of the average precision of sorted detections (N,).
-
-    A run that is drawn k times contributes each of its detections and objects k times.
-    """
-    if not objects.sum():
-        return float("nan"), float("nan")
-    weights = _weights(len(objects))
-    total = np.maximum(weights @ objects, 1)
-    if not len(correct):
-        return 0.0, 0.0
-    counts: Array = weights[:, run].astype(np.float64)
-    right = np.cumsum(counts * correct, axis=1)
-    precision = right / np.maximum(np.cumsum(counts, axis=1), 1.0)
-    envelope = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
-    areas = (np.diff(right, prepend=0.0, axis=1) * envelope).sum(axis=1) / total
-    low, high = np.percentile(areas, (2.5, 97.5)).tolist()
-    return low, high

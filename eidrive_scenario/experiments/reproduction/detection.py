@@ -23,8 +23,9 @@ from eidrive_scenario.experiments.reproduction.layout import (
     result_sections,
 )
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
+from eidrive_scenario.experiments.reproduction.rows import finite
 from eidrive_scenario.experiments.statistics.paired import paired_difference, paired_ratio
-from eidrive_scenario.experiments.statistics.samples import mean_interval, summarize
+from eidrive_scenario.experiments.statistics.samples import interval_text, mean_interval, summarize
 from eidrive_scenario.simulation import RunSettings
 
 SENDERS = {"coop/scenario_3": "vehicle", "coop/scenario_4": "rsu"}
@@ -72,7 +73,8 @@ def _means(episodes: Sequence[Episode], scenario: str, detector: str, arm: str) 
 def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str) -> dict[str, Value]:
     """Return the fields of a cell beside those of the paper.
 
-    mean, sd, low, high  mean count of an episode: mean, standard deviation and 95 % interval over the episodes
+    mean, sd, low, high  mean count of an episode: mean, standard deviation and 95 % interval over the episodes; no
+                         interval of one episode
     least, most          extremes over all time steps
     actors               mean number of different vehicles that the ego knows, without duplicates and false objects
     """
@@ -87,8 +89,8 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str
         "episodes": len(mine),
         "mean": interval.mean,
         "sd": summarize(means).population_sd,
-        "low": interval.low,
-        "high": interval.high,
+        "low": finite(interval.low),
+        "high": finite(interval.high),
         "least": int(counts.min()),
         "most": int(counts.max()),
         "actors": float(np.mean([episode.metrics[f"detection_count.{EGO}.mean"] for episode in mine])),
@@ -99,16 +101,16 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str
 
 
 def ratio_row(episodes: Sequence[Episode], scenario: str, detector: str) -> dict[str, Value]:
-    """Return the ratio of the counts with and without cooperation; None if an episode without it counts nothing."""
+    """Return the ratio of the counts with and without cooperation; None if an episode counts nothing."""
     none, cooperation = (_means(episodes, scenario, detector, arm) for arm in ARMS)
-    found = paired_ratio(none, cooperation) if min(none) > 0.0 else None
+    found = paired_ratio(none, cooperation) if min(*none, *cooperation) > 0.0 else None
     return {
         "scenario": scenario,
         "detector": detector,
         "senders": SENDERS[scenario],
         "ratio": None if found is None else found.mean,
-        "low": None if found is None else found.low,
-        "high": None if found is None else found.high,
+        "low": None if found is None else finite(found.low),
+        "high": None if found is None else finite(found.high),
         "more": float(np.mean(cooperation)) > float(np.mean(none)),
         "paper_ratio": RATIOS[scenario, detector],
     }
@@ -190,7 +192,7 @@ def _conclusions(episodes: Sequence[Episode], cells: Sequence[Row], ratios: Sequ
         paper = [COUNTS[scenario, detector, "cooperation"].mean for scenario in SENDERS]
         texts.append(
             f"`{detector}`: with the roadside units the ego knows {found.mean:+.1f} objects more than with the vehicle "
-            f"(95 % interval {found.low:+.1f} to {found.high:+.1f}; paper {paper[1] - paper[0]:+.1f})."
+            f"(95 % interval: {interval_text(found.low, found.high, '+.1f')}; paper {paper[1] - paper[0]:+.1f})."
         )
     fewer = [row for row in cells if float(row["mean"] or 0.0) < float(row["paper_mean"] or 0.0)]
     if fewer:

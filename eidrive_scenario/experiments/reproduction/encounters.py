@@ -11,6 +11,7 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.paper import EGO, HIDDEN
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, Value, plain
+from eidrive_scenario.experiments.reproduction.rows import finite
 from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.experiments.statistics.samples import mean_interval, summarize
 
@@ -46,7 +47,8 @@ def collided(episode: Episode) -> bool:
 def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
     """Return the measured values of a cell.
 
-    mean, sd, low, high   minimum distance between the centers: mean, population standard deviation, 95 % interval [m]
+    mean, sd, low, high   minimum distance between the centers: mean, population standard deviation, 95 % interval [m];
+                          no interval of one episode
     gap, gap_least        mean and minimum of the distance between the bodies, 0 after a contact [m]
     impact_speed          mean relative speed at the first contact of the runs with one [m/s]; None without one
     crash_least           least minimum distance between the centers of the runs with a contact [m]; None without one
@@ -64,8 +66,8 @@ def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
         "episodes": len(episodes),
         "mean": interval.mean,
         "sd": summary.population_sd,
-        "low": interval.low,
-        "high": interval.high,
+        "low": finite(interval.low),
+        "high": finite(interval.high),
         "gap": sum(gaps) / len(gaps),
         "gap_least": min(gaps),
         "impact_speed": sum(speeds) / len(speeds) if speeds else None,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from itertools import product
 
@@ -33,6 +32,7 @@ from eidrive_scenario.experiments.reproduction.layout import (
 from eidrive_scenario.experiments.reproduction.part import Case, Part, by_case
 from eidrive_scenario.experiments.reproduction.perception_shapes import SHAPE_COLUMNS, shapes
 from eidrive_scenario.experiments.reproduction.perception_text import conclusions, protocol, setup
+from eidrive_scenario.experiments.reproduction.rows import finite
 from eidrive_scenario.simulation import RunSettings
 
 SCENES = ("coop/scenario_3", "coop/scenario_4", "coop/scenario_5", "coop/scenario_7")
@@ -80,10 +80,10 @@ def curve_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
                     "value": value,
                     "range": range_name(place),
                     "iou": overlap,
-                    "ap": _known(one.value),
-                    "low": _known(one.low),
-                    "high": _known(one.high),
-                    "ap_local_sort": _known(one.local),
+                    "ap": finite(one.value),
+                    "low": finite(one.low),
+                    "high": finite(one.high),
+                    "ap_local_sort": finite(one.local),
                     "objects": one.objects,
                 }
 
@@ -97,8 +97,8 @@ def hidden_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
                 one = pool.hidden_recall(number)
                 place: dict[str, Value] = {"arm": arm, "axis": axis, "value": value, "iou": overlap}
                 counts: dict[str, Value] = {"found": one.found, "hidden": one.objects}
-                limits = {"low": _known(one.low), "high": _known(one.high)}
-                yield {**place, **counts, "recall": _known(one.value), **limits}
+                limits = {"low": finite(one.low), "high": finite(one.high)}
+                yield {**place, **counts, "recall": finite(one.value), **limits}
 
 
 def arm_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
@@ -110,14 +110,14 @@ def arm_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
         for overlap, one in zip(OVERLAPS, whole, strict=True):
             row |= {
                 f"ap_{_key(overlap)}": one.value,
-                f"low_{_key(overlap)}": one.low,
-                f"high_{_key(overlap)}": one.high,
+                f"low_{_key(overlap)}": finite(one.low),
+                f"high_{_key(overlap)}": finite(one.high),
             }
         for place in range(len(RANGES)):
-            row[f"ap_50_range_{place}"] = _known(pool.precision(1, place).value)
+            row[f"ap_50_range_{place}"] = finite(pool.precision(1, place).value)
         row["ap_50_local_sort"] = whole[1].local
-        row["ap_50_hit"] = _known(pool.precision_of_hit_objects().value)
-        row["hidden_50"] = _known(pool.hidden_recall(1).value)
+        row["ap_50_hit"] = finite(pool.precision_of_hit_objects().value)
+        row["hidden_50"] = finite(pool.hidden_recall(1).value)
         yield row
 
 
@@ -142,10 +142,6 @@ def _place(axis: str, value: float) -> dict[str, Value]:
 def _key(overlap: float) -> int:
     """Return the overlap in percent, for names of fields."""
     return round(100.0 * overlap)
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 def _precision(overlap: float) -> Column:

@@ -12,7 +12,6 @@ from eidrive_scenario.experiments.cooperative_perception.conditions import (
     YAW_PER_POSITION,
 )
 from eidrive_scenario.experiments.cooperative_perception.samples import RANGES, PerceptionRecord
-from eidrive_scenario.experiments.cooperative_perception.scores import RESAMPLES
 from eidrive_scenario.experiments.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_scenario.experiments.reproduction.layout import REASON, Row
 from eidrive_scenario.experiments.reproduction.perception_shapes import crossing
@@ -61,11 +60,12 @@ def protocol() -> tuple[str, ...]:
         "or 0.7; detections choose in order of their score within a frame. Classes are not compared. Boxes are "
         "compared relative to the ego: the error of this pose does not affect own detections.",
         "Average precision is the area under precision over recall at all points, with the maximum precision at or "
-        "above each recall (PASCAL VOC 2010). Detections of all frames are sorted by score (global sort). OPV2V's "
+        "above each recall (PASCAL VOC 2010). Detections of all frames are sorted by score (global sort), and those "
+        "of one score enter together, as in KITTI's evaluation. OPV2V's "
         "papers keep the order of the frames (local sort), which is the second number. A correct detection counts "
         "in the range of its object, a wrong one in its own range. Scores are existence probabilities where they "
-        f"are estimated; the least is {LEAST_EXISTENCE:g}. Intervals are 95 % percentile bootstrap intervals over "
-        f"the runs ({RESAMPLES} samples).",
+        f"are estimated; the least is {LEAST_EXISTENCE:g}. Intervals are 95 % jackknife intervals over the runs "
+        "(Student's t of the pseudo-values).",
         "Hidden objects: no lidar point of the ego is on the body, and at least one of another station is. Volume: "
         "bytes of all sent messages per second, as encoded, from the link statistics.",
     )

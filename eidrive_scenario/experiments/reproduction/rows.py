@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from eidrive_scenario.experiments.reproduction.layout import Row
@@ -10,6 +11,17 @@ from eidrive_scenario.experiments.reproduction.layout import Row
 def number(row: Row, name: str) -> float:
     """Return a field as number; 0 if it is empty."""
     return float(row[name] or 0.0)
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None for NaN: an undefined value is an empty field."""
+    return None if math.isnan(value) else value
+
+
+def limits(rows: Sequence[Row], name: str, low: str = "low", high: str = "high") -> tuple[list[float], list[float]]:
+    """Return the limits of the intervals of a field; the value itself where there is none."""
+    ends = [[number(row, name if row[end] is None else end) for row in rows] for end in (low, high)]
+    return ends[0], ends[1]
 
 
 def distinct(rows: Sequence[Row], name: str) -> list[str]:

@@ -31,6 +31,7 @@ from eidrive_scenario.experiments.reproduction.layout import (
     result_sections,
 )
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
+from eidrive_scenario.experiments.reproduction.rows import finite
 from eidrive_scenario.experiments.reproduction.table_2_text import SUMMARY_COLUMNS, conclusions, setup, summary
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, paired_difference, paired_spread
 from eidrive_scenario.simulation import RunSettings
@@ -145,8 +146,8 @@ def compare(column: Sequence[Cell]) -> Iterator[dict[str, Value]]:
             **column_fields(first.scenario, first.detector, first.planner, first.variant),
             "statement": one.statement,
             "difference": found.mean,
-            "low": found.low,
-            "high": found.high,
+            "low": finite(found.low),
+            "high": finite(found.high),
             "holds": found.mean > 0.0,
             "certain": found.low > 0.0,
             "paper_difference": means[0] - means[1],

@@ -26,14 +26,20 @@ from eidrive_scenario.experiments.reproduction.layout import (
     result_sections,
 )
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
-from eidrive_scenario.experiments.statistics.paired import paired_difference
+from eidrive_scenario.experiments.reproduction.rows import scenario_title
+from eidrive_scenario.experiments.statistics.paired import PairedVerdicts
 from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario.variation import variations
 from eidrive_scenario.simulation import RunSettings
 
 SCENARIOS = tuple(f"coop/scenario_{number}" for number in range(5, 9))
 SENDERS = ("both", "rsu", "vehicle")
 """Arms of the paper, as values of the parameter Participants."""
 DETECTORS = ("oracle", "yolov5")
+BUS_START, BUS_OFFSET = "BusStart", "BusOffset"
+"""Parameters of the scenarios: start of the bus, and its variation [m]."""
 TOLERANCE = 0.10
 """Difference of two rates that counts as agreement, unless the rate of the paper is in the interval."""
 COMPARISONS = (("both", "rsu", True), ("rsu", "vehicle", False))
@@ -80,19 +86,20 @@ def compare(episodes: Sequence[Episode], scenario: str, detector: str) -> list[d
     rows: list[dict[str, Value]] = []
     for higher, lower, equal in COMPARISONS:
         free = [
-            [float(not collided(episode)) for episode in select(episodes, scenario, f"{detector} {senders}")]
+            [not collided(episode) for episode in select(episodes, scenario, f"{detector} {senders}")]
             for senders in (lower, higher)
         ]
-        found = paired_difference(*free)
+        verdicts = PairedVerdicts.of(*free)
+        low, high = verdicts.interval()
         rows.append(
             {
                 "scenario": scenario,
                 "detector": detector,
                 "statement": f"{higher} {'>=' if equal else '>'} {lower}",
-                "difference": found.mean,
-                "low": found.low,
-                "high": found.high,
-                "holds": found.mean >= 0.0 if equal else found.mean > 0.0,
+                "difference": verdicts.difference,
+                "low": low,
+                "high": high,
+                "holds": verdicts.difference >= 0.0 if equal else verdicts.difference > 0.0,
                 "paper_difference": TABLE_3[scenario, higher].rate - TABLE_3[scenario, lower].rate,
             }
         )
@@ -128,7 +135,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     places = product(detectors, SCENARIOS)
     compared = [row for detector, scenario in places for row in compare(episodes, scenario, detector)]
     sections = [
-        Section("Set-up", _setup(int(rows[0]["episodes"] or 0))),
+        Section("Set-up", _setup(rows)),
         *result_sections([*(_finding(rows, compared, detector) for detector in detectors), *_reasons(rows)]),
     ]
     for detector in detectors:
@@ -138,23 +145,39 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     return PartReport(PART.title, tuple(sections))
 
 
-def _setup(episodes: int) -> tuple[str, ...]:
+def _setup(rows: Sequence[Row]) -> tuple[str, ...]:
     return (
-        f"Scenarios 5 to 8, {episodes} episodes a cell with seeds from 1, without latency and loss. A success is a run "
-        "in which the ego touches nothing. Positions, speeds, areas and the rule of the ego are those of EI-Drive.",
+        f"Scenarios 5 to 8, {rows[0]['episodes']} episodes a cell with seeds from 1, without latency and loss. A "
+        "success is a run in which the ego touches nothing. Positions, speeds, areas and the rule of the ego are those "
+        "of EI-Drive.",
         "Free parameters, one value per scenario and equal in its three cells: the start of the hidden car (the "
         "nearest in steps of half a meter from which the cars collide without cooperation in seeds 1 to 20), and "
         "the traffic in front of the sending vehicle. EI-Drive draws 30 cars at random, and neither their motion nor "
-        "their models are recorded; here buses drive at the head of these cars. In 5 and 6 it is one bus, with a "
-        "start from which it hides the car from the sending vehicle in about half of the runs. In 7 and 8 there are "
-        "three, one in each lane, with one start for both scenarios: the middle of the values from which they hide "
-        "the car in all of seeds 1 to 10. So the rates of the vehicle alone follow from the choice of the traffic: "
-        "with one bus in 7 and 8, too, they are 10 % and 30 %, and with cars but no bus, at rest at first in and "
-        "around EI-Drive's area of traffic, 80 % to 100 % (10 seeds, oracle). Acceleration is 3.5 m/s². No value "
-        "differs between the cells of a scenario.",
+        "their models are recorded; here buses drive at the head of these cars: one in 5 and 6, three in 7 and "
+        "8, one in each lane. Acceleration is 3.5 m/s². No value differs between the cells of a scenario.",
+        f"Start of the rear axle of the bus, y in the start frame of the ego, with its uniform variation between "
+        f"seeds: {'; '.join(map(_bus_start, SCENARIOS))}. In 7 and 8 it is the middle of the values from which the "
+        "buses hide the car from the sending vehicle in all of seeds 1 to 10. In 5 and 6 start and variation decide "
+        f"in how many runs the vehicle sees the car in time: with the vehicle alone, {_misses(rows)} runs end in a "
+        "collision. So the rates of the vehicle alone follow from the choice of the traffic: with "
+        "one bus in 7 and 8, too, they are 10 % and 30 %, and with cars but no bus, at rest at first in and "
+        "around EI-Drive's area of traffic, 80 % to 100 % (10 seeds, oracle).",
         "The paper does not state the number of its episodes; its rates fit three batches of 10 to 20 each. It does "
         "not state the detector either: its published configuration selects YOLOv5.",
     )
+
+
+def _bus_start(scenario: str) -> str:
+    """Return start and variation of the bus of a scenario, as its file specifies them."""
+    specified = load_scenario(resolve_scenario(scenario))
+    low, high = variations(specified)[BUS_OFFSET].uniform or (0.0, 0.0)
+    return f"{scenario_title(scenario)} {float(specified.parameters[BUS_START]):g} m, {low:+g} to {high:+g} m"
+
+
+def _misses(rows: Sequence[Row]) -> str:
+    """Return the numbers of collisions with the vehicle as the only sender in the scenarios with one bus."""
+    alone = [row for row in rows if row["senders"] == "vehicle" and row["scenario"] in SCENARIOS[:2]]
+    return " and ".join(f"{row['collisions']} of {row['episodes']} ({_place(row)}, {row['detector']})" for row in alone)
 
 
 def _finding(rows: Sequence[Row], compared: Sequence[Row], detector: str) -> str:

@@ -5,19 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import binom, binomtest, bootstrap, norm
+from scipy.stats import binom, binomtest, norm
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.experiments.statistics.samples import jackknife_interval, mean_interval
+
+LEAST_PAIRS = 5
+"""Minimum number of pairs for the interval of a difference of standard deviations, of which fewer say too little."""
 
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Difference, second minus first, of pairs with equal seeds, with its bootstrap interval."""
+    """Difference, second minus first, of pairs with equal seeds, with its confidence interval.
+
+    low, high  limits; NaN if there are too few pairs, such as a single one
+    """
 
     pairs: int
     mean: float
@@ -26,73 +31,92 @@ class PairedDifference:
     confidence: float
 
 
-def paired_difference(
-    first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
-) -> PairedDifference:
-    """Compare the means of two arms with equal seeds in equal order (percentile bootstrap over the pairs).
+def paired_difference(first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95) -> PairedDifference:
+    """Compare the means of two arms with equal seeds in equal order (Student's t interval of the differences).
 
-    A single pair has an interval of zero width. Raise ValueError if the arms differ in length or are empty.
+    Differences that are all equal have an interval of zero width; for verdicts use `PairedVerdicts`. Raise ValueError
+    if the arms differ in length or are empty, or for values that are not finite.
     """
-    return _compare(_mean_difference, first, second, confidence, resamples, seed)
+    arms = _arms(first, second)
+    interval = mean_interval((arms[1] - arms[0]).tolist(), confidence=confidence)
+    return PairedDifference(len(first), interval.mean, interval.low, interval.high, confidence)
 
 
-def paired_spread(
-    first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
-) -> PairedDifference:
-    """Compare the population standard deviations of two arms as `paired_difference` compares their means."""
-    return _compare(_spread_difference, first, second, confidence, resamples, seed)
-
-
-def paired_ratio(
-    first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
-) -> PairedDifference:
+def paired_ratio(first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95) -> PairedDifference:
     """Return the ratio of the means, second over first, as `paired_difference` returns their difference.
 
-    Raise ValueError if a value of the first arm is not positive, too.
+    The interval is that of the logarithm of the ratio, by the jackknife. Raise ValueError if a value is not positive,
+    too.
     """
-    if min(first, default=1.0) <= 0.0:
-        raise ValueError(f"ratio: not positive (got {min(first)})")
-    return _compare(_mean_ratio, first, second, confidence, resamples, seed)
+    arms = _arms(first, second)
+    least = min(float(arm.min()) for arm in arms)
+    if least <= 0.0:
+        raise ValueError(f"ratio: not positive (got {least})")
+    ratio = float(arms[1].mean() / arms[0].mean())
+    if len(first) == 1:
+        return PairedDifference(1, ratio, math.nan, math.nan, confidence)
+    # Not the total less each value, whose rounding error may exceed the others
+    sums = [np.where(np.eye(len(arm), dtype=bool), 0.0, arm).sum(axis=1) for arm in arms]
+    left_out = np.log(sums[1]) - np.log(sums[0])
+    interval = jackknife_interval(math.log(ratio), left_out.tolist(), confidence=confidence)
+    return PairedDifference(len(first), ratio, _exponential(interval.low), _exponential(interval.high), confidence)
 
 
-def _mean_ratio(first: Array, second: Array, axis: int = -1) -> Any:
-    return np.mean(second, axis=axis) / np.mean(first, axis=axis)
+def paired_spread(first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95) -> PairedDifference:
+    """Compare the population standard deviations of two arms as `paired_difference` compares their means.
+
+    The interval follows from those of both arms and their correlation (Zou, Psychological Methods 12, 2007). That of an
+    arm is the jackknife interval of the logarithm of its standard deviation (Miller, Annals of Mathematical Statistics
+    39, 1968), which does not assume normal values. There are limits from LEAST_PAIRS pairs on.
+    """
+    arms = _arms(first, second)
+    deviations = [float(arm.std()) for arm in arms]
+    difference, count = deviations[1] - deviations[0], len(first)
+    if count < LEAST_PAIRS:
+        return PairedDifference(count, difference, math.nan, math.nan, confidence)
+    left_out = [_log_deviations(arm) for arm in arms]
+    (below_first, above_first), (below_second, above_second) = (
+        _margins(deviation, logarithms, confidence) for deviation, logarithms in zip(deviations, left_out, strict=True)
+    )
+    is_constant = min(float(np.ptp(logarithms)) for logarithms in left_out) == 0.0
+    correlation = 0.0 if is_constant else float(np.corrcoef(left_out)[0, 1])
+    low = difference - _combined(below_second, above_first, correlation)
+    high = difference + _combined(above_second, below_first, correlation)
+    return PairedDifference(count, difference, low, high, confidence)
 
 
-def _mean_difference(first: Array, second: Array, axis: int = -1) -> Any:
-    return np.mean(second - first, axis=axis)
+def _log_deviations(arm: Array) -> Array:
+    """Return the logarithms of the standard deviation without each value (N,), relative to that of all values.
+
+    A value that alone makes up the variance would leave none; the rest is at least 1/N² of it.
+    """
+    squares, count = (arm - arm.mean()) ** 2, len(arm)
+    total = float(squares.sum())
+    if total == 0.0:
+        return np.zeros(count)
+    rest = 1.0 - count / (count - 1) * squares / total
+    return np.asarray(0.5 * np.log(np.maximum(rest, 1.0 / count**2) * (count - 1) / (count - 2)))
 
 
-def _spread_difference(first: Array, second: Array, axis: int = -1) -> Any:
-    return np.std(second, axis=axis) - np.std(first, axis=axis)
+def _margins(deviation: float, left_out: Array, confidence: float) -> tuple[float, float]:
+    """Return the distances of the limits of a standard deviation from it, below and above."""
+    half_width = jackknife_interval(0.0, left_out.tolist(), confidence=confidence).high
+    return deviation * (1.0 - _exponential(-half_width)), deviation * (_exponential(half_width) - 1.0)
 
 
-def _compare(
-    difference: Callable[..., Any],
-    first: Sequence[float],
-    second: Sequence[float],
-    confidence: float,
-    resamples: int,
-    seed: int,
-) -> PairedDifference:
+def _combined(one: float, other: float, correlation: float) -> float:
+    return math.sqrt(max(0.0, one**2 + other**2 - 2.0 * correlation * one * other))
+
+
+def _exponential(logarithm: float) -> float:
+    """Return the exponential function, bounded to finite numbers."""
+    return math.exp(min(logarithm, 700.0))
+
+
+def _arms(first: Sequence[float], second: Sequence[float]) -> tuple[Array, Array]:
     if len(first) != len(second) or not first:
         raise ValueError(f"pairs: lengths differ or are 0 (got {len(first)} and {len(second)} values)")
-    arms = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-
-    value = float(difference(*arms))
-    low, high = value, value
-    if len(first) > 1:
-        interval = bootstrap(
-            arms,
-            difference,
-            paired=True,
-            n_resamples=resamples,
-            confidence_level=confidence,
-            method="percentile",
-            rng=generator(seed, "paired bootstrap"),
-        ).confidence_interval
-        low, high = float(interval.low), float(interval.high)
-    return PairedDifference(pairs=len(first), mean=value, low=low, high=high, confidence=confidence)
+    return np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
 
 
 @dataclass(frozen=True)

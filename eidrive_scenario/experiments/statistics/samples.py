@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from eidrive_scenario.experiments.statistics.paired import paired_difference
+from scipy.special import stdtrit
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,10 @@ def summarize(values: Sequence[float]) -> Summary:
 
 @dataclass(frozen=True)
 class MeanInterval:
-    """Mean of a sample with its bootstrap interval, in the unit of its values."""
+    """Mean of a sample with its confidence interval, in the unit of its values.
+
+    low, high  limits; NaN for a single value, whose spread is unknown
+    """
 
     mean: float
     low: float
@@ -50,9 +52,40 @@ class MeanInterval:
 
 
 def mean_interval(values: Sequence[float], *, confidence: float = 0.95) -> MeanInterval:
-    """Return the mean of at least one value with its percentile bootstrap interval, of zero width for a single value.
+    """Return the mean of at least one finite value with Student's t interval (Student, Biometrika 6, 1908).
 
-    The bootstrap, because minimum distances of runs with and without a crash have two modes.
+    It covers at `confidence` for normal values, for any number of them from 2 on. The percentile bootstrap does not: it
+    is about 1.96 sqrt(1 - 1/n) standard errors wide on each side, which covers less than 80 % of the means of three
+    values. Outliers rarer than 1 in n are in few samples and not in their intervals. Equal values have an interval of
+    zero width. Raise ValueError without values, for values that are not finite, or a confidence out of (0, 1).
     """
-    difference = paired_difference([0.0] * len(values), values, confidence=confidence)
-    return MeanInterval(difference.mean, difference.low, difference.high)
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence: not between 0 and 1 (got {confidence})")
+    summary = summarize(values)
+    half_width = _quantile(summary.count, confidence) * summary.sample_sd / math.sqrt(summary.count)
+    return MeanInterval(summary.mean, summary.mean - half_width, summary.mean + half_width)
+
+
+def jackknife_interval(value: float, left_out: Sequence[float], *, confidence: float = 0.95) -> MeanInterval:
+    """Return a smooth function of a sample with Student's t interval of its pseudo-values (Tukey 1958).
+
+    value     of the whole sample
+    left_out  of the sample without each of its n elements in turn
+
+    The pseudo-values n · value - (n - 1) · left_out take the place of single measurements: of a mean, they are the
+    values themselves. Errors as for `mean_interval`.
+    """
+    count = len(left_out)
+    pseudo_values = count * value - (count - 1) * np.asarray(left_out, dtype=np.float64)
+    interval = mean_interval(pseudo_values.tolist(), confidence=confidence)
+    return MeanInterval(value, value + interval.low - interval.mean, value + interval.high - interval.mean)
+
+
+def _quantile(count: int, confidence: float) -> float:
+    """Return the quantile of Student's t distribution for `count` values; NaN for a single one."""
+    return float(stdtrit(count - 1, 0.5 + confidence / 2.0)) if count > 1 else math.nan
+
+
+def interval_text(low: float, high: float, form: str) -> str:
+    """Return the limits of an interval as text, with a format specification such as `+.2f`."""
+    return "no interval, too few values" if math.isnan(low) else f"{low:{form}} to {high:{form}}"

@@ -62,7 +62,7 @@ def compare(
     """Compare the runs of two sweeps with equal scenario, seed and values of the axes.
 
     margin   largest decrease of the success rate that counts as not worse
-    metrics  metrics whose means are compared, with percentile bootstrap intervals
+    metrics  metrics whose means are compared, with Student's t intervals
 
     Raise SettingError if a file is not a store, if no runs are equal, or for an unknown metric.
     """

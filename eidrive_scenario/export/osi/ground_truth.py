@@ -16,6 +16,7 @@ from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 from eidrive_scenario.world.weather import Weather
 
 _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
@@ -26,6 +27,7 @@ class GroundTruthBuilder:
 
     host   name of the host vehicle, or None
     towed  vehicle categories of trailers and semitrailers, by name
+    axles  axles of vehicles, by name
     weather  that an option of the run sets instead of the scenario
     """
 
@@ -36,6 +38,7 @@ class GroundTruthBuilder:
         ids: Identifiers,
         host: str | None,
         towed: Mapping[str, str] = MappingProxyType({}),
+        axles: Mapping[str, AxleCenters] = MappingProxyType({}),
         weather: Weather | None = None,
     ) -> None:
         self._osi = osi
@@ -45,6 +48,7 @@ class GroundTruthBuilder:
         self._lights = TrafficLights(osi, roads, ids)
         self._host = host
         self._towed = towed
+        self._axles = axles
         self._weather = weather
         self._has_map = False
 
@@ -60,7 +64,7 @@ class GroundTruthBuilder:
             self._lanes.add(message)
             self._has_map = True
         lanes = self._lanes.assigned(frame.view)
-        add_moving_objects(self._osi, message, frame, self._ids, lanes, self._towed)
+        add_moving_objects(self._osi, message, frame, self._ids, lanes, self._towed, self._axles)
         self._lights.add(message, frame.signals)
         if frame.environment is not None or self._weather is not None:
             conditions = message.environmental_conditions

@@ -13,6 +13,7 @@ from eidrive_scenario.export.bodies import rotations
 from eidrive_scenario.export.osi.identifiers import Identifiers
 from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_vector
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.view import WorldView
 
@@ -56,11 +57,13 @@ def add_moving_objects(
     ids: Identifiers,
     lanes: Mapping[int, int],
     towed: Mapping[str, str] = MappingProxyType({}),
+    axles: Mapping[str, AxleCenters] = MappingProxyType({}),
 ) -> None:
     """Add all actors to a GroundTruth message.
 
     lanes  identifiers of lanes by the row of the actor
     towed  vehicle categories of trailers and semitrailers, by name
+    axles  axles of vehicles, by name
     """
     view = frame.view
     turns = rotations(view.yaw, view.pitch, view.roll)
@@ -89,8 +92,25 @@ def add_moving_objects(
             data.has_trailer = name in frame.trailers
             if data.has_trailer:
                 data.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
-            set_vector(found.vehicle_attributes.bbcenter_to_rear, -view.offset[row])
+            _set_axles(found.vehicle_attributes, view.offset[row], axles.get(name))
             _set_lights(osi, data.light_state, frame.appearances.get(name))
+
+
+def _set_axles(attributes: Any, offset: Array, axles: AxleCenters | None) -> None:
+    """Set the vectors from the center of the box to the centers of the axles, in the frame of the object.
+
+    Of a vehicle with unknown axles, the rear one is the reference point, on the ground.
+    """
+    set_vector(attributes.bbcenter_to_rear, rear_axle(axles) - offset)
+    if axles is not None and axles.front is not None:
+        x, z = axles.front
+        set_vector(attributes.bbcenter_to_front, np.array([x, 0.0, z]) - offset)
+
+
+def rear_axle(axles: AxleCenters | None) -> Array:
+    """Return the center of the rear axle from the reference point (3,) [m], the origin of OSI's vehicle frame."""
+    x, z = (0.0, 0.0) if axles is None else axles.rear
+    return np.array([x, 0.0, z])
 
 
 def center_motion(view: WorldView, arms: Array) -> tuple[Array, Array]:

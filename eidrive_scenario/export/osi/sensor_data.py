@@ -11,9 +11,10 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.export.bodies import angles, rotations
 from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type
+from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type, rear_axle
 from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_time, set_vector
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 
 
 class _Origin(NamedTuple):
@@ -38,13 +39,17 @@ class SensorDataBuilder:
     """Builder of the messages of one station, in the frame of its vehicle.
 
     list_name  "detections" for own detections, "fused" for the objects after fusion
+    axles      axles of the station; None for a mast, and if they are unknown
     """
 
-    def __init__(self, osi: Osi, ids: Identifiers, station: str, list_name: str) -> None:
+    def __init__(
+        self, osi: Osi, ids: Identifiers, station: str, list_name: str, axles: AxleCenters | None = None
+    ) -> None:
         self._osi = osi
         self._station = station
         self._list = list_name
         self._sensor = ids.of("sensor", station, list_name)
+        self._rear_axle = rear_axle(axles)
 
     def build(self, frame: Frame) -> Any | None:
         """Return the message of a frame, or None if the station is absent."""
@@ -55,8 +60,8 @@ class SensorDataBuilder:
         objects: Detections = getattr(step, self._list)
         message = self._osi.begin(self._osi.sensor_data(), frame.view.time)
         message.sensor_id.value = self._sensor
-        # The sensor is a virtual one in the origin of the vehicle
-        set_vector(message.mounting_position.position, (0.0, 0.0, 0.0))
+        # The sensor is a virtual one in the reference point; OSI measures its place from the rear axle
+        set_vector(message.mounting_position.position, -self._rear_axle)
         set_orientation(message.mounting_position.orientation, 0.0)
         if math.isfinite(objects.time):
             set_time(message.last_measurement_time, objects.time)

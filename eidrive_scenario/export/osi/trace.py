@@ -29,7 +29,8 @@ _CHANNEL = f"{TRACE_METADATA}.channel"
 _LISTS: Mapping[str, str] = {"detections": "own detections", "fused": "objects after fusion"}
 """Object lists of a station, with their descriptions."""
 _CONVENTIONS = (
-    "lanes and boundaries are in the first GroundTruth only; bbcenter_to_rear points to the ground below the rear axle"
+    "lanes and boundaries are in the first GroundTruth only; "
+    "bbcenter_to_rear of vehicles of background traffic points to the ground below the rear axle"
 )
 
 
@@ -58,7 +59,7 @@ def check_osi() -> None:
 
 
 def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
-    builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.weather)
+    builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.axles, run.weather)
     for frame in run.frames():
         for data in run.converted(frame, lambda one: [builder.build(one).SerializeToString()]):
             stream.write(struct.pack("<I", len(data)) + data)
@@ -129,7 +130,10 @@ class _Traces:
     def __init__(self, osi: Osi, run: RecordedRun) -> None:
         self._osi = osi
         self._sensors = Identifiers(_FIRST_SENSOR)
-        self._truth = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.weather)
+        self._axles = run.axles
+        self._truth = GroundTruthBuilder(
+            osi, run.roads, Identifiers(), host_vehicle(run), run.towed, self._axles, run.weather
+        )
         self._title = run.title
         self._stations: dict[tuple[str, str], SensorDataBuilder] = {}
 
@@ -140,7 +144,9 @@ class _Traces:
             for name, text in _LISTS.items():
                 key = station, name
                 if key not in self._stations:
-                    self._stations[key] = SensorDataBuilder(self._osi, self._sensors, station, name)
+                    self._stations[key] = SensorDataBuilder(
+                        self._osi, self._sensors, station, name, self._axles.get(station)
+                    )
                 message = self._stations[key].build(frame)
                 if message is not None:
                     yield sensor_data_topic(station, name), f"{text} of {station}", message

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.published import COUNTS, TABLE_2
 from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
-from eidrive_scenario.experiments.reproduction.rows import distinct, number, scenario_title
+from eidrive_scenario.experiments.reproduction.rows import distinct, limits, number, scenario_title
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.reporting.reproduction.channel_curves import channels_figure
 from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
@@ -135,8 +135,8 @@ def draw(part: str, report: PartReport, out: Path) -> Path | None:
 
 
 def _points(axes: Axes, at: Sequence[float], rows: Sequence[Row], color: str, label: str) -> None:
-    low, mean, high = ([number(row, name) for row in rows] for name in ("low", "mean", "high"))
-    _interval(axes, at, low, mean, high, color, f"{label}, 95 %")
+    low, high = limits(rows, "mean")
+    _interval(axes, at, low, [number(row, "mean") for row in rows], high, color, f"{label}, 95 %")
 
 
 def _interval(

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
-from eidrive_scenario.experiments.reproduction.rows import number
+from eidrive_scenario.experiments.reproduction.rows import limits, number
 
 COLORS = {
     "none": "#6b7280",
@@ -31,7 +31,7 @@ def perception_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
     panels = figure.subplots(len(OVERLAPS) + 1, len(axes_names), squeeze=False)
     for overlap, line in zip(OVERLAPS, panels, strict=False):
         mine = [row for row in curves if row["range"] == "all" and row["iou"] == overlap]
-        top = 1.05 * max(number(row, "high") for row in mine)
+        top = 1.05 * max(limits(mine, "ap")[1])
         for name, axes in zip(axes_names, line, strict=True):
             _curves(axes, [row for row in mine if row["axis"] == name], "ap")
             axes.set_xlabel(UNITS.get(name, name), fontsize=8)
@@ -56,8 +56,8 @@ def _curves(axes: Axes, rows: Sequence[Row], name: str) -> None:
     """Draw one curve per arm with its interval."""
     for arm, color in COLORS.items():
         mine = [row for row in rows if row["arm"] == arm]
-        at, low, middle, high = ([number(row, field) for row in mine] for field in ("value", "low", name, "high"))
-        axes.fill_between(at, low, high, color=color, alpha=0.12, lw=0)
+        at, middle = ([number(row, field) for row in mine] for field in ("value", name))
+        axes.fill_between(at, *limits(mine, name), color=color, alpha=0.12, lw=0)
         axes.plot(at, middle, "o-", color=color, ms=3, lw=1.2, label=f"{arm}, 95 %")
 
 
@@ -70,10 +70,7 @@ def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
         some = [row for row in mine if row["arm"] == arm]
         at = [places.index(str(row["range"])) + width * (place - (len(COLORS) - 1) / 2) for row in some]
         values = [number(row, "ap") for row in some]
-        errors = [
-            [max(0.0, value - number(row, "low")) for value, row in zip(values, some, strict=True)],
-            [max(0.0, number(row, "high") - value) for value, row in zip(values, some, strict=True)],
-        ]
+        errors = [[abs(end - value) for value, end in zip(values, ends, strict=True)] for ends in limits(some, "ap")]
         axes.bar(at, values, width, color=color, yerr=errors, error_kw={"lw": 0.8})
     axes.set_xticks(range(len(places)), labels=places)
     axes.set_xlabel("distance from the ego, without faults", fontsize=8)

@@ -133,15 +133,42 @@ def test_recall_of_hidden_objects() -> None:
     assert math.isnan(Pool([record(GOLDEN[0])], NAME).hidden_recall(0).value)
 
 
-def test_interval_is_that_of_resampled_runs() -> None:
-    """Runs with precisions 1 and 0: with two draws of two runs the result is 0, about 1/2, or 1."""
+def test_precision_of_equal_scores_does_not_depend_on_the_order_of_frames() -> None:
+    """One right and one wrong detection of one score, in two frames of one object."""
+    right = detected([(10.0, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0))
+    wrong = detected([(50.0, 0.0, 0.0)], [0.9]), truth()
+    assert precision(right, wrong) == precision(wrong, right) == [0.5, 0.5, 0.5]
+
+
+def test_detections_of_one_score_count_in_their_own_ranges() -> None:
+    """The second detection overlaps its object more and takes part first; the first one is wrong and beyond 50 m."""
+    found = detected([(60.0, 0.0, 0.0), (10.0, 0.0, 0.0)], [0.9, 0.9])
+    pool = Pool([record((found, truth((10.0, 0.0, 0.0))))], NAME)
+    assert (pool.precision(1, 0).value, pool.precision(1).value) == (1.0, 0.5)
+
+
+def test_interval_follows_from_runs_without_each_other() -> None:
+    """Runs with precisions 1 and 0: without one of them the precision is 0 or 1. One run has no interval."""
     good = record((detected([(10.0, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0))))
     bad = record((detected([], []), truth((10.0, 0.0, 0.0))))
     one = Pool([good, bad], NAME).precision(1)
     assert (one.value, one.low, one.high) == (0.5, 0.0, 1.0)
     same = Pool([record(*GOLDEN)] * 3, NAME).precision(2)
     assert (same.low, same.high) == pytest.approx((0.65, 0.65)), "equal runs have no spread"
-    assert Pool([good], NAME).megabytes_per_second == 0.5
+    alone = Pool([good], NAME)
+    assert math.isnan(alone.precision(1).low)
+    assert alone.megabytes_per_second == 0.5
+
+
+def test_interval_of_runs_that_all_find_everything_is_wilsons() -> None:
+    """Of 10 runs without a miss, Wilson's interval of 10 of 10 is 72 % to 100 %; of 0 of 10 it is 0 to 28 %."""
+    hidden = truth((10.0, 0.0, 0.0), hidden=True)
+    good = record((detected([(10.0, 0.0, 0.0)], [0.9]), hidden))
+    bad = record((detected([], []), hidden))
+    for runs, low, high in (([good] * 10, 0.722, 1.0), ([bad] * 10, 0.0, 0.278)):
+        pool = Pool(runs, NAME)
+        for one in (pool.precision(1), pool.hidden_recall(1)):
+            assert (one.low, one.high) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_moved_detections_keep_their_place_relative_to_the_station() -> None:

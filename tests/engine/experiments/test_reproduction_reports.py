@@ -117,6 +117,31 @@ def test_table_3_of_the_papers_rates_agrees_with_the_paper() -> None:
     assert "rsu > vehicle in 4 of 4 scenarios" in text
 
 
+def test_table_3_states_start_and_variation_of_the_bus() -> None:
+    """Values of the scenario files. With rates of 20 % and 50 %, 32 and 20 of 40 runs end in a collision."""
+    alone = {("coop/scenario_5", "vehicle"): 0.2, ("coop/scenario_6", "vehicle"): 0.5}
+    rates = dict.fromkeys(TABLE_3, 1.0) | alone
+    text = table_3.report(episodes_of_rates(rates, 40), ("oracle",)).markdown()
+    assert "scenario 5 -36 m, -3 to +3 m; scenario 6 -33.8 m, -5 to +5 m; scenario 7 -24.8 m, -3 to +3 m" in text
+    assert "32 of 40 (scenario_5, oracle) and 20 of 40 (scenario_6, oracle) runs end in a collision" in text
+    assert "about half" not in text
+
+
+def test_table_3_of_no_collisions_has_intervals_of_the_differences() -> None:
+    """Equal verdicts of 40 pairs: the score interval ends at z² / (n + z²) = 8.8 % on each side, not at 0."""
+    report = table_3.report(episodes_of_rates(dict.fromkeys(TABLE_3, 1.0), 40), ("oracle",))
+    limits = [(row["low"], row["high"]) for row in report.data()["table3_comparisons"]]
+    assert len(limits) == 8
+    assert all(pair == (pytest.approx(-0.0876, abs=1e-4), pytest.approx(0.0876, abs=1e-4)) for pair in limits)
+
+
+def test_reports_of_one_episode_have_no_intervals_of_means() -> None:
+    """A dash stands in their cells, and figures show the values without bars."""
+    single = table_3.report(episodes_of_rates(dict.fromkeys(TABLE_3, 1.0), 1), ("oracle",))
+    assert {(row["low"], row["high"]) for row in single.data()["table3"]} == {(None, None)}
+    assert "| 3.00 ± 0.00 | - |" in single.markdown()
+
+
 def test_table_3_of_equal_rates_departs_from_the_paper() -> None:
     """All runs without a collision: 40 of 40 has the Wilson interval 0.91 to 1, which excludes five of the rates."""
     report = table_3.report(episodes_of_rates(dict.fromkeys(TABLE_3, 1.0), 40), ("oracle",))
@@ -146,7 +171,7 @@ def test_detection_of_the_papers_counts_has_its_ratios() -> None:
     report = detection.report(counted_episodes(counts), detection.DETECTORS)
     for row in report.data()["detection_ratios"]:
         assert row["ratio"] == pytest.approx(RATIOS[str(row["scenario"]), str(row["detector"])], abs=0.02)
-        assert row["low"] == row["ratio"] == row["high"], "a single episode"
+        assert (row["low"], row["high"]) == (None, None), "a single episode"
     assert {row["mean"] == pytest.approx(row["paper_mean"]) for row in report.data()["detection"]} == {True}
     text = report.markdown()
     assert "Cooperation finds more objects in 4 of 4 panels" in text

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from opendrive_xml import elevation_xml, map_xml, road_xml, superelevation_xml
+from openscenario_xml import object_xml, road_file_xml, scenario_xml, vehicle_xml
 from osi3trace.osi_trace import OSITrace
 from scipy.spatial.transform import Rotation
+from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 from written_recording import Body, detected, step, view, write_run
 
 from eidrive_scenario.experiments.single_run import run_and_save
@@ -51,7 +55,7 @@ def scenario_3(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def test_positions_of_trace_equal_those_of_the_run(scenario_3: tuple[Path, Path]) -> None:
-    """Rotated and added to the box center, bbcenter_to_rear leads back to the reference point of OpenSCENARIO."""
+    """The box center, less its rotated offset, is the reference point of OpenSCENARIO."""
     frames = list(read_recording(scenario_3[0]).frames())
     truths = messages(scenario_3[1])
     assert len(truths) == len(frames) > 100
@@ -61,9 +65,50 @@ def test_positions_of_trace_equal_those_of_the_run(scenario_3: tuple[Path, Path]
         for row, found in enumerate(truth.moving_object):
             angles = found.base.orientation
             turn = Rotation.from_euler("ZYX", [angles.yaw, angles.pitch, angles.roll])
-            rear = vector(found.vehicle_attributes.bbcenter_to_rear) if found.type == 2 else -frame.view.offset[row]
-            position = vector(found.base.position) + turn.apply(rear)
+            position = vector(found.base.position) - turn.apply(frame.view.offset[row])
             assert np.abs(position - frame.view.position[row]).max() < MILLIMETER
+
+
+def test_axles_are_measured_from_the_box_center_on_any_slope(tmp_path: Path) -> None:
+    """OSI: bbcenter_to_rear and bbcenter_to_front lead to the middle of the axles, in the frame of the object.
+
+    The center is at (1.4, 0, 0.75). The axles of the car are at x of 2.8 and 0 m, the one of the trailer at -1.2 m, all
+    0.3 m high. The road climbs by 10 % and is banked by 0.2 rad.
+    """
+    trailer = re.sub("<FrontAxle.*?/>", "", vehicle_xml().replace('positionX="0"', 'positionX="-1.2"'))
+    walker = (
+        '<Pedestrian name="p" mass="80" pedestrianCategory="pedestrian"><BoundingBox><Center x="0" y="0" z="0.9"/>'
+        '<Dimensions width="0.5" length="0.5" height="1.8"/></BoundingBox><Properties/></Pedestrian>'
+    )
+    road = tmp_path / "slope.xodr"
+    road.write_text(map_xml(road_xml(length=400.0, profiles=elevation_xml(slope=0.1) + superelevation_xml(0.2))))
+    scenario = scenario_xml(
+        entities=object_xml("Ego") + object_xml("Trailer", trailer) + object_xml("Walker", walker),
+        init="".join(
+            init_xml(name, teleport_xml(lane_position_xml(-1, s)))
+            for name, s in (("Ego", 100), ("Trailer", 50), ("Walker", 150))
+        ),
+        stop=end_xml(0.1),
+        road=road_file_xml(road),
+    )
+    result = run_and_save(scenario, out=tmp_path / "run")
+    assert result.recording is not None
+    write_osi(open_run(result.recording), tmp_path / "trace.mcap")
+    car, towed, person = messages(tmp_path / "trace.mcap")[-1].moving_object
+    assert car.base.orientation.pitch < -0.09
+    assert vector(car.vehicle_attributes.bbcenter_to_rear) == pytest.approx([-1.4, 0.0, -0.45])
+    assert vector(car.vehicle_attributes.bbcenter_to_front) == pytest.approx([1.4, 0.0, -0.45])
+    assert vector(towed.vehicle_attributes.bbcenter_to_rear) == pytest.approx([-2.6, 0.0, -0.45])
+    assert not towed.vehicle_attributes.HasField("bbcenter_to_front")
+    assert not person.HasField("vehicle_attributes")
+
+
+def test_rear_axle_of_vehicle_with_unknown_axles_is_the_reference_point(tmp_path: Path) -> None:
+    """As of background traffic, and of recordings that lack the axles."""
+    (truth,) = exported(tmp_path, Frame(view({"A": {}})))
+    attributes = truth.moving_object[0].vehicle_attributes
+    assert vector(attributes.bbcenter_to_rear) == pytest.approx([-1.4, 0.0, -0.75])
+    assert not attributes.HasField("bbcenter_to_front")
 
 
 def test_identifiers_are_unique_and_stable(scenario_3: tuple[Path, Path]) -> None:

@@ -51,6 +51,22 @@ def test_detections_are_in_the_frame_of_the_vehicle(tmp_path: Path) -> None:
     assert message.sensor_id.value == found.header.sensor_id[0].value
 
 
+def test_sensor_is_mounted_in_the_reference_point_below_the_rear_axle(tmp_path: Path) -> None:
+    """OSI states the place of a sensor from the middle of the rear axle, which is 0.3 m high here."""
+    steps = {name: step(detected(0.0, []), drives=name == "Ego") for name in ("Ego", "Mast")}
+    frame = Frame(view({"Ego": {}, "Mast": {"category": "misc"}}), steps)
+    metadata = {"axles": '{"Ego": {"rear": [0.1, 0.3], "front": [2.8, 0.3]}}'}
+    write_osi(write_run(tmp_path, [frame], metadata=metadata), tmp_path / "t.mcap")
+    places = [sensor_data(tmp_path / "t.mcap", name)[0].mounting_position.position for name in ("Ego", "Mast")]
+    assert [(place.x, place.y, place.z) for place in places] == [pytest.approx((-0.1, 0.0, -0.3)), (0.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize("text", ["[]", "{", '{"Ego": 3}', '{"Ego": {"rear": null, "front": null}}'])
+def test_axles_that_cannot_be_read_are_unknown(tmp_path: Path, text: str) -> None:
+    run = write_run(tmp_path, [Frame(view({"Ego": {}}))], metadata={"axles": text})
+    assert dict(run.axles) == {}
+
+
 def test_detections_are_relative_to_the_estimated_pose(tmp_path: Path) -> None:
     estimate = EgoState(0.0, np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     own = detected(0.0, [(11.0, 0.0, 0.75, 4.0, 2.0, 1.5, 0.0)])

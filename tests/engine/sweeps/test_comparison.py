@@ -83,6 +83,22 @@ def test_compare_omits_pairs_with_infinite_values(tmp_path: Path) -> None:
     assert found.mean == pytest.approx(0.5)
 
 
+def test_compare_command_states_intervals_of_metrics(eidrive: Eidrive, tmp_path: Path) -> None:
+    """Gaps 1, 2, 3 and 1, 2, 6: differences 0, 0, 3 with mean 1 and standard deviation sqrt(3), so 1 ± 4.303.
+
+    A single pair has no interval.
+    """
+    first, second = (store(tmp_path / f"{name}.db", name, [True] * 3) for name in "ab")
+    with ResultStore.open(second, {"eidrive-scenario": "b"}) as opened:
+        run = list(opened.runs())[-1]
+        opened.add(replace(run, result={**run.result, "gap": 6.0}))
+    done = eidrive("compare", first, second, "--metric", "gap")
+    assert "gap: B - A +1 (95%: -3.303 to +5.303; 3 pairs)" in done.stdout
+    alone = [store(tmp_path / f"{name}.db", name, [True]) for name in "cd"]
+    done = eidrive("compare", *alone, "--metric", "gap")
+    assert "gap: B - A +0 (95%: no interval, too few values; 1 pairs)" in done.stdout
+
+
 def test_compare_with_unknown_metric_names_known_ones(tmp_path: Path) -> None:
     first, second = (store(tmp_path / f"{name}.db", name, [True]) for name in "ab")
     with pytest.raises(SettingError, match="known: gap"):
