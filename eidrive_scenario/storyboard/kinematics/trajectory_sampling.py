@@ -184,10 +184,9 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     if not given:
         poses = smooth
     elif not all(has_headings):
-        peaks = [tangents[number] for number in curve.peaks(count)]
         turned = [
-            (pose._replace(h=wrap_angle(pose.h - tangent) if has_heading else 0.0), weight)
-            for (pose, weight), tangent, has_heading in zip(control, peaks, has_headings, strict=True)
+            (pose._replace(h=wrap_angle(pose.h - tangents[peak]) if has_heading and peak is not None else 0.0), weight)
+            for (pose, weight), peak, has_heading in zip(control, curve.peaks(count), has_headings, strict=True)
         ]
         turns = Nurbs(shape.order, curve.knots, turned).sampled(count)
         poses = [pose._replace(h=h + turn.h) for pose, h, turn in zip(poses, tangents, turns, strict=True)]
