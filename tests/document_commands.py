@@ -286,8 +286,9 @@ def _broken(step: Step, done: subprocess.CompletedProcess[str], folder: Path, pa
 
 
 def _rows(text: str) -> Iterator[str]:
-    """Yield the rows of the Markdown tables of a text, without their rulers."""
-    return (_in_one_line(line) for line in text.splitlines() if line.startswith("|") and not set(line) <= set("|-: "))
+    """Yield the rows of the Markdown tables of a text, without their rulers. Cells without a value have any dash."""
+    lines = (line.replace("\u2013", "-") for line in text.splitlines() if line.startswith("|"))
+    return (_in_one_line(line) for line in lines if not set(line) <= set("|-: "))
 
 
 def environment_of(python: Path) -> dict[str, str]:

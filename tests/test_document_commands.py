@@ -111,10 +111,10 @@ def test_claim_that_is_gone_or_has_no_evidence_is_an_error(tmp_path: Path) -> No
 
 
 def test_rows_of_a_written_table_are_in_the_page(tmp_path: Path) -> None:
-    text = "| a | b |\n|---|---|\n| x | 1 of 2 |\n| y | 2 of 2 |\n"
+    text = "| a | b |\n|---|---|\n| x | 1 of 2 |\n| y | \u2013 |\n| w | 2 of 2 |\n"
     run = [
         {
-            "command": "printf '| a | b |\\n|---|---|\\n| x |  1 of 2 |\\n| z | 0 of 2 |\\n' > t.md",
+            "command": "printf '| a | b |\\n|---|---|\\n| x |  1 of 2 |\\n| y | - |\\n| z | 0 of 2 |\\n' > t.md",
             "rows": ["t.md", "u.md"],
         }
     ]

@@ -92,7 +92,7 @@ def average_precision(matches: Sequence[Matches], objects: int) -> float:
     return area_in_order(correct, objects, scores)
 
 
-def area_in_order(correct: Bools, objects: int, scores: Array | None = None) -> float:
+def area_in_order(correct: Bools, objects: int, scores: Array | Integers | None = None) -> float:
     """Return the area under precision over recall of detections in the given order; NaN without objects.
 
     Neighbors with equal `scores` enter together, and without scores each detection alone. OpenCOOD evaluates detections
@@ -111,7 +111,7 @@ def _precision_recall(correct: Bools, objects: int, ends: Integers) -> tuple[Arr
     return right / max(objects, 1), right / (ends + 1)
 
 
-def _last_of_equal(scores: Array | None, count: int) -> Integers:
+def _last_of_equal(scores: Array | Integers | None, count: int) -> Integers:
     """Return the rows (K,) of sorted detections after which the score changes; all rows without scores."""
     if scores is None:
         return np.arange(count)

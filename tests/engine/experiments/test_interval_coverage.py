@@ -148,9 +148,9 @@ def test_average_precision_and_recall_of_runs(population: list[PerceptionRecord]
     whole = Pool(population, "arm")
     drawn = generator(count, "samples of runs").integers(0, len(population), (SAMPLES // 4, count)).tolist()
     pools = [Pool([population[number] for number in numbers], "arm") for numbers in drawn]
-    for measure in (lambda pool: pool.precision(0), lambda pool: pool.hidden_recall(0)):
-        found = [measure(pool) for pool in pools]
-        assert LEAST <= coverage([(one.low, one.high) for one in found], measure(whole).value) <= MOST
+    precisions, recalls = [pool.precision(0) for pool in pools], [pool.hidden_recall(0) for pool in pools]
+    assert LEAST <= coverage([(one.low, one.high) for one in precisions], whole.precision(0).value) <= MOST
+    assert LEAST <= coverage([(one.low, one.high) for one in recalls], whole.hidden_recall(0).value) <= MOST
 
 
 def test_boundary_of_success() -> None:
