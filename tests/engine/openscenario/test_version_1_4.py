@@ -118,7 +118,8 @@ def test_preference_for_permanent_lanes_completes_at_once(tmp_path: Path) -> Non
     story = story_xml(action=PREFERRED.format(layer="permanent"))
     path = tmp_path / "work_zone.xosc"
     path.write_bytes(scenario_xml(minor=4, road=ROAD, init=f'<Private entityRef="Ego">{place}</Private>', story=story))
-    result = run_file(path, settings=RunSettings(time_limit=3.0))
+    collision = {"collision": {"of": "Ego"}}
+    result = run_file(path, settings=RunSettings(time_limit=3.0, criteria=collision))
     assert result.end_reason == "storyboard complete"
     assert result.warnings == ()
 
