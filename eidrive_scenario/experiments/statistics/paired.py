@@ -79,7 +79,7 @@ def paired_spread(first: Sequence[float], second: Sequence[float], *, confidence
         _margins(deviation, logarithms, confidence) for deviation, logarithms in zip(deviations, left_out, strict=True)
     )
     is_constant = min(float(np.ptp(logarithms)) for logarithms in left_out) == 0.0
-    correlation = 0.0 if is_constant else float(np.asarray(np.corrcoef(*left_out))[0, 1])
+    correlation = 0.0 if is_constant else float(np.asarray(np.corrcoef(left_out[0], left_out[1]))[0, 1])
     low = difference - _combined(below_second, above_first, correlation)
     high = difference + _combined(above_second, below_first, correlation)
     return PairedDifference(count, difference, low, high, confidence)
