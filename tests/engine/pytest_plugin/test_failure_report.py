@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 from faulty_extensions import write_scenario
 
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.pytest_plugin.criterion_lines import line_of_criterion
-from eidrive_scenario.pytest_plugin.failure_text import explain
+from eidrive_scenario.pytest_plugin.failure_text import explain, failure_text
 from eidrive_scenario.simulation import RunSettings
 
 pytest_plugins = ["pytester"]
@@ -21,6 +22,10 @@ pytest_plugins = ["pytester"]
 pytestmark = pytest.mark.timeout(600)
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+
+
+def test_control_characters_in_a_failure_are_escaped() -> None:
+    assert failure_text(InputError(Diagnostic("unknown entity 'a\x1b[2J\x9b'"))) == r"unknown entity 'a\u001b[2J\u009b'"
 
 
 def test_failed_run_is_explained_with_state_and_decision(tmp_path: Path) -> None:
