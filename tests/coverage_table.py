@@ -163,7 +163,6 @@ WITHOUT_EFFECT = {
     "AnimationFile.timeOffset": "animation files are recorded, not executed",
     "AssignControllerAction.activateAnimation": LIGHTS,
     "AssignControllerAction.activateLighting": LIGHTS,
-    "Axle.positionZ": "wheels stand on the road",
     "Clothoid.MotionEnd": MOTION,
     "Clothoid.MotionStart": MOTION,
     "ClothoidSpline.MotionEnd": MOTION,

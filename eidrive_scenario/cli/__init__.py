@@ -64,12 +64,13 @@ def _options(
     ] = False,
 ) -> None:
     """Select the project, by default that of the current folder. `Guarded` and `_show_version` evaluate the others."""
+    from eidrive_scenario.cli.streams import echo
     from eidrive_scenario.project import enter_project, select_project
 
     with suppress(FileNotFoundError):  # The current folder is deleted
         if project is not None:
             if notice := enter_project(project):
-                typer.echo(notice, err=True)
+                echo(notice, err=True)
             return
         select_project(Path.cwd())
 

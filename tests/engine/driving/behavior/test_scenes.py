@@ -15,20 +15,21 @@ SCENES = sorted(path.stem for path in FOLDER.glob("*.xosc"))
 
 
 def test_library_has_the_scenes() -> None:
-    assert len(SCENES) == 24
+    assert len(SCENES) == 25
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_behavior_arrives_without_collision_by_own_fault(scene: str) -> None:
     result = run_file(f"driving/{scene}", seed=1)
-    assert {verdict.name: verdict.passed for verdict in result.criteria} == {"collision": True, "reach_position": True}
+    assert {verdict.name for verdict in result.criteria} >= {"collision", "reach_position"}
+    assert all(verdict.passed for verdict in result.criteria)
     assert result.metrics["collision.count"] == 0.0
     assert not result.warnings
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [scene for scene in SCENES if scene != "parked_cars"])
 def test_lane_follower_collides(scene: str) -> None:
-    """Each scene contains a conflict: without a reaction there is a contact."""
+    """Each scene contains a conflict: without a reaction there is a contact. Beside parked cars none is needed."""
     contact = {"collision": {"of": "Ego", "name": "contact"}}
     settings = RunSettings(parameters={"Planner": "route"}, criteria=contact)
     result = run_file(f"driving/{scene}", seed=1, settings=settings)
