@@ -42,16 +42,19 @@ def file_suggestion(
 
 def _similar_path(path: Path, suffixes: Collection[str]) -> Path | None:
     """Return an existing file whose path differs from `path` by similar names only; None without one."""
-    above = path.parent
-    if not os.path.isdir(above):
-        folder = None if above == path else _similar_path(above, ())
-        return None if folder is None else _existing(folder / path.name, suffixes)
-    name = most_similar(path.name, _names(above, suffixes))
-    return None if name is None else above / name
-
-
-def _existing(path: Path, suffixes: Collection[str]) -> Path | None:
-    return path if os.path.isfile(path) else _similar_path(path, suffixes)
+    folder = next((above for above in path.parents if os.path.isdir(above)), None)
+    if folder is None:
+        return None
+    *missing, last = path.relative_to(folder).parts
+    for part in missing:
+        name = part if os.path.isdir(folder / part) else most_similar(part, _names(folder, ()))
+        if name is None:
+            return None
+        folder /= name
+    if missing and os.path.isfile(folder / last):
+        return folder / last
+    name = most_similar(last, _names(folder, suffixes))
+    return None if name is None else folder / name
 
 
 def _names(folder: Path, suffixes: Collection[str]) -> list[str]:
