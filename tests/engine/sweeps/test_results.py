@@ -275,7 +275,8 @@ def test_export_over_a_store_is_refused(eidrive: Eidrive, store: Path, option: s
 
 def test_sweep_and_results_name_runs_with_warnings(eidrive: Eidrive, tmp_path: Path) -> None:
     """A time step above 0.1 s is a warning of each run."""
-    options = ("--vary", "dt=0.05,0.5", "--seeds", "1,2", "--vary", "time_limit=0.5")
+    one_after_another = ("--workers", "1")
+    options = ("--vary", "dt=0.05,0.5", "--seeds", "1,2", "--vary", "time_limit=0.5", *one_after_another)
     swept = eidrive("sweep", "coop/scenario_1", *options, "--store", tmp_path / "s.db")
     command = "eidrive run coop/scenario_1 --seed 1 --dt 0.5 --time-limit 0.5"
     expected = f"warning: 2 of 4 runs have warnings; to print those of the first: {command}"
