@@ -197,7 +197,7 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     if times is None:
         return TrajectoryCurve(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
     meters = 1 + int(polygon_length)
-    # A control point whose basis function is zero at all samples of a long curve has no time of its own
+    # A control point whose basis function is zero at all samples of a long curve has no separate time
     peaks = [(number, time) for number, time in zip(curve.peaks(count), times, strict=True) if number is not None]
     stations = [math.floor((number + 1) / count * meters) / meters * count for number, _ in peaks]
     point_times = np.interp(np.arange(count + 1), stations, [time for _, time in peaks])

@@ -172,7 +172,7 @@ def test_time_of_control_point_holds_at_peak_of_its_basis_function() -> None:
     assert (way.at_time(0.0), way.at_time(6.0)) == pytest.approx((0.0, 20.0))
 
 
-def test_spline_with_more_equal_knots_than_its_order_ends_before_the_last_point() -> None:
+def test_spline_with_excess_equal_knots_ends_before_last_point() -> None:
     """Order 2: straight lines between the points at the knots 0, 1 and 2; the interval of the last point is empty."""
     shape = model.Nurbs(
         order=2,
