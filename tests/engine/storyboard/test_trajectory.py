@@ -188,7 +188,7 @@ def test_spline_of_many_points_is_sampled_in_linear_time(order: int, spacing: fl
     """With the knots 0, 1, 2, … point i is at the mean i + order / 2 of its inner knots: the curve is linear in its
     parameter, from (order - 1) to (points), and so is the time i of point i.
 
-    The samples are 1 m and 0.1 m apart, so that some points of the second curve have no sample of their own.
+    The samples are 1 m and 0.1 m apart, so that some points of the second curve have no separate sample.
     """
     points = 20_000
     shape = model.Nurbs(
