@@ -21,7 +21,8 @@ THIN = 3.0 * RANGE_NOISE
 SHAPELESS = 0.4
 """Maximum size of a rectangle around points that show no heading [m]."""
 FEW_COLUMNS = 1.6
-"""Number of gaps between columns of rays below which the heading of a rectangle is worse than that of the lane."""
+"""Number of gaps between columns of rays below which the heading of a rectangle is worse than that of the lane: two
+columns, one of which may have hit the rear and one the side, show a line that is neither."""
 HEADING_DEVIATION = 0.4
 """Standard deviation of an assumed heading [rad]."""
 NEGLIGIBLE = 12.0
@@ -101,7 +102,7 @@ def fit_box(
     shapes = rectangles(points[:, :2])
     shapeless = shapes[0].widest < SHAPELESS
     axes: tuple[int, ...] = (0, 1)
-    if heading is not None and shapes[0].widest < max(SHAPELESS, FEW_COLUMNS * pattern.azimuth * math.hypot(x, y)):
+    if heading is not None and (shapeless or _bearings(points) < FEW_COLUMNS * pattern.azimuth):
         shapes, axes = [bounds(points[:, :2], heading)], (0,)
     elif shapeless:
         shapes = [bounds(points[:, :2], math.atan2(y, x))]
@@ -137,6 +138,12 @@ def fit_box(
         best.cost + 2.0 * math.log(prior.share),
         hidden,
     )
+
+
+def _bearings(points: Array) -> float:
+    """Return the angle between the outermost points (N, 3), viewed from the sensor [rad]."""
+    x, y = points[:, :2].mean(axis=0).tolist()
+    return float(np.ptp(np.arctan2(x * points[:, 1] - y * points[:, 0], x * points[:, 0] + y * points[:, 1])))
 
 
 def _complete_box(hypothesis: _Hypothesis, shapeless: bool) -> tuple[list[float], tuple[float, float], Array]:

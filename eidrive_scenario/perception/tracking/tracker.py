@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.geometry import iou_bev, wrap_angle
 from eidrive_scenario.perception.tracking.association import associate, position_noise
 from eidrive_scenario.perception.tracking.existence import MOST, detected, likelihood_ratio, missed, survived
 from eidrive_scenario.perception.tracking.history import TrackHistory
-from eidrive_scenario.perception.tracking.interacting_models import InteractingModels, Tracks
+from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT, InteractingModels, Tracks
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
@@ -28,6 +28,8 @@ ACROSS = math.cos(math.pi / 4.0)
 """Cosine of the angle between two axes from which on one is across the other."""
 PART = 0.5
 """Share of the length of a track below which a box shows a part of the object."""
+LARGEST_OVERLAP = 0.1
+"""Maximum overlap of two bodies (intersection over union) by errors of their boxes: 0.8 m of two cars in a row."""
 SMOOTHING = 0.2
 """Weight of a new box in the size, height and heading of an object with many detections."""
 
@@ -91,9 +93,10 @@ class Tracker(TrackingMethod):
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         expected = self._filter.combined(self._tracks)
         rows, columns = associate(expected, confirmed, detections.boxes, noise, self._gate)
-        on_bodies = self._boxes_on_bodies(expected, confirmed, detections.boxes)
+        unassigned = np.setdiff1d(np.arange(len(detections)), columns)
+        on_bodies = self._boxes_on_bodies(expected, confirmed, rows, unassigned, detections.boxes, noise)
         for column, row in on_bodies.items():
-            if column not in columns and row not in rows:
+            if row not in rows:
                 rows.append(row)
                 columns.append(column)
                 # It says that the object is there, and little about its place.
@@ -107,24 +110,38 @@ class Tracker(TrackingMethod):
             history.record_scan(row in hit, self.settings)
         for row, column in zip(rows, columns, strict=True):
             self._histories[row].record_detection(detections, column)
-        taken = {*columns, *on_bodies}
-        self._initiate(detections, [column for column in range(len(detections)) if column not in taken], noise)
+        self._initiate(detections, [column for column in unassigned.tolist() if column not in on_bodies], noise)
         self._delete(detections.time)
         return self._confirm_and_report(detections.time)
 
-    def _boxes_on_bodies(self, expected: Estimates, confirmed: Bools, boxes: Array) -> dict[int, int]:
-        """Return the boxes with their centers on the body of a confirmed track, with the row of this track.
+    def _boxes_on_bodies(
+        self,
+        expected: Estimates,
+        confirmed: Bools,
+        detected: list[int],
+        columns: NDArray[np.intp],
+        boxes: Array,
+        noise: Array,
+    ) -> dict[int, int]:
+        """Return which of the boxes in `columns` overlap with the body of a confirmed track, with its row.
 
-        Two bodies cannot overlap, so that they show this object: a part of it, or all of it outside the gate.
+        Two bodies cannot overlap, so that they show this object: a part of it, or all of it outside the gate. A body
+        without a detected box may be beside its place, by the error of its position relative to the box.
         """
         tracks = np.flatnonzero(confirmed)
-        length, width, yaw = self._shape[tracks][:, [1, 2, 4]].T
-        offset = boxes[None, :, :2] - expected.state[tracks, None, :2]
-        cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-        ahead = cos * offset[..., 0] + sin * offset[..., 1]
-        aside = cos * offset[..., 1] - sin * offset[..., 0]
-        on_body = (2.0 * np.abs(ahead) < length[:, None]) & (2.0 * np.abs(aside) < width[:, None])
-        return {column: int(tracks[place]) for place, column in np.argwhere(on_body).tolist()}
+        if not len(columns) or not len(tracks):
+            return {}
+        bodies = self._boxes(tracks, expected.state[tracks])
+        offset = boxes[columns, :2] - bodies[:, None, :2]
+        cos, sin = np.cos(bodies[:, 6]), np.sin(bodies[:, 6])
+        axes = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], -2)
+        spread = expected.covariance[tracks, None, :2, :2] + noise[columns]
+        deviation = np.sqrt(np.einsum("tai,tbij,taj->tba", axes, spread, axes))
+        deviation[np.isin(tracks, detected)] = 0.0
+        reach = bodies[:, None, 3:5] / 2.0 + SIGNIFICANT * deviation
+        on_body = np.all(np.abs(np.einsum("tai,tbi->tba", axes, offset)) < reach, axis=-1)
+        on_body |= iou_bev(bodies, boxes[columns]) > LARGEST_OVERLAP
+        return {int(columns[column]): int(tracks[row]) for row, column in np.argwhere(on_body).tolist()}
 
     def _update_existence(
         self,

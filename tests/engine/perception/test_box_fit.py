@@ -152,6 +152,15 @@ def test_fit_box_of_few_points_uses_given_heading() -> None:
     assert unknown.covariance[0, 0] > known.covariance[0, 0]
 
 
+def test_fit_box_of_one_column_on_each_of_two_sides_uses_given_heading() -> None:
+    """A car ahead, 2.3 to 4.1 m to the right: one column of rays hits its rear at 40 m, the next one its side 3 m behind.
+    The line between them is 16 degrees off."""
+    columns = np.array([[x, y, z] for x, y in ((40.0, -3.2), (43.0, -2.3)) for z in (0.4, 1.0)])
+    car = fit(columns, heading=0.0, classes=("car",), pattern=Pattern(0.026, 0.026, math.radians(15.0)))
+    assert car.box[6] == pytest.approx(0.0)
+    assert car.box[0] > 41.5
+
+
 def test_fit_box_of_two_objects_has_large_deviation() -> None:
     """Two cars side by side, 6 m apart, in one cluster: no class is 8 m wide and 1.5 m high."""
     both = np.concatenate([outline(20, y, 4.6, 1.85, 0.0) for y in (-3, 3)])

@@ -324,3 +324,33 @@ def test_boxes_on_the_body_of_a_track_are_no_other_objects() -> None:
     for scan in range(25, 28):
         held = track.update(cars(DT * scan, (20, 0), (14, 0)))
     assert held.tracks == (1, 2)
+
+
+def test_box_that_overlaps_a_body_is_no_other_object() -> None:
+    """A car ends at 22.3 m. A box from 21.1 m on overlaps it by 1.2 m, more than two cars in a row; one from 22.1 m on
+    may be a second car, and a pedestrian 0.1 m beside its side is one."""
+    for x, y, name, expected in (
+        (23.4, 0, "car", (1,)),
+        (24.4, 0, "car", (1, 2)),
+        (20.0, 1.25, "pedestrian", (1, 2)),
+    ):
+        track = tracker()
+        for scan in range(20):
+            track.update(cars(DT * scan, (20, 0)))
+        both = cars(0.0, (20, 0), (x, y), names=("car", name))
+        if name == "pedestrian":
+            both.boxes[1, 3:6] = 0.5, 0.5, 1.7
+        for scan in range(20, 25):
+            held = track.update(replace(both, time=DT * scan))
+        assert held.tracks == expected
+
+
+def test_box_beside_an_undetected_body_is_this_object() -> None:
+    """The center of a box is 0.3 m behind a car of 4.6 m whose own box is missing, with an error of 0.4 m."""
+    track = tracker()
+    for scan in range(20):
+        track.update(cars(DT * scan, (20, 0), deviation=0.4))
+    part = cars(0.0, (17.4, 0, math.pi / 2.0), deviation=0.4, names=("bicycle",))
+    part.boxes[0, 3:6] = 1.7, 0.6, 1.5
+    for scan in range(20, 25):
+        assert track.update(replace(part, time=DT * scan)).tracks == (1,)
