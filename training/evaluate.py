@@ -16,7 +16,7 @@ from typing import Any
 
 import cv2
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
@@ -35,7 +35,7 @@ from training.light_scores import light_table, readings
 from training.misses import misses
 from training.runtime_scores import runtime_table
 from training.scenes import StationScene, library_scenes, random_scenes
-from training.scoring import VEHICLES, EvaluatedImage, Part, score
+from training.scoring import EvaluatedImage, Part, score
 from training.sweeps import plot_sweeps, sweeps
 from training.tables import WEATHERS, Table, as_markdown, error_table, tables_of
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.detector import LearnedDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.settings import LearnedSettings
@@ -17,7 +17,7 @@ from training.dataset import Dataset, shows_enough, write
 from training.labels import Label
 from training.render_data import PER_WORLD, Shot, render, table
 from training.scenes import StationScene
-from training.scoring import VEHICLES, EvaluatedImage, Objects
+from training.scoring import EvaluatedImage, Objects
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.experiments.average_precision import match
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.networks.suppression import overlap
 from training.dataset import Dataset
-from training.scoring import VEHICLES, EvaluatedImage
+from training.scoring import EvaluatedImage
 from training.tables import Table, number
 
 Bools = NDArray[np.bool_]

@@ -15,8 +15,6 @@ from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, li
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-VEHICLES = ("car", "truck", "bus")
-
 
 @dataclass(frozen=True)
 class Objects:

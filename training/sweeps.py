@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.experiments.average_precision import match
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.camera import ImageSensor
@@ -22,7 +22,6 @@ from training.dataset import shows_enough
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
 from training.random_scene import LanePositions, random_traffic, random_view
-from training.scoring import VEHICLES
 
 VISUAL_RANGES = (30_000.0, 1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 35.0)
 ELEVATIONS = (40.0, 20.0, 10.0, 5.0, 2.0, 0.0, -3.0, -6.0, -9.0, -12.0, -18.0)

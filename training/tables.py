@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT
-from training.scoring import ROAD_USERS, VEHICLES, EvaluatedImage, Part, as_one_light, mean_precision, score
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, VEHICLES
+from training.scoring import ROAD_USERS, EvaluatedImage, Part, as_one_light, mean_precision, score
 
 Array = NDArray[np.float64]
 Table = tuple[str, list[str], list[list[str]]]

@@ -18,6 +18,9 @@ STOP_SIGN = "stop sign"
 IMAGE_CLASSES = (*OBJECT_CLASSES, *(f"{LIGHT} {state}" for state in LIGHT_STATES), STOP_SIGN)
 """The classes of the shipped weights, in the order of the networks' outputs."""
 
+VEHICLES = ("car", "truck", "bus")
+"""Those of vehicles with four or more wheels; a van is a car."""
+
 VERY_LIKE = 0.85
 """Similarity (ratio of Ratcliff and Obershelp) from which a name is reported as misspelt."""
 _VEHICLES = ("car", "truck", "bus", "van")

@@ -92,13 +92,18 @@ class ImageNetwork(ABC):
             candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
         groups = self._groups[candidates.classes]
         kept = suppress(candidates.boxes, candidates.scores, groups, LARGEST_OVERLAP)
-        boxes = (candidates.boxes[kept] - np.tile(scaled.corner, 2)) / np.tile(scaled.scale, 2)
+        boxes = self.calibrated(candidates.boxes[kept], [self.classes[number] for number in candidates.classes[kept]])
+        boxes = (boxes - np.tile(scaled.corner, 2)) / np.tile(scaled.scale, 2)
         boxes[:, 0::2] = boxes[:, 0::2].clip(0.0, width)
         boxes[:, 1::2] = boxes[:, 1::2].clip(0.0, height)
         visible = (boxes[:, 2:] > boxes[:, :2]).all(axis=1)
         boxes, kept = boxes[visible], kept[visible]
         names = tuple(self.classes[number] for number in candidates.classes[kept].tolist())
         return ImageDetections(boxes, candidates.scores[kept], names)
+
+    def calibrated(self, boxes: Array, classes: Sequence[str]) -> Array:
+        """Return boxes (N, 4) of an image of the input size [px] without the mean errors of their edges, if known."""
+        return boxes
 
     @abstractmethod
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:

@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned import image_memory
+from eidrive_scenario.perception.learned.classes import VEHICLES
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.raw_outputs import ssd_candidates, ssd_scales, yolo_candidates, yolo_scales
 from eidrive_scenario.perception.learned.runtime_selection import Device, Runtime
@@ -51,6 +52,7 @@ class OwnNetwork(ImageNetwork):
         super().__init__(description.classes, description.input_size, confidence or description.confidence)
         self.name = description.network
         self.identity: str = f"{digest} {self.confidence!r} {runtime} {threads} {device}"
+        self._outward: Floats = np.array(description.outward, dtype=float).reshape(-1, 5)
         self._anchors = weights.arrays["anchors"] if self.name == "yolov5" else None
 
     def find_in(self, reading: CameraReading) -> ImageDetections:
@@ -105,6 +107,18 @@ class OwnNetwork(ImageNetwork):
         if len(images) == 1:
             return [self.candidates(images[0])]
         return [self._candidates(outputs) for outputs in self._infer(images)]
+
+    def calibrated(self, boxes: Array, classes: Sequence[str]) -> Array:
+        vehicles = [row for row, name in enumerate(classes) if name in VEHICLES]
+        if not len(self._outward) or not vehicles:
+            return boxes
+        boxes = boxes.copy()
+        height = boxes[vehicles, 3] - boxes[vehicles, 1]
+        left, top, right, bottom = (
+            np.interp(height, self._outward[:, 0], self._outward[:, 1 + edge]) for edge in range(4)
+        )
+        boxes[vehicles] += np.stack([left, top, -right, -bottom], axis=1)
+        return boxes
 
     def _candidates(self, outputs: list[Floats]) -> Candidates:
         if self._anchors is None:

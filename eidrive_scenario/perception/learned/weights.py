@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -36,6 +37,8 @@ class Description:
     network     `yolov5` or `ssd`;  classes  in the order of its outputs
     input_size  width and height of its input [px];  anchors  of yolov5 [px]
     confidence  default of the minimum score of a box
+    outward     rows of a box height and of the distances by which the left, top, right and bottom edges of boxes of
+                vehicles are outside those of the vehicles on average, by ascending height [px]
     """
 
     network: str
@@ -43,6 +46,7 @@ class Description:
     input_size: tuple[int, int]
     anchors: Anchors | None = None
     confidence: float = DEFAULT_CONFIDENCE
+    outward: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -111,10 +115,14 @@ def _parse_description(data: dict[str, Any]) -> Description:
     confidence = float(data.get("confidence", Description.confidence))
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"its confidence is invalid (got {confidence:g}; expected a number between 0 and 1)")
+    outward = tuple(tuple(float(value) for value in row) for row in data.get("outward", ()))
+    if any(len(row) != 5 or not all(map(math.isfinite, row)) for row in outward):
+        raise ValueError("outward: invalid row (expected a height and four distances)")
     return Description(
         network=network,
         classes=classes,
         input_size=(width, height),
         confidence=confidence,
         anchors=anchors,
+        outward=outward,
     )

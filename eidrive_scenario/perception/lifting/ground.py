@@ -101,10 +101,10 @@ def lift_by_ground(
 
     Each box stands on the ground and has the usual size of its class, or of one that detectors confuse with it. Its
     position is fitted so that the outline of its projection has the edges of the image box: least squares (Levenberg
-    and Marquardt) for several headings. The class and heading with the minimum error are selected; the spread over the
-    others adds to the covariance. An edge at the border of the image is only a bound: the object continues there. The
-    front points along the lane if there is a map, else away from the camera. The height of roads is that of the map,
-    else `ground` [m].
+    and Marquardt) for several headings. The class and position with the minimum error and the mean axis are selected;
+    the spread over the others adds to the covariance. An edge at the border of the image is only a bound: the object
+    continues there. The front points along the lane if there is a map, else away from the camera. The height of roads
+    is that of the map, else `ground` [m].
     """
     if not len(boxes):
         empty = np.empty((0, HEADINGS))
@@ -182,7 +182,9 @@ class _View:
         rows = np.arange(count)
         weights = np.exp(-0.5 * (costs - costs[rows, best][:, None]))
         weights /= weights.sum(axis=1, keepdims=True)
-        place, heading, information = places[rows, best], headings[rows, best], informations[rows, best]
+        place, information = places[rows, best], informations[rows, best]
+        # The mean axis: the image of a distant body hardly depends on its heading, so that the best one is random.
+        heading = 0.5 * np.angle(np.einsum("nk,nk->n", weights, np.exp(2j * headings)))
         offsets = places - place[:, None]
         heading_spread = np.einsum("nk,nki,nkj->nij", weights, offsets, offsets)
         along = np.where(on_lane, base, np.arctan2(place[:, 1], place[:, 0]))

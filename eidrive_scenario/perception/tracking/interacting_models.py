@@ -27,6 +27,15 @@ MOVING = 1.0
 """Minimum speed of an object whose direction of motion is certain [m/s]."""
 SIGNIFICANT = 2.0
 """Minimum speed of such an object in standard deviations."""
+UNCERTAIN = 2.0
+"""Standard deviation of a speed above which it is unknown unless it is `CERTAIN` [m/s]. Speeds of pedestrians that are
+tracked by lidar or camera have less, those of objects in their first scans much more."""
+CERTAIN = 3.0
+"""Minimum of such a speed in standard deviations."""
+COMMON_SHARE = 0.02
+"""Share of the variance of a box by which the position of a standing object becomes uncertain again at the next box.
+Errors of successive boxes are alike, as they come from the same visible part and the same assumed size: without it,
+many bad boxes would seem to be one good one. The variance of the position stays above an eighth of that of a box."""
 STANDS, MOVES = 0, 1
 """Indices of the models."""
 
@@ -111,6 +120,16 @@ class InteractingModels:
         posterior = tracks.probability * np.exp(likelihood - likelihood.max(axis=0))
         return _stacked([update.estimates for update in updates], posterior / posterior.sum(axis=0))
 
+    def add_common_errors(self, tracks: Tracks, rows: Rows, noise: Array) -> Tracks:
+        """Return predicted tracks in which the positions of standing objects are uncertain by what the errors of
+        successive boxes have in common.
+
+        rows   of tracks with a measured box, of position noise (M, 2, 2)
+        """
+        covariance = tracks.covariance.copy()
+        covariance[STANDS, rows, :2, :2] += COMMON_SHARE * noise
+        return tracks._replace(covariance=covariance)
+
     def share_pose_change(self, tracks: Tracks, rows: Rows, boxes: Array, noise: Array) -> Tracks:
         """Return predicted tracks in which the change of the pose error is estimated from the boxes of other tracks.
 
@@ -153,9 +172,11 @@ class InteractingModels:
         return _moments(self._aligned(tracks.state), tracks.covariance, tracks.probability)
 
     def velocity(self, tracks: Tracks) -> Array:
-        """Return the mean velocities (N, 2) [m/s]."""
-        velocity: Array = tracks.probability[MOVES][:, None] * self._base.velocity(tracks.state[MOVES])
-        return velocity
+        """Return the mean velocities (N, 2), 0 for objects whose velocity is unknown [m/s]."""
+        moves = Estimates(tracks.state[MOVES], tracks.covariance[MOVES])
+        velocity, variance = self._base.velocity(moves.state), self._base.speed_variance(moves)
+        known = (variance < UNCERTAIN**2) | (np.square(velocity).sum(axis=1) > CERTAIN**2 * variance)
+        return np.asarray(np.where(known, tracks.probability[MOVES], 0.0)[:, None] * velocity)
 
     def course(self, tracks: Tracks) -> Array:
         """Return the directions (N,) in which objects certainly move [rad], NaN for others.

@@ -89,7 +89,8 @@ class Tracker(TrackingMethod):
             self._existence = survived(self._existence, step, self.settings.lifetime)
         if self._pose_errors is not None:
             self._pose_errors.advance(detections.time)
-        noise = position_noise(detections.covariance)
+        of_boxes = position_noise(detections.covariance)
+        noise = of_boxes.copy()
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         expected = self._filter.combined(self._tracks)
         rows, columns = associate(expected, confirmed, detections.boxes, noise, self._gate)
@@ -105,6 +106,7 @@ class Tracker(TrackingMethod):
         hit = set(rows)
         self._update_existence(expected, rows, detections, columns, noise, in_view)
         if rows:
+            self._tracks = self._filter.add_common_errors(self._tracks, rows, of_boxes[columns])
             self._correct(rows, detections, columns, noise)
         for row, history in enumerate(self._histories):
             history.record_scan(row in hit, self.settings)
@@ -182,9 +184,10 @@ class Tracker(TrackingMethod):
         shape = self._shape[rows]
         confirmed = np.array([self._histories[row].number is not None for row in rows], dtype=bool)
         is_part = confirmed & (boxes[:, 3] < PART * shape[:, 1])
-        noise = noise[columns] + _axis_noise(shape, boxes, confirmed)
-        if is_part.any():
-            noise[is_part] += _part_noise(shape[is_part], boxes[is_part])
+        differs = is_part | (confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS))
+        noise = noise[columns]
+        if differs.any():
+            noise[differs] += _extent_noise(shape[differs], boxes[differs])
         self._tracks = self._filter.share_pose_change(self._tracks, rows, boxes, noise)
         tracks = self._filter.update(self._tracks.take(rows), boxes, noise)
         self._tracks.put(rows, tracks)
@@ -274,25 +277,15 @@ class Tracker(TrackingMethod):
         )
 
 
-def _axis_noise(shape: Array, boxes: Array, confirmed: Bools) -> Array:
-    """Return the covariance (N, 2, 2) of centers of boxes (N, 7) whose axis is across that of their confirmed track
-    [m²].
+def _extent_noise(shape: Array, boxes: Array) -> Array:
+    """Return the covariance (N, 2, 2) of centers of boxes (N, 7) that show another extent than their tracks [m²].
 
-    The same visible corner belongs to a box along the track or across it; their centers differ by half the difference
-    of length and width in both directions.
+    The same visible corner belongs to both: along each axis of the track, the centers differ by half the difference of
+    the extents.
     """
-    across = confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS)
-    shift = np.where(across, (shape[:, 1] - shape[:, 2]) / 2.0, 0.0)
-    return np.asarray((shift**2)[:, None, None] * np.eye(2))
-
-
-def _part_noise(shape: Array, boxes: Array) -> Array:
-    """Return the covariance (N, 2, 2) of centers of boxes (N, 7) around a visible part of their track [m²].
-
-    They differ from the center of the object by up to half the differences of the lengths and of the widths.
-    """
-    along = (shape[:, 1] - boxes[:, 3]) / 2.0
-    aside = np.maximum(shape[:, 2] - boxes[:, 4], 0.0) / 2.0
+    turn = boxes[:, 6] - shape[:, 4]
+    along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    extent = np.stack([along * boxes[:, 3] + across * boxes[:, 4], across * boxes[:, 3] + along * boxes[:, 4]], -1)
     cos, sin = np.cos(shape[:, 4]), np.sin(shape[:, 4])
     axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-    return np.asarray(np.einsum("nij,nj,nkj->nik", axes, np.stack([along, aside], -1) ** 2, axes))
+    return np.asarray(np.einsum("nij,nj,nkj->nik", axes, np.square(shape[:, 1:3] - extent) / 4.0, axes))

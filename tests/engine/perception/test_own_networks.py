@@ -255,3 +255,24 @@ def test_detector_with_runtime_reports_its_version() -> None:
     need("openvino")
     found = YoloDetector(LearnedSettings(runtime="openvino")).library_versions
     assert found == {"openvino": version("openvino")}
+
+
+def test_calibration_moves_edges_of_vehicles_by_box_height(tmp_path: Path) -> None:
+    """Distances of 1 to 4 pixels at a height of 10, twice as far at 20, and constant beyond; other classes keep their
+    boxes."""
+    with np.load(SHIPPED / "ssd.npz") as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    description = json.loads(str(arrays["description"]))
+    description["outward"] = [[10, 1, 2, 3, 4], [20, 2, 4, 6, 8]]
+    path = tmp_path / "calibrated.npz"
+    np.savez(path, **{**arrays, "description": np.array(json.dumps(description))})
+    network = OwnNetwork(path, "opencv")
+    boxes = np.array([[100.0, 100.0, 200.0, 100.0 + height] for height in (8, 15, 40, 15)])
+    calibrated = network.calibrated(boxes, ["car", "bus", "truck", "pedestrian"])
+    moved = (calibrated - boxes) * (1, 1, -1, -1)
+    expected = np.array([[1.0, 2.0, 3.0, 4.0], [1.5, 3.0, 4.5, 6.0], [2.0, 4.0, 6.0, 8.0], [0.0, 0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(moved, expected)
+    description["outward"] = [[10, 1, 2]]
+    np.savez(path, **{**arrays, "description": np.array(json.dumps(description))})
+    with pytest.raises(SettingError, match=r"outward: invalid row"):
+        OwnNetwork(path, "opencv")

@@ -354,3 +354,27 @@ def test_box_beside_an_undetected_body_is_this_object() -> None:
     part.boxes[0, 3:6] = 1.7, 0.6, 1.5
     for scan in range(20, 25):
         assert track.update(replace(part, time=DT * scan)).tracks == (1,)
+
+
+def test_velocity_of_new_track_is_zero_until_it_is_known() -> None:
+    """Errors of 0.4 m let a parked car seem to move by 0.8 m in 0.1 s: 8 m/s with a standard deviation of 5.7 m/s. A
+    car at 15 m/s with errors of 0.1 m moves for certain from its third box on."""
+    track = tracker()
+    reported = [track.update(cars(DT * scan, (x, 0), deviation=0.4)) for scan, x in enumerate((20.0, 20.8, 20.4))]
+    assert [held.velocity.tolist() for held in reported[1:]] == [[[0.0, 0.0]]] * 2
+    track = tracker()
+    for scan in range(3):
+        held = track.update(cars(DT * scan, (15.0 * DT * scan, 0)))
+    assert held.velocity[0, 0] == pytest.approx(15.0, abs=1.0)
+
+
+def test_position_of_standing_object_stays_as_uncertain_as_common_errors() -> None:
+    """300 boxes of a standard deviation of 3 m, all of them 3 m too near, are no precise position: a better sensor is
+    believed at once."""
+    track = tracker()
+    for scan in range(300):
+        held = track.update(cars(DT * scan, (50, 0), deviation=3.0))
+    assert 1.0 < math.sqrt(held.covariance[0, 0, 0]) < 1.5
+    held = track.update(cars(30.0, (53, 0), deviation=0.2))
+    assert held.tracks == (1,)
+    assert held.boxes[0, 0] == pytest.approx(53.0, abs=0.3)
