@@ -56,7 +56,7 @@ class PoseErrorArm:
             "Participants": "vehicle",
             "PoseNoise": f"{{position: {self.deviation}, yaw: {yaw}, correlation_time: {time}}}",
         }
-        return RunSettings(parameters=parameters, criteria={BRAKING: {"of": EGO, "at_most": 10**6}})
+        return RunSettings(channel="ideal", parameters=parameters, criteria={BRAKING: {"of": EGO, "at_most": 10**6}})
 
 
 def arms() -> Iterator[PoseErrorArm]:

@@ -15,7 +15,7 @@ from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Row
 from eidrive_scenario.experiments.reproduction.perception_shapes import crossing, shapes
 from eidrive_scenario.reporting.reproduction.figures import draw
-from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 CORRECT = 0b11_001_001_001
 """Code of a detection that is correct at all overlaps and for both truths, in the first range."""
@@ -159,3 +159,9 @@ def test_closed_loop_covers_each_tracker_and_fusion_at_all_errors() -> None:
     assert cells == expected
     assert {arm.fusion for arm in pose_errors.arms() if arm.detector == "lidar"} >= {"early"}
     assert pose_errors.cases(()) == [case for case in drives if not case.arm.startswith("lidar")]
+
+
+def test_closed_loop_receives_messages() -> None:
+    arm = next(arm for arm in pose_errors.arms() if arm.deviation == 0.2)
+    with Simulation(pose_errors.SCENE, settings=arm.settings) as simulation:
+        assert any(simulation.tick()[0].steps["Ego"].inbox for _ in range(30))
