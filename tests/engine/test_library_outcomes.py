@@ -65,6 +65,12 @@ def test_lane_follower_hits_the_slower_vehicle(number: int, other: str, seed: in
     assert f"Ego and {other} hit each other" in result.criteria[0].reason
 
 
+@pytest.mark.parametrize(("detector", "seed"), [("ssd", 1), ("yolov5", 2)])
+def test_images_are_sufficient_to_overtake(detector: str, seed: int) -> None:
+    """Every such run of the paper completes the task."""
+    assert run_file("pipeline/scenario_1", seed=seed, settings=RunSettings(detector=detector)).passed
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("number", "rule"), [(3, "running_red_light"), (4, "running_stop_sign")])
 def test_signal_criterion_depends_on_obedience_only(number: int, rule: str, seed: int) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.motion_models import (
     HEADING,
@@ -27,11 +27,8 @@ MOVING = 1.0
 """Minimum speed of an object whose direction of motion is certain [m/s]."""
 SIGNIFICANT = 2.0
 """Minimum speed of such an object in standard deviations."""
-UNCERTAIN = 2.0
-"""Standard deviation of a speed above which it is unknown unless it is `CERTAIN` [m/s]. Speeds of pedestrians that are
-tracked by lidar or camera have less, those of objects in their first scans much more."""
 CERTAIN = 3.0
-"""Minimum of such a speed in standard deviations."""
+"""Minimum speed of an object in its first scans in standard deviations: two or three positions are hardly a motion."""
 COMMON_SHARE = 0.02
 """Share of the variance of a box by which the position of a standing object becomes uncertain again at the next box.
 Errors of successive boxes are alike, as they come from the same visible part and the same assumed size: without it,
@@ -171,12 +168,17 @@ class InteractingModels:
         """Return mean and covariance of each track over both models."""
         return _moments(self._aligned(tracks.state), tracks.covariance, tracks.probability)
 
-    def velocity(self, tracks: Tracks) -> Array:
-        """Return the mean velocities (N, 2), 0 for objects whose velocity is unknown [m/s]."""
+    def velocity(self, tracks: Tracks, recent: Bools | None = None) -> Array:
+        """Return the mean velocities (N, 2) [m/s].
+
+        recent  whether objects (N,) have been detected in few scans: their velocity is 0 unless it is certain
+        """
         moves = Estimates(tracks.state[MOVES], tracks.covariance[MOVES])
-        velocity, variance = self._base.velocity(moves.state), self._base.speed_variance(moves)
-        known = (variance < UNCERTAIN**2) | (np.square(velocity).sum(axis=1) > CERTAIN**2 * variance)
-        return np.asarray(np.where(known, tracks.probability[MOVES], 0.0)[:, None] * velocity)
+        velocity, probability = self._base.velocity(moves.state), tracks.probability[MOVES]
+        if recent is not None and recent.any():
+            least = CERTAIN**2 * self._base.speed_variance(moves)
+            probability = np.where(recent & (np.square(velocity).sum(axis=1) < least), 0.0, probability)
+        return np.asarray(probability[:, None] * velocity)
 
     def course(self, tracks: Tracks) -> Array:
         """Return the directions (N,) in which objects certainly move [rad], NaN for others.

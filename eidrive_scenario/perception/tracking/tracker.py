@@ -30,6 +30,8 @@ PART = 0.5
 """Share of the length of a track below which a box shows a part of the object."""
 LARGEST_OVERLAP = 0.1
 """Maximum overlap of two bodies (intersection over union) by errors of their boxes: 0.8 m of two cars in a row."""
+SETTLED = 6
+"""Number of detections of a track from which on its velocity no longer depends on that of the first ones."""
 SMOOTHING = 0.2
 """Weight of a new box in the size, height and heading of an object with many detections."""
 
@@ -265,12 +267,13 @@ class Tracker(TrackingMethod):
     def _report(self, time: float, rows: list[int], tracks: Tracks, existence: Array) -> Detections:
         histories = [self._histories[row] for row in rows]
         state, covariance = self._filter.combined(tracks)
+        recent = np.array([history.hits < SETTLED for history in histories], dtype=bool)
         return Detections(
             time,
             self._boxes(rows, state),
             np.array([history.score for history in histories]) * existence,
             tuple([history.name for history in histories]),
-            self._filter.velocity(tracks),
+            self._filter.velocity(tracks, recent),
             covariance[:, :2, :2],
             tuple([history.number or 0 for history in histories]),
             existence,
