@@ -65,10 +65,10 @@ def distant_vehicles(camera: CameraSettings, worlds: int) -> Iterator[Distant]:
     for number in range(worlds):
         rng = generator(1, "calibration of edges", number)
         with tempfile.TemporaryDirectory() as folder:
-            place = random_place(rng, Path(folder))
-        positions = LanePositions.of(place.roads)
-        with World(place.roads) as world:
-            place.build_houses(world)
+            site = random_place(rng, Path(folder))
+        positions = LanePositions.of(site.roads)
+        with World(site.roads) as world:
+            site.build_houses(world)
             world.set_weather(Weather(name="clear"))
             for _ in range(PER_WORLD):
                 yield _image(world, positions, camera, rng)
@@ -116,8 +116,8 @@ def edge_errors(network: ImageNetwork, images: list[Distant]) -> Array:
             and label.box[0] > 2.0
             and label.box[2] < network.input_size[0] - 2.0
         ]
-        found = network.find(image.pixels)
-        vehicles = found.boxes[[name in VEHICLES for name in found.classes]]
+        detections = network.find(image.pixels)
+        vehicles = detections.boxes[[name in VEHICLES for name in detections.classes]]
         if not whole or not len(vehicles):
             continue
         true = np.array([label.box for label in whole])

@@ -14,7 +14,6 @@ from eidrive_scenario.openscenario import load_scenario
 ELEMENTS = 10_000
 
 
-@cache
 def reading_time() -> float:
     """Return the processor time of reading a plain scenario of 10,000 parameters, in seconds."""
     declarations = "\n".join(
@@ -30,11 +29,17 @@ def reading_time() -> float:
     return min(times)
 
 
+usual_reading_time = cache(reading_time)
+
+
 @contextmanager
 def work_within(readings: float) -> Iterator[None]:
     """Fail if the block takes more processor time than `readings` times the reading of 10,000 parameters."""
-    unit = reading_time()
+    unit = usual_reading_time()
     began = time.process_time()
     yield
-    spent = (time.process_time() - began) / unit
+    spent = time.process_time() - began
+    if spent >= readings * unit:
+        unit = max(unit, reading_time())  # the machine may have become slower since the first reading
+    spent /= unit
     assert spent < readings, f"the block took {spent:.3g} times the reading of {ELEMENTS} parameters"

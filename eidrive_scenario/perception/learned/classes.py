@@ -23,7 +23,7 @@ VEHICLES = ("car", "truck", "bus")
 
 VERY_LIKE = 0.85
 """Similarity (ratio of Ratcliff and Obershelp) from which a name is reported as misspelt."""
-_VEHICLES = ("car", "truck", "bus", "van")
+_VEHICLES = (*VEHICLES, "van")
 _SAME_AS = {"van": "car", "person": "pedestrian", "motorcycle": "motorbike"}
 
 

@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +119,8 @@ def _parse_description(data: dict[str, Any]) -> Description:
     outward = tuple(tuple(float(value) for value in row) for row in data.get("outward", ()))
     if any(len(row) != 5 or not all(map(math.isfinite, row)) for row in outward):
         raise ValueError("outward: invalid row (expected a height and four distances)")
+    if any(before[0] >= after[0] for before, after in pairwise(outward)):
+        raise ValueError("outward: rows are not in ascending order of their heights")
     return Description(
         network=network,
         classes=classes,

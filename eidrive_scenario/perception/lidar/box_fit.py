@@ -102,7 +102,7 @@ def fit_box(
     shapes = rectangles(points[:, :2])
     shapeless = shapes[0].widest < SHAPELESS
     axes: tuple[int, ...] = (0, 1)
-    if heading is not None and (shapeless or _bearings(points) < FEW_COLUMNS * pattern.azimuth):
+    if heading is not None and (shapeless or float(np.ptp(_bearings(points[:, :2]))) < FEW_COLUMNS * pattern.azimuth):
         shapes, axes = [bounds(points[:, :2], heading)], (0,)
     elif shapeless:
         shapes = [bounds(points[:, :2], math.atan2(y, x))]
@@ -140,10 +140,10 @@ def fit_box(
     )
 
 
-def _bearings(points: Array) -> float:
-    """Return the angle between the outermost points (N, 3), viewed from the sensor [rad]."""
-    x, y = points[:, :2].mean(axis=0).tolist()
-    return float(np.ptp(np.arctan2(x * points[:, 1] - y * points[:, 0], x * points[:, 0] + y * points[:, 1])))
+def _bearings(plan: Array) -> Array:
+    """Return the angles (N,) from the direction of the mean of points (N, 2) to them, viewed from the sensor [rad]."""
+    x, y = plan.mean(axis=0).tolist()
+    return np.asarray(np.arctan2(x * plan[:, 1] - y * plan[:, 0], x * plan[:, 0] + y * plan[:, 1]))
 
 
 def _complete_box(hypothesis: _Hypothesis, shapeless: bool) -> tuple[list[float], tuple[float, float], Array]:
@@ -258,7 +258,7 @@ def _ends_of(
         # The points have almost equal positions along the axis, so their order is noise; the axis points to one side.
         leads_left = x * axis[1] - y * axis[0] > 0.0
         return (flags[1], flags[0]) if leads_left else flags
-    bearing = np.arctan2(x * plan[:, 1] - y * plan[:, 0], x * plan[:, 0] + y * plan[:, 1])
+    bearing = _bearings(plan)
     at_low = at_high = False
     for is_hidden, row in zip(flags, (int(np.argmax(bearing)), int(np.argmin(bearing))), strict=True):
         if is_hidden:

@@ -36,6 +36,9 @@ LEVEL = 0.1
 """Change in road height at an object that requires another iteration [m]."""
 LOOKS = 4
 """Maximum number of fits with updated road heights."""
+INDISTINCT = 1.0
+"""Excess of the squared error up to which the heading of the lane explains an image as well as the best one: one
+standard deviation."""
 NO_BODY = 4 * 7.0**2
 """Squared error above which no body of the class fills an image box: seven standard deviations at each edge. In 22,000
 boxes of the networks on vehicles and pedestrians in view, the largest was 156; a stripe of a crosswalk had 1,700."""
@@ -101,10 +104,10 @@ def lift_by_ground(
 
     Each box stands on the ground and has the usual size of its class, or of one that detectors confuse with it. Its
     position is fitted so that the outline of its projection has the edges of the image box: least squares (Levenberg
-    and Marquardt) for several headings. The class and position with the minimum error and the mean axis are selected;
-    the spread over the others adds to the covariance. An edge at the border of the image is only a bound: the object
-    continues there. The front points along the lane if there is a map, else away from the camera. The height of roads
-    is that of the map, else `ground` [m].
+    and Marquardt) for several headings. The class and heading with the minimum error are selected; a body has the
+    heading of the lane if that is as good within one standard deviation. The spread over the other headings adds to the
+    covariance. An edge at the border of the image is only a bound: the object continues there. The front points along
+    the lane if there is a map, else away from the camera. The height of roads is that of the map, else `ground` [m].
     """
     if not len(boxes):
         empty = np.empty((0, HEADINGS))
@@ -183,8 +186,9 @@ class _View:
         weights = np.exp(-0.5 * (costs - costs[rows, best][:, None]))
         weights /= weights.sum(axis=1, keepdims=True)
         place, information = places[rows, best], informations[rows, best]
-        # The mean axis: the image of a distant body hardly depends on its heading, so that the best one is random.
-        heading = 0.5 * np.angle(np.einsum("nk,nk->n", weights, np.exp(2j * headings)))
+        # The image of a distant body hardly depends on its heading, so that the best one would be random.
+        indistinct = on_lane & (costs[:, 0] <= costs[rows, best] + INDISTINCT)
+        heading = headings[rows, np.where(indistinct, 0, best)]
         offsets = places - place[:, None]
         heading_spread = np.einsum("nk,nki,nkj->nij", weights, offsets, offsets)
         along = np.where(on_lane, base, np.arctan2(place[:, 1], place[:, 0]))

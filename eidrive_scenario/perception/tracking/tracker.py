@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.geometry import iou_bev, wrap_angle
 from eidrive_scenario.perception.tracking.association import associate, position_noise
 from eidrive_scenario.perception.tracking.existence import MOST, detected, likelihood_ratio, missed, survived
@@ -31,7 +31,7 @@ PART = 0.5
 LARGEST_OVERLAP = 0.1
 """Maximum overlap of two bodies (intersection over union) by errors of their boxes: 0.8 m of two cars in a row."""
 SETTLED = 6
-"""Number of detections of a track from which on its velocity no longer depends on that of the first ones."""
+"""Number of detections of a track from which on its velocity counts whatever its uncertainty: half a second."""
 SMOOTHING = 0.2
 """Weight of a new box in the size, height and heading of an object with many detections."""
 
@@ -91,8 +91,8 @@ class Tracker(TrackingMethod):
             self._existence = survived(self._existence, step, self.settings.lifetime)
         if self._pose_errors is not None:
             self._pose_errors.advance(detections.time)
-        of_boxes = position_noise(detections.covariance)
-        noise = of_boxes.copy()
+        stated = position_noise(detections.covariance)
+        noise = stated.copy()
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         expected = self._filter.combined(self._tracks)
         rows, columns = associate(expected, confirmed, detections.boxes, noise, self._gate)
@@ -108,7 +108,7 @@ class Tracker(TrackingMethod):
         hit = set(rows)
         self._update_existence(expected, rows, detections, columns, noise, in_view)
         if rows:
-            self._tracks = self._filter.add_common_errors(self._tracks, rows, of_boxes[columns])
+            self._tracks = self._filter.add_common_errors(self._tracks, rows, stated[columns])
             self._correct(rows, detections, columns, noise)
         for row, history in enumerate(self._histories):
             history.record_scan(row in hit, self.settings)
@@ -116,6 +116,9 @@ class Tracker(TrackingMethod):
             self._histories[row].record_detection(detections, column)
         self._initiate(detections, [column for column in unassigned.tolist() if column not in on_bodies], noise)
         self._delete(detections.time)
+        # Road users on foot and on two wheels set off at any time: that they stand must not be concluded.
+        vulnerable = [row for row, history in enumerate(self._histories) if history.name in VULNERABLE]
+        self._tracks.probability[:, vulnerable] = np.array([[0.0], [1.0]])
         return self._confirm_and_report(detections.time)
 
     def _boxes_on_bodies(
@@ -137,8 +140,7 @@ class Tracker(TrackingMethod):
             return {}
         bodies = self._boxes(tracks, expected.state[tracks])
         offset = boxes[columns, :2] - bodies[:, None, :2]
-        cos, sin = np.cos(bodies[:, 6]), np.sin(bodies[:, 6])
-        axes = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], -2)
+        axes = _axes(bodies[:, 6])
         spread = expected.covariance[tracks, None, :2, :2] + noise[columns]
         deviation = np.sqrt(np.einsum("tai,tbij,taj->tba", axes, spread, axes))
         deviation[np.isin(tracks, detected)] = 0.0
@@ -267,7 +269,9 @@ class Tracker(TrackingMethod):
     def _report(self, time: float, rows: list[int], tracks: Tracks, existence: Array) -> Detections:
         histories = [self._histories[row] for row in rows]
         state, covariance = self._filter.combined(tracks)
-        recent = np.array([history.hits < SETTLED for history in histories], dtype=bool)
+        recent = np.array(
+            [history.hits < SETTLED and history.name not in VULNERABLE for history in histories], dtype=bool
+        )
         return Detections(
             time,
             self._boxes(rows, state),
@@ -289,6 +293,11 @@ def _extent_noise(shape: Array, boxes: Array) -> Array:
     turn = boxes[:, 6] - shape[:, 4]
     along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
     extent = np.stack([along * boxes[:, 3] + across * boxes[:, 4], across * boxes[:, 3] + along * boxes[:, 4]], -1)
-    cos, sin = np.cos(shape[:, 4]), np.sin(shape[:, 4])
-    axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-    return np.asarray(np.einsum("nij,nj,nkj->nik", axes, np.square(shape[:, 1:3] - extent) / 4.0, axes))
+    axes = _axes(shape[:, 4])
+    return np.asarray(np.einsum("nai,na,nak->nik", axes, np.square(shape[:, 1:3] - extent) / 4.0, axes))
+
+
+def _axes(yaw: Array) -> Array:
+    """Return the directions (N, 2, 2) along and across bodies with headings (N,)."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], -2)

@@ -152,7 +152,7 @@ def test_fit_box_of_few_points_uses_given_heading() -> None:
     assert unknown.covariance[0, 0] > known.covariance[0, 0]
 
 
-def test_fit_box_of_one_column_on_each_of_two_sides_uses_given_heading() -> None:
+def test_fit_box_of_columns_on_two_sides_uses_given_heading() -> None:
     """A car ahead, 2.3 to 4.1 m to the right: a column of rays hits its rear at 40 m, the next one its side 3 m behind.
     The line between them is 16 degrees off."""
     columns = np.array([[x, y, z] for x, y in ((40.0, -3.2), (43.0, -2.3)) for z in (0.4, 1.0)])
