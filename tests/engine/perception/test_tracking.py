@@ -378,3 +378,16 @@ def test_position_of_standing_object_stays_as_uncertain_as_common_errors() -> No
     held = track.update(cars(30.0, (53, 0), deviation=0.2))
     assert held.tracks == (1,)
     assert held.boxes[0, 0] == pytest.approx(53.0, abs=0.3)
+
+
+def test_pedestrian_who_stood_for_long_moves_at_once() -> None:
+    """After 3 s at rest, two boxes of a walk of 1.5 m/s show it; a car that moved by 0.3 m may still stand."""
+    speeds = {}
+    for name in ("pedestrian", "car"):
+        track = tracker()
+        for scan in range(33):
+            moved = 1.5 * DT * max(scan - 30, 0)
+            held = track.update(cars(DT * scan, (20.0, moved), names=(name,)))
+        speeds[name] = float(held.velocity[0, 1])
+    assert speeds["pedestrian"] == pytest.approx(1.5, abs=0.5)
+    assert speeds["car"] < 0.2
