@@ -116,8 +116,8 @@ def section(episodes: Sequence[Episode]) -> Section:
     return Section(
         "Closed loop with pose errors",
         (
-            f"`xosc/{SCENE}.xosc`: the ego passes parked cars at 10 m/s, and another parked car sends what it detects. Both "
-            f"assume a pose with an error, drawn in each time step or with a correlation time of {DRIFT_TIME:g} s "
+            f"`xosc/{SCENE}.xosc`: the ego passes parked cars at 10 m/s, and another parked car sends what it detects. "
+            f"Both assume a pose with an error, drawn in each time step or with a correlation time of {DRIFT_TIME:g} s "
             "(drift). No object is a reason to brake harder than 3 m/s², so all brakings are false. The ego also "
             "drives by this pose.",
         ),
