@@ -18,7 +18,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 demo: install   ## run scenarios 1 and 2 of the paper in all arms: reports/demo.html
-	$(BIN)/python -m eidrive_scenario.reporting.demo --out reports/demo.html
+	$(BIN)/python -m eidrive_reports.demo --out reports/demo.html
 
 test: install   ## run the test suite and the scenarios of the library
 	$(BIN)/python -m pytest -n auto --durations 25 tests xosc/coop
@@ -41,7 +41,7 @@ check-standards: install  ## check scenarios, road files and OSI traces by the c
 
 reproduce: install  ## repeat the experiments of the paper, and compare trends with expected ones: reports/paper, reports/trends
 	OPENBLAS_NUM_THREADS=1 $(BIN)/eidrive reproduce all --out reports/paper
-	$(BIN)/python -m eidrive_scenario.reporting.trends --out reports/trends
+	$(BIN)/python -m eidrive_reports.trends --out reports/trends
 
 bench: install  ## measure the figures of docs/performance.md, and the time per package
 	$(BIN)/python benchmarks/figures.py
@@ -69,31 +69,31 @@ eval: install   ## evaluate the learned detectors on held-out images and library
 	$(BIN)/python -m training.evaluate
 
 closed-loop: install  ## run the scenarios of the paper with learned detectors, 20 seeds each: reports/closed_loop.md
-	$(BIN)/python -m eidrive_scenario.experiments.closed_loop --out reports
+	$(BIN)/python -m eidrive_reports.closed_loop --out reports
 
 heat-maps: install  ## run the obstructed crossings over both speeds: reports/heat_maps/*.png
-	$(BIN)/python -m eidrive_scenario.reporting.heat_map --out reports/heat_maps
+	$(BIN)/python -m eidrive_reports.heat_maps --out reports/heat_maps
 
 library-pictures: install  ## draw the scenarios of the library: docs/library/*.png and the table in README.md
-	$(BIN)/python -m eidrive_scenario.reporting.library_pictures
+	$(BIN)/python -m eidrive_reports.library_pictures
 
 planners: install  ## run the scenes for planners with two planners, 10 seeds each: reports/planner_scenes.md
-	$(BIN)/python -m eidrive_scenario.experiments.planner_scenes --out reports
+	$(BIN)/python -m eidrive_reports.planner_scenes --out reports
 
 driven-files: install  ## drive the files of EIDRIVE_CORPORA by the planner: reports/driven_corpora.md
 	@test -n "$$EIDRIVE_CORPORA" || { echo 'EIDRIVE_CORPORA is not set: the folder of the corpora'; exit 2; }
 	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of the maps of ScenarioRunner'; exit 2; }
-	$(BIN)/python -m eidrive_scenario.experiments.driven_corpora --out reports --resume
+	$(BIN)/python -m eidrive_reports.driven_corpora --out reports --resume
 
 long-drives: install  ## drive at least ten minutes through traffic on Town01 and Town04 of EIDRIVE_MAPS: reports/long_drives.md
 	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of Town01.xodr and Town04.xodr'; exit 2; }
-	$(BIN)/python -m eidrive_scenario.experiments.long_drives "$$EIDRIVE_MAPS"/Town01.xodr "$$EIDRIVE_MAPS"/Town04.xodr --minutes 15 --out reports
+	$(BIN)/python -m eidrive_reports.long_drives "$$EIDRIVE_MAPS"/Town01.xodr "$$EIDRIVE_MAPS"/Town04.xodr --minutes 15 --out reports
 
 corner-cases: install  ## run the corner cases with and without messages, 10 seeds each: reports/corner_cases.md
-	$(BIN)/python -m eidrive_scenario.experiments.corner_cases --out reports
+	$(BIN)/python -m eidrive_reports.corner_cases --out reports
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
-	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet
+	$(BIN)/python -m eidrive_reports.weather_sheet
 
 pages: install  ## open a report and replays in EIDRIVE_BROWSER, with axe-playwright-python: reports/pages, docs/figures/replay.png
 	@test -n "$$EIDRIVE_BROWSER" || { echo 'EIDRIVE_BROWSER is not set: the program of Chromium'; exit 2; }
@@ -104,4 +104,4 @@ pages: install  ## open a report and replays in EIDRIVE_BROWSER, with axe-playwr
 
 clean:          ## remove the virtual environment and all generated files
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
-	find reports -mindepth 1 ! -name README.md -delete
+	git clean -qfdX reports

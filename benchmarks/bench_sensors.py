@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import cv2
+from eidrive_reports.street_view import look_at
+from eidrive_reports.weather_sheet import street
 
 from eidrive_scenario.library import names
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.reporting.drawing.street_view import look_at
-from eidrive_scenario.reporting.weather_sheet import street
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings

@@ -32,7 +32,19 @@ python_use_unqualified_type_names = True
 add_module_names = False
 
 # An object of several modules of the interface is described once, in the first of these.
-_MODULES = ("common", "perception", "fusion", "v2x", "driving", "criteria", "actions", "run", "live")
+_MODULES = (
+    "common",
+    "perception",
+    "fusion",
+    "v2x",
+    "driving",
+    "criteria",
+    "actions",
+    "run",
+    "live",
+    "experiments",
+    "pages",
+)
 _API = "eidrive_scenario.api"
 _OWNERS: dict[str, str] = {}
 for _module in _MODULES:

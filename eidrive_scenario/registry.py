@@ -27,6 +27,7 @@ GROUPS = (
     "controllers",
     "trackers",
     "vehicle_controllers",
+    "commands",
 )
 _SINGULAR = {
     "criteria": "criterion",
@@ -34,7 +35,7 @@ _SINGULAR = {
     "controllers": "controller model",
     "vehicle_controllers": "vehicle controller",
 }
-_BUILT_IN = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
+_BUILT_IN = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria", "eidrive_reports")
 
 
 class Registration(NamedTuple):

@@ -18,7 +18,7 @@ import venv
 from collections.abc import Sequence
 from pathlib import Path
 
-PACKAGES = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
+PACKAGES = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria", "eidrive_reports")
 CONTENT = f"""
 import importlib, sys
 from pathlib import Path

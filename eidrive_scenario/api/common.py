@@ -3,8 +3,9 @@
 Stable: all names.
 """
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.errors import (
+    ConstraintError,
     Diagnostic,
     EidriveError,
     ExtensionError,
@@ -13,21 +14,28 @@ from eidrive_scenario.errors import (
     SettingError,
     SimulationError,
     WallLimitError,
+    quoted,
     suggestion,
 )
+from eidrive_scenario.files.atomic import exclusive, write_atomically
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.geometry import (
     box_distance,
     footprint,
     footprint_distance,
+    iou_bev,
     overlap,
     point_in_polygon,
+    points_in_box,
+    points_in_polygon,
     wrap_angle,
 )
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.registry import register
+from eidrive_scenario.registry import register, registry
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
+from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.tolerances import EPSILON, TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
@@ -38,12 +46,16 @@ __all__ = [
     "TIME_TOLERANCE",
     "ActorSpec",
     "Array",
+    "Bools",
+    "ConstraintError",
     "Contact",
     "Control",
     "Diagnostic",
     "EidriveError",
     "ExtensionError",
     "InputError",
+    "Integers",
+    "LaneKey",
     "LaneLocation",
     "Placement",
     "Pose",
@@ -58,14 +70,22 @@ __all__ = [
     "WallLimitError",
     "WorldView",
     "box_distance",
+    "exclusive",
     "footprint",
     "footprint_distance",
     "generator",
+    "iou_bev",
+    "load_json",
     "load_yaml",
     "overlap",
     "parse_settings",
     "point_in_polygon",
+    "points_in_box",
+    "points_in_polygon",
+    "quoted",
     "register",
+    "registry",
     "suggestion",
     "wrap_angle",
+    "write_atomically",
 ]

@@ -6,11 +6,14 @@ Stable: all names but those of driving stacks (`DrivingStack`, `EmptyStack`, `St
 
 from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.agent_factory import build_agent
+from eidrive_scenario.driving.communication.radio_line_of_sight import line_of_sight_states
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
-from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import (
     DrivingStack,
     EmptyStack,
@@ -20,6 +23,7 @@ from eidrive_scenario.driving.stack import (
     StackSettings,
 )
 from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
@@ -27,6 +31,7 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 
 __all__ = [
     "ActorSpec",
+    "Agent",
     "AgentSettings",
     "AgentStep",
     "Control",
@@ -46,6 +51,10 @@ __all__ = [
     "StackSettings",
     "StationAction",
     "StationPerception",
+    "Stations",
     "VehicleController",
     "ViewSector",
+    "agent_settings",
+    "build_agent",
+    "line_of_sight_states",
 ]

@@ -103,7 +103,7 @@ def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
     from eidrive_scenario.project import conftest_above, unused_project
     from eidrive_scenario.registry import GROUPS, singular
 
-    unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model", "command"))
+    unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model"))
     sources = dict.fromkeys(one.source for one in diagnostics if one.source and one.message.startswith(unknown))
     notices: dict[str, None] = {}
     for path in map(Path, sources):

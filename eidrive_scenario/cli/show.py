@@ -34,6 +34,7 @@ class Names(StrEnum):
     criteria = "criteria"
     actions = "actions"
     conditions = "conditions"
+    commands = "commands"
     rules = "rules"
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from perception_metrics import metric_sample, recall_by_sight
 from scenario_1 import ONE, FrameCollector, simulate, with_properties
 
 from eidrive_scenario.driving import stations
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.perception_metrics import metric_sample, recall_by_sight
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.world.actor import ActorSpec

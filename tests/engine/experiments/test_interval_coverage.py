@@ -15,11 +15,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from eidrive_reports.cooperative_perception.scores import FULL_SCORE, PerceptionRecord, Pool, Tally
 from scipy.stats import binom
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.experiments.cooperative_perception.samples import FULL_SCORE, PerceptionRecord, Tally
-from eidrive_scenario.experiments.cooperative_perception.scores import Pool
 from eidrive_scenario.experiments.statistics.paired import (
     LEAST_PAIRS,
     PairedDifference,

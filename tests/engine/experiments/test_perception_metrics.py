@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenario_1 import ONE, FrameCollector, simulate
-
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.experiments.perception_metrics import (
+from perception_metrics import (
     MetricSample,
     metric_sample,
     position_error,
     precision_bev,
     recall_by_sight,
 )
+from scenario_1 import ONE, FrameCollector, simulate
+
+from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry

@@ -10,9 +10,9 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from eidrive_reports.street_view import look_at
 
 from eidrive_scenario.content_digest import content_digest
-from eidrive_scenario.reporting.drawing.street_view import look_at
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility

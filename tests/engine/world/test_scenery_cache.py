@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from eidrive_reports.street_view import look_at
+from eidrive_reports.weather_sheet import street
 from sample_car import CarFactory
 
 from eidrive_scenario.library import names
-from eidrive_scenario.reporting.drawing.street_view import look_at
-from eidrive_scenario.reporting.weather_sheet import street
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.camera import Pinhole, Radiance

@@ -1,0 +1,262 @@
+"""Receivers of one run: agents of the ego under several conditions, on the sensor readings of one run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from msgspec.structs import replace
+
+from eidrive_scenario.api.common import ActorSpec, Array, wrap_angle
+from eidrive_scenario.api.driving import Agent, AgentSettings, Detections, EgoState, StackContext, build_agent
+from eidrive_scenario.api.perception import Detector, PoseNoise, Readings
+from eidrive_scenario.api.v2x import Message, build_channel, load_profile
+
+SCAN_RATE = 10.0
+"""Lidar scans of each station per second, at equal times [Hz]."""
+DRIFT_TIME = 10.0
+"""Correlation time of a drifting pose error [s], of the order of that of GNSS."""
+YAW_PER_POSITION = 1.0 / 0.6
+"""Standard deviation of the heading per that of the position [degrees/m]: 1° at 0.6 m."""
+LEAST_EXISTENCE = 0.05
+"""Minimum existence probability of fused objects, that of the detector: unlikely objects are part of the curve."""
+ONE_SCAN = 0.05
+"""Memory of early fusion [s]: less than the interval of two scans, so that each frame is detected separately."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Use of messages by the receiving station.
+
+    fusion       fusion method; `settings` are its settings
+    cooperates   whether it receives messages
+    points       whether messages contain points
+    """
+
+    fusion: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    cooperates: bool = True
+    points: bool = False
+
+
+_FILTERED = {"existence": LEAST_EXISTENCE}
+ARMS: Mapping[str, Arm] = {
+    "none": Arm("average", cooperates=False),
+    "none, filtered": Arm("covariance_intersection", _FILTERED, cooperates=False),
+    "average": Arm("average"),
+    "covariance_intersection": Arm("covariance_intersection", _FILTERED),
+    "early": Arm("early", {**_FILTERED, "max_age": ONE_SCAN}, points=True),
+}
+"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Arm under faults.
+
+    deviation    standard deviation of the assumed position of each station, the ego included, along x and y [m];
+                 that of the heading is proportional
+    correlation  correlation time of the pose errors; 0: independent in each scan [s]
+    latency, loss  delay of each message [s], and probability of its loss
+    every        number of scans per message
+    cell         grid of transmitted points [m]
+    """
+
+    arm: str
+    deviation: float = 0.0
+    correlation: float = 0.0
+    latency: float = 0.0
+    loss: float = 0.0
+    every: int = 1
+    cell: float = 0.1
+
+    @property
+    def name(self) -> str:
+        """Name in the record."""
+        parts = [f"{name} {getattr(self, name):g}" for name in ("deviation", "correlation", "latency", "loss")]
+        return "; ".join([self.arm, *parts, f"every {self.every}", f"cell {self.cell:g}"])
+
+    @property
+    def senders(self) -> tuple[PoseNoise | None, float]:
+        """Settings of the senders: pose error and grid of points. Conditions with equal ones have the same messages."""
+        return self.pose_noise, self.cell
+
+    @property
+    def pose_noise(self) -> PoseNoise | None:
+        """Pose error of every station; None for exact poses."""
+        if not self.deviation:
+            return None
+        yaw = YAW_PER_POSITION * self.deviation
+        return PoseNoise(position=self.deviation, yaw=yaw, correlation_time=self.correlation)
+
+    @property
+    def channel(self) -> dict[str, Any]:
+        """Profile of the channel."""
+        loss = {"kind": "bernoulli", "probability": self.loss} if self.loss else {"kind": "none"}
+        return {"model": "composed", "delay": {"kind": "constant", "seconds": self.latency}, "loss": loss}
+
+
+AXES: Mapping[str, tuple[str, Mapping[str, float], tuple[float, ...]]] = {
+    "pose error": ("deviation", {}, (0.0, 0.2, 0.4, 0.6)),
+    "pose drift": ("deviation", {"correlation": DRIFT_TIME}, (0.0, 0.2, 0.4, 0.6)),
+    "latency": ("latency", {}, (0.0, 0.1, 0.2, 0.3, 0.5)),
+    "loss": ("loss", {}, (0.0, 0.3, 0.6, 0.9)),
+}
+"""Axes of the curves: varied field, other fields, and values. The value 0 is the condition without faults."""
+COMPARED = ("none", "average", "covariance_intersection", "early")
+"""Arms of the curves."""
+SCANS_PER_MESSAGE = (1, 2, 5)
+CELLS = (0.2,)
+"""Grids of points in addition to that of the other conditions [m]."""
+
+
+def on_axis(arm: str, axis: str, value: float) -> Condition:
+    """Return the condition of an arm at a value of an axis."""
+    varied, others, _ = AXES[axis]
+    return Condition(arm, **{varied: value, **(others if value else {})})  # type: ignore[arg-type]
+
+
+def by_volume() -> list[Condition]:
+    """Return the conditions with fewer messages, or fewer points."""
+    sending = [arm for arm in COMPARED if ARMS[arm].cooperates]
+    found = [Condition(arm, every=every) for arm in sending for every in SCANS_PER_MESSAGE]
+    return found + [Condition(arm, cell=cell) for arm in sending if ARMS[arm].points for cell in CELLS]
+
+
+def all_conditions() -> tuple[Condition, ...]:
+    """Return all conditions, each once."""
+    curves = [
+        on_axis(arm, axis, value) for axis, (_, _, values) in AXES.items() for arm in COMPARED for value in values
+    ]
+    return tuple(dict.fromkeys([*(Condition(arm) for arm in ARMS), *curves, *by_volume()]))
+
+
+WAIT = 0.001
+"""Time that the ego waits for messages of the same scan [s]: scans are simultaneous, and no message arrives at once."""
+
+
+def moved(found: Detections, before: EgoState, after: EgoState) -> Detections:
+    """Return detections of a station at pose `before` as it reports them from pose `after`."""
+    turn = after.yaw - before.yaw
+    cos, sin = np.cos(turn), np.sin(turn)
+    rotation = np.array([[cos, -sin], [sin, cos]])
+    boxes = found.boxes.copy()
+    boxes[:, :2] = (boxes[:, :2] - before.position[:2]) @ rotation.T + after.position[:2]
+    boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
+    covariance = rotation @ found.covariance @ rotation.T
+    return replace(found, boxes=boxes, velocity=found.velocity @ rotation.T, covariance=covariance)
+
+
+class KnownDetections(Detector):
+    """Detections of a station that were computed for its true pose. All receivers of a run share them."""
+
+    needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
+
+    def __init__(self) -> None:
+        self.found = Detections(0.0)
+        self.pose: EgoState | None = None
+
+    def detect(self, readings: Readings) -> Detections:
+        """Return the known detections, relative to the pose of the readings."""
+        assert self.pose is not None
+        same = self.pose.yaw == readings.ego.yaw and (self.pose.position == readings.ego.position).all()
+        return self.found if same else moved(self.found, self.pose, readings.ego)
+
+
+class Crew:
+    """Stations of a run: their bodies, settings and known detections; it builds further agents of them."""
+
+    def __init__(self, context: StackContext, settings: Mapping[str, AgentSettings], ego: str) -> None:
+        self.ego = ego
+        self.seed = context.seed
+        self.specs: dict[str, ActorSpec] = {}
+        self.known: dict[str, KnownDetections] = {}
+        self._context = context
+        self._settings = settings
+
+    @property
+    def senders(self) -> list[str]:
+        """Names of the present stations that send."""
+        accepted = self._settings[self.ego].cooperates_with
+        return sorted(name for name in self.specs if name != self.ego and (accepted is None or name in accepted))
+
+    def add(self, spec: ActorSpec) -> None:
+        """Add a station that enters the world."""
+        self.specs[spec.name] = spec
+        self.known[spec.name] = KnownDetections()
+
+    def agent(self, name: str, **changes: object) -> Agent:
+        """Return an agent of a station that does not drive, with other settings."""
+        settings = self._settings[name].model_copy(update={"planner": "none", **changes})
+        context, detector = self._context, self.known[name]
+        return build_agent(settings, self.specs[name], context.roads, seed=self.seed, dt=context.dt, detector=detector)
+
+
+class Senders:
+    """Agents of all senders with one pose error and one grid of points."""
+
+    def __init__(self, crew: Crew, pose_noise: PoseNoise | None, cell: float) -> None:
+        shared = {"fusion": "early", "fusion_settings": {"cell": cell}, "cooperates_with": ()}
+        self._agents = {name: crew.agent(name, pose_noise=pose_noise, **shared) for name in crew.senders}
+
+    def messages(self, readings: Mapping[str, Readings], now: float) -> list[Message]:
+        """Return the messages of a scan, with boxes and points."""
+        return [
+            message
+            for name, agent in self._agents.items()
+            for message in agent.act(readings[name], (), now, None).outbox
+        ]
+
+
+class Receiver:
+    """Ego under one condition, with its own channel."""
+
+    def __init__(self, crew: Crew, condition: Condition) -> None:
+        arm = ARMS[condition.arm]
+        self._arm, self._every, self._ego = arm, condition.every, crew.ego
+        self._agent = crew.agent(
+            crew.ego,
+            fusion=arm.fusion,
+            fusion_settings=dict(arm.settings),
+            cooperates_with=tuple(crew.senders) if arm.cooperates else (),
+            pose_noise=condition.pose_noise,
+        )
+        channel = build_channel(load_profile(condition.channel, []), crew.seed)
+        assert channel is not None
+        self._channel = channel
+        self._scans = 0
+
+    def scan(self, readings: Readings, messages: Sequence[Message], *, sampled: bool) -> Detections:
+        """Transmit the messages of a scan, and return the objects of the ego relative to its true pose.
+
+        sampled  whether the result is used; otherwise points of the ego are not merged with others
+        """
+        now = readings.time
+        if self._arm.cooperates and (self._scans + self._every // 2) % self._every == 0:
+            sent = messages if self._arm.points else [_without_points(message) for message in messages]
+            self._channel.transmit([(message, [self._ego]) for message in sent], now)
+        self._scans += 1
+        inbox = self._channel.deliver(self._ego, now + WAIT)
+        used = readings if sampled or not self._arm.points else replace(readings, lidars={})
+        step = self._agent.act(used, inbox, now, None)
+        return step.fused if step.estimate is None else moved(step.fused, step.estimate, readings.ego)
+
+    def megabytes_per_second(self, now: float) -> float:
+        """Return the size of the sent messages per second."""
+        sent = sum(link.bytes_sent for link in self._channel.statistics(now).values())
+        return sent / now / 1e6 if now > 0.0 else 0.0
+
+
+def _without_points(message: Message) -> Message:
+    if message.points is None:
+        return message
+    return replace(message, points=None, size=message.size - message.points.size)
+
+
+def world_points(readings: Readings) -> Array:
+    """Return the points (N, 3) of all lidars of a station in the world frame."""
+    return np.concatenate(
+        [reading.points @ reading.pose[:3, :3].T + reading.pose[:3, 3] for reading in readings.lidars.values()]
+    )

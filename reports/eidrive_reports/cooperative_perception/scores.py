@@ -1,0 +1,255 @@
+"""Average precision and recall over the records of several runs, with jackknife intervals over the runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.api.common import Array, Bools, Integers, WorldView, iou_bev, points_in_box
+from eidrive_scenario.api.driving import Detections
+from eidrive_scenario.api.experiments import area_in_order, jackknife_interval, match_by_share, matching_order, wilson
+
+OVERLAPS = (0.3, 0.5, 0.7)
+"""Intersections over union in plan view from which a detection is correct."""
+RANGES = (30.0, 50.0, 100.0)
+"""Ends of the classes of the distance from the center of the ego [m]; farther objects are ignored."""
+FULL_SCORE = 65535
+ABOVE_GROUND = 0.2
+"""Points lower than this above the base of a body are those of the ground [m]."""
+_MARGIN = 0.1
+"""Growth of a body on each side, for the noise of points on its surface [m]."""
+_HIT_OVERLAP = 1
+"""Index of the overlap for the second truth: bodies that any lidar hits."""
+
+_SECOND = 3 * len(OVERLAPS)
+"""Bit of the second truth in a code."""
+
+Codes = NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Road users in a frame.
+
+    boxes   (M, 7) of all bodies except the ego, world frame
+    place   (M,) class of the distance from the ego; len(RANGES) beyond the last one
+    hit     (M,) whether a lidar of any station hits the body
+    hidden  (M,) whether the lidar of the ego does not hit it, and that of another station does
+    """
+
+    boxes: Array
+    place: Integers
+    hit: Bools
+    hidden: Bools
+
+    @property
+    def counted(self) -> Bools:
+        """Whether each body is in range (M,)."""
+        return self.place < len(RANGES)
+
+
+class Tally(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Detections of one receiver over all frames of a run.
+
+    scores    scores as 16-bit integers, best first within each frame, frames in order
+    codes     16 bits per detection, see `sample_codes`
+    hidden    number of found hidden objects, by overlap
+    megabytes_per_second  sent over all links
+    """
+
+    scores: bytes
+    codes: bytes
+    hidden: tuple[int, ...]
+    megabytes_per_second: float
+
+
+class PerceptionRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Measurement of one run: numbers of frames and objects, and the detections by condition.
+
+    objects  true objects by range; hit: by range, those that a lidar of any station hits; hidden: to the ego only
+    """
+
+    frames: int
+    objects: tuple[int, ...]
+    hit: tuple[int, ...]
+    hidden: int
+    tallies: dict[str, Tally]
+
+
+def true_objects(view: WorldView, ego: str, clouds: dict[str, Array]) -> Truth:
+    """Return the road users of a view except the ego. Masts and other objects at rest are no road users.
+
+    clouds  points (N, 3) of the lidars of each station, world frame
+    """
+    rows = [row for name, row in view.rows.items() if name != ego and view.categories[row] != "misc"]
+    boxes = view.boxes[rows].reshape(-1, 7)
+    own = _hits(boxes, clouds[ego])
+    others = np.zeros(len(boxes), dtype=bool)
+    for name, points in clouds.items():
+        if name != ego:
+            others |= _hits(boxes, points)
+    place = range_class(boxes, view.boxes[view.row(ego), :2])
+    return Truth(boxes, place, own | others, others & ~own)
+
+
+def range_class(boxes: Array, center: Array) -> Integers:
+    """Return the range class (N,) of boxes by the distance of their centers."""
+    place: Integers = np.searchsorted(np.array(RANGES), np.linalg.norm(boxes[:, :2] - center, axis=1))
+    return place
+
+
+def _hits(boxes: Array, points: Array) -> Bools:
+    """Return whether at least one point is on each body (N,), as OPV2V lists objects."""
+    found = np.zeros(len(boxes), dtype=bool)
+    for row, (x, y, z, length, width, height, yaw) in enumerate(boxes.tolist()):
+        near = points[np.abs(points[:, :2] - (x, y)).max(axis=1) < length]
+        body = (x, y, z + ABOVE_GROUND / 2.0, length + _MARGIN, width + _MARGIN, height - ABOVE_GROUND + _MARGIN, yaw)
+        found[row] = bool(points_in_box(near, np.array(body)).any())
+    return found
+
+
+def sample_codes(found: Detections, truth: Truth, center: Array) -> tuple[Codes, Codes, Integers]:
+    """Return scores and codes (N,) of detections in the true world frame, and the found hidden objects by overlap.
+
+    Code: for each overlap 1 bit for a correct detection and 2 bits for the range class, of the object of a correct
+    detection or else of the detection itself; then 1 bit for correct and 1 bit for counted with the second truth. A
+    detection beyond the last range, or of an object there, has the class len(RANGES) and does not count.
+    """
+    shares, confidence = iou_bev(found.boxes, truth.boxes), found.confidence
+    order = matching_order(shares, confidence)
+    own_place = range_class(found.boxes, center)[order]
+    codes: Codes = np.zeros(len(found), dtype=np.uint16)
+    hidden = np.zeros(len(OVERLAPS), dtype=np.int64)
+    for number, least in enumerate(OVERLAPS):
+        matches = match_by_share(shares, confidence, ~truth.counted, least)
+        rows = matches.taken[matches.correct]
+        place = np.where(matches.counted, own_place, len(RANGES))
+        place[matches.correct] = truth.place[rows]
+        codes |= _shifted(matches.correct, 3 * number) | _shifted(place, 3 * number + 1)
+        hidden[number] = np.count_nonzero(truth.hidden[rows])
+    second = match_by_share(shares, confidence, ~(truth.counted & truth.hit), OVERLAPS[_HIT_OVERLAP])
+    counted = second.counted & (second.correct | (own_place < len(RANGES)))
+    codes |= _shifted(second.correct, _SECOND) | _shifted(counted, _SECOND + 1)
+    scores = np.rint(FULL_SCORE * np.clip(confidence[order], 0.0, 1.0)).astype(np.uint16)
+    return scores, codes, hidden
+
+
+def _shifted(values: NDArray[Any], bits: int) -> Codes:
+    return (values.astype(np.uint16) << bits).astype(np.uint16)
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Average precision with its 95 % interval.
+
+    low, high  jackknife over the runs; NaN for a single one
+    local      average precision of detections in the order of the frames, sorted within a frame only
+    objects    number of true objects
+    """
+
+    value: float
+    low: float
+    high: float
+    local: float
+    objects: int
+
+
+@dataclass(frozen=True)
+class HiddenRecall:
+    """Share of the objects hidden to the ego that are found, at any score, with its 95 % interval over the runs."""
+
+    value: float
+    low: float
+    high: float
+    found: int
+    objects: int
+
+
+class Pool:
+    """Detections of one condition in all runs, frames in order."""
+
+    def __init__(self, records: Sequence[PerceptionRecord], condition: str) -> None:
+        self._records = records
+        tallies = [record.tallies[condition] for record in records]
+        self._tallies = tallies
+        codes = [np.frombuffer(tally.codes, dtype="<u2") for tally in tallies]
+        self._codes = np.concatenate(codes).astype(np.int64)
+        self._scores = np.concatenate([np.frombuffer(tally.scores, dtype="<u2") for tally in tallies]).astype(np.int64)
+        self._run = np.repeat(np.arange(len(records)), [len(part) for part in codes])
+
+    @property
+    def megabytes_per_second(self) -> float:
+        """Mean size of the sent messages per second over the runs."""
+        return float(np.mean([tally.megabytes_per_second for tally in self._tallies]))
+
+    def precision(self, overlap: int, place: int | None = None) -> Precision:
+        """Return the average precision at an overlap of OVERLAPS, in one range class or in all."""
+        places = self._codes >> (3 * overlap + 1) & 3
+        kept = places < len(RANGES) if place is None else places == place
+        objects = [_total(record.objects, place) for record in self._records]
+        return self._precision(self._codes >> (3 * overlap) & 1 == 1, kept, objects)
+
+    def precision_of_hit_objects(self) -> Precision:
+        """Return the average precision at the overlap 0.5 for objects that a lidar of any station hits."""
+        kept = self._codes >> (_SECOND + 1) & 1 == 1
+        return self._precision(self._codes >> _SECOND & 1 == 1, kept, [sum(record.hit) for record in self._records])
+
+    def _precision(self, correct: Bools, kept: Bools, objects: Sequence[int]) -> Precision:
+        local = area_in_order(correct[kept], sum(objects))
+        order = np.flatnonzero(kept)
+        order = order[np.argsort(-self._scores[order], kind="stable")]
+        right, scores, run = correct[order], self._scores[order], self._run[order]
+        value = area_in_order(right, sum(objects), scores)
+        left_out = [
+            area_in_order(right[run != number], sum(objects) - count, scores[run != number])
+            for number, count in enumerate(objects)
+        ]
+        return Precision(value, *_limits(value, left_out), local, sum(objects))
+
+    def hidden_recall(self, overlap: int) -> HiddenRecall:
+        """Return the recall of hidden objects at an overlap of OVERLAPS; NaN without such objects."""
+        pairs = [
+            (tally.hidden[overlap] if tally.hidden else 0, record.hidden)
+            for tally, record in zip(self._tallies, self._records, strict=True)
+            if record.hidden
+        ]
+        found, total = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
+        if not total:
+            return HiddenRecall(float("nan"), float("nan"), float("nan"), 0, 0)
+        value = found / total
+        left_out = [(found - part) / (total - whole) if whole < total else float("nan") for part, whole in pairs]
+        return HiddenRecall(value, *_limits(value, left_out), found, total)
+
+
+def _limits(value: float, left_out: Sequence[float]) -> tuple[float, float]:
+    """Return the limits of a value between 0 and 1 from those without each of the runs.
+
+    They are NaN for a single run, or if the value is not defined without one of the runs.
+    """
+    if len(left_out) < 2 or any(map(math.isnan, left_out)):
+        return float("nan"), float("nan")
+    if value in (0.0, 1.0):
+        # The runs do not differ, so that only their number says how rare the other outcome may be
+        share = wilson(int(value) * len(left_out), len(left_out))
+        return share.low, share.high
+    if min(left_out) > 0.0 and max(left_out) < 1.0:
+        # On this scale the limits are nearer to symmetric, and between 0 and 1
+        logits = [math.log(one / (1.0 - one)) for one in (value, *left_out)]
+        interval = jackknife_interval(logits[0], logits[1:])
+        return _share(interval.low), _share(interval.high)
+    interval = jackknife_interval(value, left_out)
+    return max(interval.low, 0.0), min(interval.high, 1.0)
+
+
+def _share(logit: float) -> float:
+    return 0.5 + 0.5 * math.tanh(0.5 * logit)
+
+
+def _total(counts: Sequence[int], place: int | None) -> int:
+    return sum(counts) if place is None else counts[place]

@@ -1,0 +1,112 @@
+"""Corner cases of the library with and without messages, and with the faults of their senders.
+
+python -m eidrive_reports.corner_cases --out reports
+
+The output is corner_cases.md, the table of docs/corner_cases.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from eidrive_reports.planner_scenes import CONTACT, EGO, SceneRun, run_of
+from eidrive_scenario.api.common import write_atomically
+from eidrive_scenario.api.experiments import Job, run_jobs
+from eidrive_scenario.api.run import RunSettings
+
+VEHICLE, UNIT = {"Participants": "vehicle"}, {"Participants": "rsu"}
+ARMS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
+    "pedestrian_parked_cars": {"parked car": VEHICLE},
+    "wrong_way_driver": {"roadside unit": UNIT},
+    "emergency_vehicle": {"ambulance": VEHICLE},
+    "tunnel_breakdown": {"truck": VEHICLE},
+    "cyclist_right_turn": {"roadside unit": UNIT},
+    "jam_end": {"last cars": VEHICLE},
+    "ghost": {
+        "roadside unit, ghost of score 1": UNIT,
+        "roadside unit, ghost of score 0.4": {**UNIT, "GhostScore": "0.4"},
+    },
+    "contradicting_senders": {
+        "right unit": UNIT,
+        "wrong unit": {"Participants": "wrong"},
+        "both units": {"Participants": "both"},
+    },
+    "wrong_clock": {
+        "roadside unit, right clock": {**UNIT, "ClockOffset": "0"},
+        "clock 0.5 s ahead": {**UNIT, "ClockOffset": "0.5"},
+        "clock 0.5 s behind": {**UNIT, "ClockOffset": "-0.5"},
+        "clock 2.4 s behind": {**UNIT, "ClockOffset": "-2.4"},
+    },
+    "jammer": {
+        "roadside unit, no jammer": {**UNIT, "JammerPower": "-30"},
+        "roadside unit, jammer of 30 dBm": UNIT,
+    },
+}
+"""Parameters by scenario and arm, in addition to the arm without messages."""
+ALONE = "none"
+"""Name of the arm without messages."""
+
+
+def jobs(scenarios: Iterable[str], seeds: Sequence[int]) -> list[Job]:
+    """Return the runs of all arms of these scenarios."""
+    found = []
+    for name in scenarios:
+        for arm, parameters in {ALONE: {"Participants": "none"}, **ARMS[name]}.items():
+            contact = {"collision": {"of": EGO, "name": CONTACT}}
+            settings = RunSettings(parameters=dict(parameters), criteria=contact)
+            found += [Job(f"corner_cases/{name}", arm, seed, settings) for seed in seeds]
+    return found
+
+
+def table(runs: Sequence[SceneRun]) -> str:
+    """Return the runs as a Markdown table, one line per scenario and arm in order of appearance."""
+    lines = [
+        "| scenario | senders | collisions | arrived | known after [s] | time lost [s] | hardest braking [m/s²] |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    before = ""
+    for scenario, arm in dict.fromkeys((run.scenario, run.planner) for run in runs):
+        mine = [run for run in runs if (run.scenario, run.planner) == (scenario, arm)]
+        free = [run for run in mine if not run.collided]
+        cells = [
+            "" if scenario == before else f"`{scenario.split('/')[-1]}`",
+            arm,
+            f"{sum(run.collided for run in mine)} of {len(mine)}",
+            f"{sum(run.arrived for run in mine)} of {len(mine)}",
+            _mean([run.detected for run in mine if run.detected is not None]),
+            _mean([run.lost for run in mine if run.arrived]),
+            f"{max(run.braking for run in free):.1f}" if free else "-",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+        before = scenario
+    return "\n".join(lines) + "\n"
+
+
+def _mean(values: Sequence[float]) -> str:
+    return f"{sum(values) / len(values):.1f}".replace("-0.0", "0.0") if values else "-"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    choices = [*ARMS, []]  # argparse compares an empty list of names with the choices, too
+    parser.add_argument("names", nargs="*", choices=choices, help="scenarios (default: all)")
+    parser.add_argument("--out", type=Path, default=Path("reports"))
+    parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 1")
+    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    chosen = jobs(options.names or ARMS, range(1, options.seeds + 1))
+    runs = run_jobs(chosen, run_of, workers=options.workers, console=Console(stderr=True), title="corner cases")
+    result = table(runs)
+    with write_atomically(options.out / "corner_cases.md") as stream:
+        stream.write(result.encode())
+    sys.stdout.write(result)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,360 @@
+"""Runs of scenarios that were written for other engines, driven by a planner: jobs, outcomes and their record."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from eidrive_scenario.api.common import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
+from eidrive_scenario.api.criteria import Criterion, Frame
+from eidrive_scenario.api.experiments import Job, definition, run_jobs
+from eidrive_scenario.api.run import (
+    Assignment,
+    ConcreteRun,
+    DistributionExpansion,
+    RunResult,
+    RunSettings,
+    Simulation,
+    load_distribution,
+    load_scenario,
+)
+
+CONTACT = "contact"
+"""Name of the criterion that judges the contacts of the vehicle."""
+WINDOW = 0.5
+"""Length of the average of the accelerations [s]."""
+STANDING = 0.1
+"""Maximum speed of a standing vehicle [m/s]."""
+DISPLACED = 5.0
+"""Time after a contact in which another one is a consequence of the first one [s]."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Standstill from `time` for `duration` [s] at x, y [m]; `reason` is the most frequent one of the plans."""
+
+    time: float
+    duration: float
+    x: float
+    y: float
+    reason: str
+
+
+class DrivenMotion:
+    """Motion of one vehicle, from frames in order.
+
+    A contact is by own fault if the criterion `contact` judges so. One within `DISPLACED` of an earlier contact does
+    not count: a vehicle that was hit is pushed against others.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self.distance = 0.0
+        """Distance covered [m]."""
+        self.stops: list[Stop] = []
+        self.contacts: list[tuple[float, bool]] = []
+        """Time [s] of each contact, and whether it is by own fault."""
+        self._times: list[float] = []
+        self._speeds: list[float] = []
+        self._place: tuple[float, float] | None = None
+        self._stopped_at: float | None = None
+        self._reasons: Counter[str] = Counter()
+
+    def observe(self, frame: Frame, criteria: Iterable[Criterion]) -> None:
+        """Add a frame, which the criteria have observed."""
+        view = frame.view
+        row = view.rows.get(self._name)
+        if row is None:
+            self._end_stop(view.time)
+            self._place = None
+            return
+        state = view.states[row]
+        if self._place is not None:
+            self.distance += float(np.hypot(state.x - self._place[0], state.y - self._place[1]))
+        self._place = (state.x, state.y)
+        self._times.append(view.time)
+        self._speeds.append(state.speed)
+        if abs(state.speed) > STANDING:
+            self._end_stop(view.time)
+        else:
+            if self._stopped_at is None:
+                self._stopped_at = view.time
+            step = frame.steps.get(self._name)
+            if step is not None and step.plan is not None:
+                self._reasons[step.plan.reason] += 1
+        if any(self._name in (contact.first, contact.second) for contact in view.contacts):
+            self._add_contacts(view.time, criteria)
+
+    def finish(self) -> None:
+        """End the stop in which the run ended."""
+        if self._times:
+            self._end_stop(self._times[-1])
+
+    def _end_stop(self, time: float) -> None:
+        if self._stopped_at is not None and self._place is not None:
+            reason = max(self._reasons, key=lambda one: self._reasons[one], default="")
+            self.stops.append(Stop(self._stopped_at, time - self._stopped_at, *self._place, reason))
+        self._stopped_at = None
+        self._reasons.clear()
+
+    def _add_contacts(self, time: float, criteria: Iterable[Criterion]) -> None:
+        metrics = next(one.metrics() for one in criteria if one.name == CONTACT)
+        count, at_fault = (int(metrics.get(f"{CONTACT}.{key}", 0.0)) for key in ("count", "at_fault"))
+        fresh = count - len(self.contacts)
+        blamed = at_fault - sum(fault for _, fault in self.contacts)
+        self.contacts += [(time, n < blamed) for n in range(fresh)]
+
+    @property
+    def collided(self) -> bool:
+        """Whether it had a contact."""
+        return bool(self.contacts)
+
+    @property
+    def at_fault(self) -> bool:
+        """Whether a contact was by its own fault and not the consequence of an earlier one."""
+        last = -np.inf
+        for time, fault in self.contacts:
+            if fault and not 0.0 < time - last < DISPLACED:
+                return True
+            last = time
+        return False
+
+    @property
+    def longest_stop(self) -> float:
+        """Duration of the longest standstill [s]."""
+        return max((stop.duration for stop in self.stops), default=0.0)
+
+    @property
+    def hardest_braking(self) -> float:
+        """Maximum mean deceleration over `WINDOW` before the first contact [m/s²]."""
+        times, speeds = np.array(self._times), np.array(self._speeds)
+        if self.contacts:
+            speeds = speeds[times < self.contacts[0][0]]
+        steps = round(WINDOW / (times[1] - times[0])) if len(times) > 1 else 0
+        if not 0 < steps < len(speeds):
+            return 0.0
+        return float(max((speeds[:-steps] - speeds[steps:]).max() / WINDOW, 0.0))
+
+
+def observed_run(
+    scenario: str | Path, vehicle: str, *, seed: int, settings: RunSettings
+) -> tuple[RunResult, DrivenMotion]:
+    """Run a scenario and return its result and the motion of a vehicle."""
+    motion = DrivenMotion(vehicle)
+    with Simulation(scenario, seed=seed, settings=settings) as simulation:
+        end = None
+        while end is None:
+            frame, end = simulation.tick()
+            motion.observe(frame, simulation.criteria)
+        result = simulation.result()
+    motion.finish()
+    return result, motion
+
+
+Case = tuple[str, str, int, int, str]
+"""Group, file, number of the run in its distribution, seed and planner."""
+STACK, REFERENCE = "stack", "reference"
+DEFAULT = "behavior"
+"""Planner of the stack if none is given."""
+ORACLE = {"detector": "oracle", "mount": "roof", "range": 150}
+"""Perception of the driven vehicle."""
+TIME_LIMIT = 60.0
+"""Maximum simulated time of a run [s]."""
+DRAWS = 20
+"""Maximum number of combinations that are drawn per requested sample: each is read, and all may violate constraints."""
+
+
+@dataclass(frozen=True)
+class DrivenJob(Job):
+    """Run of the scenario of `file` in which `drive` is judged; `number` is that of the run in its distribution."""
+
+    file: str
+    number: int
+    drive: str
+    group: str = ""
+    planner: str = DEFAULT
+
+    @property
+    def case(self) -> Case:
+        """Identity of the run except for its arm."""
+        return self.group, self.file, self.number, self.seed, self.planner
+
+
+@dataclass(frozen=True)
+class DrivenRun:
+    """Outcome of one run of an arm: `stack` or `reference`.
+
+    file, number  file, and number of the run in its distribution
+    at_fault      whether a contact was by own fault
+    failed        criteria of the file that failed;  judged  number of its criteria
+    distance      distance that the entity covered [m];  duration  simulated time [s]
+    stop          longest standstill [s];  braking  maximum deceleration before a contact [m/s²]
+    unstarted     warnings about acts and events that never started
+    error         message of a run without a result, else ""
+    planner       planner of the stack, also of that with which the reference driver is compared
+    excluded      whether the values violate the constraints of a parameter, so that the run is not evaluated
+    """
+
+    file: str
+    number: int
+    arm: str
+    seed: int
+    parameters: dict[str, str] = field(default_factory=dict)
+    collided: bool = False
+    at_fault: bool = False
+    failed: tuple[str, ...] = ()
+    judged: int = 0
+    distance: float = 0.0
+    duration: float = 0.0
+    stop: float = 0.0
+    braking: float = 0.0
+    unstarted: tuple[str, ...] = ()
+    error: str = ""
+    excluded: bool = False
+    group: str = ""
+    planner: str = DEFAULT
+
+    @property
+    def case(self) -> Case:
+        """Identity of the run except for its arm."""
+        return self.group, self.file, self.number, self.seed, self.planner
+
+
+def jobs_of_file(
+    path: Path, drive: str, planner: str, samples: int, reference: dict[str, str] | None, *, group: str = ""
+) -> Iterator[DrivenJob]:
+    """Yield the jobs of a file: of each run one with the stack, and one with the reference driver if there is one.
+
+    group  name that distinguishes files of the same name in a record
+    """
+    for number, scenario, parameters in _runs(path, samples):
+        contact = {"collision": {"of": drive, "name": CONTACT}}
+        common = {"criteria": contact, "parameters": parameters, "time_limit": TIME_LIMIT}
+        arms = {STACK: RunSettings(drive={drive: {**ORACLE, "planner": planner}}, **common)}  # type: ignore[arg-type]
+        if reference is not None:
+            arms[REFERENCE] = RunSettings(controllers=reference, **common)  # type: ignore[arg-type]
+        for arm, settings in arms.items():
+            yield DrivenJob(str(scenario), arm, 1, settings, path.name, number, drive, group, planner)
+
+
+def _runs(path: Path, samples: int) -> Iterator[tuple[int, Path, dict[str, str | Assignment]]]:
+    if definition(path) != "distribution":
+        yield 0, path, {}
+        return
+    runs = load_distribution(path)
+    for number in selected_runs(runs, samples):
+        yield number, runs[number].scenario, dict(runs[number].assignments)
+
+
+def selected_runs(runs: DistributionExpansion, samples: int) -> list[int]:
+    """Return the ascending numbers of the first `samples` runs of a spread whose values satisfy all constraints.
+
+    They are fewer if the distribution is exhausted, or after DRAWS combinations per sample. A larger number of samples
+    adds runs to those of a smaller one. A run with another error is selected, as its outcome is that error.
+    """
+    drawn = (runs[number] for number in itertools.islice(runs.draws(), DRAWS * samples))
+    return sorted(run.number for run in itertools.islice(filter(_satisfies_constraints, drawn), samples))
+
+
+def _satisfies_constraints(run: ConcreteRun) -> bool:
+    try:
+        load_scenario(run.scenario, run.assignments)
+    except ConstraintError:
+        return False
+    except InputError:
+        return True
+    return True
+
+
+def run_of(job: DrivenJob) -> DrivenRun:
+    """Run a job and return its outcome."""
+    values = {
+        name: value.text if isinstance(value, Assignment) else value for name, value in job.settings.parameters.items()
+    }
+    run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group, planner=job.planner)
+    try:
+        result, motion = observed_run(job.scenario, job.drive, seed=job.seed, settings=job.settings)
+    except ConstraintError:
+        return replace(run, excluded=True)
+    except EidriveError as error:
+        return replace(run, error=str(error).splitlines()[0].replace(f"{Path(job.scenario).parent}{os.sep}", ""))
+    own = [verdict for verdict in result.criteria if verdict.name != CONTACT]
+    return replace(
+        run,
+        collided=motion.collided,
+        at_fault=motion.at_fault,
+        failed=tuple(verdict.name for verdict in own if not verdict.passed),
+        judged=len(own),
+        distance=motion.distance,
+        duration=result.simulated_s,
+        stop=motion.longest_stop,
+        braking=motion.hardest_braking,
+        unstarted=tuple(warning for warning in result.warnings if " never started" in warning),
+    )
+
+
+def read_record(record: Path) -> list[DrivenRun]:
+    """Return the runs of a record; none if it does not exist.
+
+    An incomplete last line, as a killed process leaves it, is none. Raise SettingError if any other line is invalid.
+    """
+    runs = []
+    for number, line in enumerate(_complete_lines(record).splitlines(), 1):
+        try:
+            row = json.loads(line)
+            runs.append(DrivenRun(**{**row, **{key: tuple(row[key]) for key in ("failed", "unstarted")}}))
+        except (ValueError, TypeError, KeyError) as error:
+            hint = "remove the line, or start again without --resume"
+            raise SettingError(Diagnostic(f"the record is damaged: {error}", hint, str(record), number)) from error
+    return runs
+
+
+def _complete_lines(record: Path) -> bytes:
+    content = record.read_bytes() if record.is_file() else b""
+    return content[: content.rfind(b"\n") + 1]
+
+
+def run_recorded(
+    jobs: Sequence[DrivenJob], record: Path, *, workers: int | None, console: Console, title: str
+) -> list[DrivenRun]:
+    """Return the runs of all jobs; those of the reference driver where the stack has a contact by own fault only.
+
+    Runs of the record are not repeated; new ones are added to it. Raise SettingError if the record is damaged.
+    """
+    runs = {(*run.case, run.arm): run for run in read_record(record)}
+    stacks = [job for job in jobs if job.arm == STACK]
+    _add_runs(stacks, runs, record, workers=workers, console=console, title=title)
+    compared = {job.case for job in stacks if runs[(*job.case, STACK)].at_fault}
+    references = [job for job in jobs if job.arm == REFERENCE and job.case in compared]
+    _add_runs(references, runs, record, workers=workers, console=console, title=f"{title}, reference")
+    return [run for job in jobs if (run := runs.get((*job.case, job.arm))) is not None]
+
+
+def _add_runs(
+    jobs: Sequence[DrivenJob],
+    runs: dict[tuple[*Case, str], DrivenRun],
+    record: Path,
+    *,
+    workers: int | None,
+    console: Console,
+    title: str,
+) -> None:
+    """Add the runs of jobs that are missing to `runs` and to the record."""
+    left = [job for job in jobs if (*job.case, job.arm) not in runs]
+    with record.open("ab") as lines:
+        lines.truncate(len(_complete_lines(record)))
+
+        def add(run: DrivenRun) -> None:
+            lines.write(json.dumps(asdict(run), ensure_ascii=False).encode() + b"\n")
+            lines.flush()
+            runs[(*run.case, run.arm)] = run
+
+        run_jobs(left, run_of, workers=workers, console=console, title=title, finished=add)

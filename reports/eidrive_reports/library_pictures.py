@@ -1,0 +1,180 @@
+"""Pictures of the scenarios of the library, and their table in README.md.
+
+`python -m eidrive_reports.library_pictures` in the checkout runs each scenario once, and draws its actors
+and their paths from above.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from html import escape
+from pathlib import Path
+
+import cv2
+import numpy as np
+import typer
+
+from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, write_atomically
+from eidrive_scenario.api.experiments import LibraryScenario, describe_scenarios
+from eidrive_scenario.api.pages import Canvas, Image, RoadDrawing, Window, house_outline, road_drawing
+from eidrive_scenario.api.run import Simulation, buildings
+
+EGO, SENDER, OTHER, WALKER, TRAFFIC = "#2563eb", "#ea580c", "#334155", "#dc2626", "#94a3b8"
+"""Colors of the ego, stations that send messages, other vehicles, pedestrians, and background traffic."""
+MARGIN = 8.0
+"""Distance of the shown actors from the edge of the picture [m]."""
+LEAST_WIDTH = 60.0
+"""Minimum width of the section that is shown [m]."""
+
+
+@dataclass
+class RunPaths:
+    """Boxes (7,) of the actors at their first frame, and their positions (N, 2) over time, by name."""
+
+    boxes: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    paths: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+
+    def add(self, names: Sequence[str], boxes: Sequence[Sequence[float]]) -> None:
+        """Append one frame; positions closer than half a meter to the last one are omitted."""
+        for name, box in zip(names, boxes, strict=True):
+            self.boxes.setdefault(name, tuple(box))
+            path = self.paths.setdefault(name, [])
+            if not path or np.hypot(box[0] - path[-1][0], box[1] - path[-1][1]) >= 0.5:
+                path.append((box[0], box[1]))
+
+
+def run_picture(
+    run: RunPaths,
+    roads: RoadDrawing,
+    colors: Mapping[str, str],
+    *,
+    size: tuple[int, int] = (480, 300),
+) -> Image:
+    """Return the picture (height, width, 3) in the channel order of OpenCV.
+
+    colors  color by actor; the last one is drawn on top, and its path is inside the section that is shown. Actors
+            without a color belong to the background traffic: they have no path and do not determine that section
+    size    width and height [pixels]
+    """
+    window = _window(run, colors, size[0] / size[1])
+    canvas = Canvas(window, size)
+    canvas.roads(roads)
+    for name, color in colors.items():
+        path = run.paths.get(name, ())
+        if len(path) > 1:
+            canvas.line(path, color, 0.45)
+    for name in [*(other for other in run.boxes if other not in colors), *colors]:
+        if name in run.boxes:
+            canvas.body(run.boxes[name], colors.get(name, TRAFFIC))
+    return canvas.image
+
+
+def _window(run: RunPaths, colors: Mapping[str, str], ratio: float) -> Window:
+    """Return the section with the actors and the path of the last one, in the ratio of width to height."""
+    points = [box[:2] for name, box in run.boxes.items() if name in colors]
+    points += run.paths.get(next(reversed(list(colors)), ""), [])
+    found = Window.enclosing(points or [(0.0, 0.0)], MARGIN)
+    width, height = found.right - found.left, found.top - found.bottom
+    shown = max(width, ratio * height, LEAST_WIDTH)
+    wider, higher = (shown - width) / 2.0, (shown / ratio - height) / 2.0
+    return Window(found.left - wider, found.right + wider, found.bottom - higher, found.top + higher)
+
+
+BEGIN, END = "<!-- library: begin -->\n", "<!-- library: end -->\n"
+"""Lines of the README around the table."""
+FOLDER = "docs/library"
+"""Folder of the pictures in the checkout."""
+COLUMNS = 3
+"""Scenarios in a row of the table."""
+EGO_NAME = "Ego"
+"""Name of the ego in the scenarios of the library."""
+
+
+def picture(name: str, *, seed: int = 1) -> Image:
+    """Run a scenario of the library and return its picture."""
+    run = RunPaths()
+    with Simulation(name, seed=seed) as simulation:
+        frame, end = simulation.tick()
+        categories = dict(zip(frame.view.names, frame.view.categories, strict=True))
+        stations = set(frame.steps)
+        while end is None:
+            run.add(frame.view.names, frame.view.plain_boxes)
+            frame, end = simulation.tick()
+        entities, roads = simulation.scenario.entities, simulation.roads
+    colors = {
+        entity: SENDER if entity in stations else WALKER if categories.get(entity) == "pedestrian" else OTHER
+        for entity in entities
+        if entity != EGO_NAME
+    }
+    if roads is None:
+        return run_picture(run, RoadDrawing(), {**colors, EGO_NAME: EGO})
+    houses = tuple((house_outline(house), house.size[2]) for house in buildings(roads, without=entities))
+    drawing = replace(road_drawing(roads.roads.values()), houses=houses)
+    return run_picture(run, drawing, {**colors, EGO_NAME: EGO})
+
+
+def file_name(scenario: LibraryScenario) -> str:
+    """Return the name of the file of a picture."""
+    return scenario.name.replace("/", "_") + ".png"
+
+
+def table(scenarios: Sequence[LibraryScenario]) -> str:
+    """Return the table of the scenarios with their pictures, one heading per family."""
+    lines: list[str] = []
+    for family in dict.fromkeys(scenario.family for scenario in scenarios):
+        members = [scenario for scenario in scenarios if scenario.family == family]
+        lines += [f"### `xosc/{family}`", "", "<table>"]
+        for first in range(0, len(members), COLUMNS):
+            cells = "".join(
+                f'<td width="{100 // COLUMNS}%"><img src="{FOLDER}/{file_name(each)}" alt="{escape(each.name)}"><br>'
+                f"<code>{escape(each.name)}</code>: {escape(each.description)}</td>\n"
+                for each in members[first : first + COLUMNS]
+            )
+            lines.append(f"<tr>\n{cells}</tr>")
+        lines += ["</table>", ""]
+    return "\n".join(lines)
+
+
+def with_table(readme: str, scenarios: Sequence[LibraryScenario]) -> str:
+    """Return the README with the current table. Raise SettingError if the lines around the table are missing."""
+    before, begin, rest = readme.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise SettingError(Diagnostic(f"the lines {BEGIN.strip()} and {END.strip()} are missing", "", "README.md"))
+    return f"{before}{BEGIN}\n{table(scenarios)}\n{END}{after}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the pictures and the table. Return 0, or 2 if an input is invalid or a file cannot be written."""
+    parser = argparse.ArgumentParser(description="Draw the scenarios of the library, and update their table.")
+    parser.add_argument("names", nargs="*", help="scenarios to draw, such as coop/scenario_1 (default: all)")
+    parser.add_argument("--root", type=Path, default=Path(), help="folder with README.md")
+    options = parser.parse_args(arguments)
+    scenarios = describe_scenarios()
+    unknown = set(options.names) - {scenario.name for scenario in scenarios}
+    if unknown:
+        parser.error(f"no scenario {min(unknown)!r} in the library")
+    try:
+        for scenario in scenarios:
+            if options.names and scenario.name not in options.names:
+                continue
+            path = options.root / FOLDER / file_name(scenario)
+            _, encoded = cv2.imencode(".png", picture(scenario.name), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+            with write_atomically(path) as stream:
+                stream.write(encoded.tobytes())
+            typer.echo(f"wrote {path}")
+        readme = options.root / "README.md"
+        text = with_table(readme.read_text(encoding="utf-8"), scenarios)
+        with write_atomically(readme) as stream:
+            stream.write(text.encode())
+    except (InputError, OSError) as error:
+        typer.echo(str(error), err=True)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

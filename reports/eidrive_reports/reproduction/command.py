@@ -1,0 +1,85 @@
+"""Command `eidrive reproduce`, which the engine finds by its entry point."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def reproduce(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="PART",
+            help="table2, table3, detection, pipeline, ei, sensitivity, channels, perception, or all.",
+            show_default="all",
+        ),
+    ] = None,
+    episodes: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=10_000,
+            help="Episodes of each cell, with seeds from 1.",
+            show_default="table2: 20, table3: 40, sensitivity: 3, channels: 10, perception: 4, else 5",
+        ),
+    ] = None,
+    detectors: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="the paper's; table3: oracle"),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the tables and of the records of all runs.")] = Path(
+        "reports/paper"
+    ),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes.", show_default="number of cores")
+    ] = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Repeat the runs of the record, too; without it they are kept.")
+    ] = False,
+    replays: Annotated[
+        bool,
+        typer.Option(
+            "--replays", help="Also write a replay of each arm with seed 1 (table2, table3, detection, pipeline, ei)."
+        ),
+    ] = False,
+) -> None:
+    """Reproduce the experiments of the EI-Drive paper, and write reports with its numbers beside the measured ones.
+
+    Example: eidrive reproduce table2 --episodes 5 --out reports/paper
+    """
+    from rich.console import Console
+
+    from eidrive_reports.reproduction.figures import draw
+    from eidrive_reports.reproduction.page import write_paper_page, write_part_replays
+    from eidrive_reports.reproduction.parts import ALL, selected_detectors, selected_parts
+    from eidrive_reports.reproduction.reproduce import reproduce as reproduce_part
+
+    names = [] if detectors is None else [name.strip() for name in detectors.split(",")]
+    chosen = [(part, selected_detectors(part, names)) for part in selected_parts(parts or [ALL])]
+    for part, used in chosen:
+        done = reproduce_part(
+            part,
+            out,
+            episodes=episodes or part.episodes,
+            detectors=used,
+            workers=workers,
+            restart=restart,
+            console=Console(stderr=True),
+        )
+        draw(part.name, done.report, out)
+        if replays and part.has_replays:
+            written = write_part_replays(part, out, used, workers=workers, console=Console(stderr=True))
+            typer.echo(f"{part.name}: wrote {written}")
+        elif replays:
+            typer.echo(f"{part.name}: --replays has no effect on this part", err=True)
+        page = write_paper_page(out)
+        kept = len(done.episodes) - done.added
+        typer.echo(
+            f"{part.name}: {done.added} runs in {done.elapsed_s:.0f} s, {kept} from the record; all "
+            f"{len(done.episodes)} took {done.computed_s:.0f} s of one process; wrote {out / part.name}.md and {page}"
+        )
+        if done.unused:
+            typer.echo(f"{part.name}: {done.unused} runs of the record have other settings, seeds or code", err=True)

@@ -1,0 +1,382 @@
+"""Figures of the parts: measured values with 95 % intervals beside those of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from eidrive_reports.paper import COUNTS, TABLE_2
+from eidrive_reports.reproduction.layout import PartReport, Row, distinct, limits, number, scenario_title
+from eidrive_reports.reproduction.sensitivity import LIBRARY, ORIGINAL
+from eidrive_scenario.api.common import write_atomically
+from eidrive_scenario.api.pages import heat_cells
+
+FAULT_COLORS = {"independent": "#0072b2", "bursty": "#d55e00", "radio": "#009e73"}
+"""Colors of Okabe and Ito, which color-blind readers can distinguish."""
+MARKERS = {"independent": "o", "bursty": "s", "radio": "^"}
+
+
+def channels_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
+    """Draw success over latency and over received messages by scenario and planner, and the effects of the load."""
+    faults, loads = data["channels"], data["channels_load"]
+    places = list(dict.fromkeys((str(row["scenario"]), str(row["planner"])) for row in faults))
+    figure = Figure(figsize=(3.4 * len(places) + 0.6, 8.4), layout="constrained")
+    panels = figure.subplots(3, len(places), squeeze=False)
+    for (scenario, planner), column in zip(places, panels.T, strict=True):
+        mine = [row for row in faults if (row["scenario"], row["planner"]) == (scenario, planner)]
+        _latency(column[0], mine)
+        _losses(column[1], mine)
+        column[0].set_title(f"{scenario_title(scenario)}, {planner}", fontsize=9)
+    for axes in panels[:2, 0]:
+        axes.set_ylabel("share of runs without a collision", fontsize=8)
+    panels[0, 0].legend(fontsize=7, loc="upper right")
+    panels[1, 0].legend(fontsize=7, loc="upper left")
+    _load(panels[2], loads)
+    for axes in panels.ravel():
+        axes.tick_params(labelsize=7)
+    return figure
+
+
+def _latency(axes: Axes, rows: Sequence[Row]) -> None:
+    line = [row for row in rows if row["fault"] == "latency"]
+    _rate_curve(axes, [number(row, "value") for row in line], line, "#0072b2", "o", "latency, 95 %")
+    _without_messages(axes, rows)
+    axes.set_xlabel("latency [s]", fontsize=8)
+
+
+def _losses(axes: Axes, rows: Sequence[Row]) -> None:
+    for fault, color in FAULT_COLORS.items():
+        line = sorted((row for row in rows if row["fault"] == fault), key=lambda row: number(row, "reception"))
+        _rate_curve(axes, [number(row, "reception") for row in line], line, color, MARKERS[fault], fault)
+    _without_messages(axes, rows)
+    axes.set_xlabel("received share of the messages", fontsize=8)
+
+
+def _rate_curve(axes: Axes, at: Sequence[float], rows: Sequence[Row], color: str, marker: str, label: str) -> None:
+    low, share, high = ([number(row, name) for row in rows] for name in ("low", "share", "high"))
+    axes.fill_between(at, low, high, color=color, alpha=0.15, lw=0)
+    axes.plot(at, share, marker=marker, color=color, ms=4, lw=1, label=label)
+    axes.set_ylim(-0.03, 1.03)
+
+
+def _without_messages(axes: Axes, rows: Sequence[Row]) -> None:
+    (row,) = (row for row in rows if row["fault"] == "none")
+    axes.axhline(number(row, "share"), color="black", lw=0.8, ls="--", label="no cooperation")
+
+
+def _load(panels: Sequence[Axes], rows: Sequence[Row]) -> None:
+    """Draw busy ratio and received share, age of information, and success over the number of stations."""
+    busy, age, success = panels[:3]
+    for (access, color), marker in zip(
+        zip(distinct(rows, "access"), ("#0072b2", "#d55e00"), strict=False), "os", strict=False
+    ):
+        mine = [row for row in rows if row["access"] == access]
+        at = [number(row, "stations") for row in mine]
+        busy.plot(at, [number(row, "busy") for row in mine], marker=marker, color=color, ms=4, lw=1, label=access)
+        received = [number(row, "reception") for row in mine]
+        busy.plot(at, received, marker=marker, mfc="none", color=color, ms=4, lw=1, ls=":")
+        age.plot(at, [number(row, "age") for row in mine], marker=marker, color=color, ms=4, lw=1, label="mean")
+        late = [number(row, "p95_age") for row in mine]
+        age.plot(at, late, marker=marker, mfc="none", color=color, ms=4, lw=1, ls=":", label="95 % of the time below")
+        _rate_curve(success, at, mine, color, marker, access)
+    busy.set_ylabel("busy ratio (solid), received (dotted)", fontsize=8)
+    age.set_ylabel("age of information [s]", fontsize=8)
+    success.set_ylabel("share of runs without a collision", fontsize=8)
+    busy.legend(fontsize=7)
+    age.legend(fontsize=6)
+    busy.set_ylim(-0.03, 1.03)
+    age.set_ylim(bottom=0.0)
+    for axes in panels:
+        axes.set_xlabel("stations, scenario 1", fontsize=8)
+
+
+MAP_COLORS = "YlOrBr"
+"""Color map of the probability of a collision, from 0 (light) to 1 (dark); color-blind readers can distinguish it."""
+MARKS = (("s", "start of EI-Drive", ORIGINAL), ("o", "start of the library", LIBRARY))
+"""Marks on the maps: symbol, label and places."""
+PAPER_LATENCY = 0.3
+"""Latency of the arm `latency` of the paper [s]."""
+
+
+def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
+    """Draw one map per planner, scenario and arm, and the curve over the latency beside them."""
+    cells, curve = data["sensitivity"], data["sensitivity_latency"]
+    arms = list(dict.fromkeys(str(row["arm"]) for row in cells))
+    lines = list(dict.fromkeys((str(row["planner"]), str(row["scenario"])) for row in cells))
+    figure = Figure(figsize=(2.1 * len(arms) + 3.6, 2.7 * len(lines)), layout="constrained")
+    panels = figure.subplots(len(lines), len(arms) + 1, squeeze=False, width_ratios=[1.0] * len(arms) + [1.5])
+    for (planner, scenario), line in zip(lines, panels, strict=True):
+        for arm, axes in zip(arms, line[:-1], strict=True):
+            mine = [row for row in cells if (row["planner"], row["scenario"], row["arm"]) == (planner, scenario, arm)]
+            image = _map(axes, mine)
+            _marks(axes, scenario)
+            axes.set_title(f"{scenario_title(scenario)}, {arm}", fontsize=8)
+            axes.tick_params(labelsize=7, labelleft=arm == arms[0])
+        line[0].set_ylabel(f"{planner}\nspeed of the ego [m/s]", fontsize=8)
+        _latency_curve(line[-1], [row for row in curve if (row["planner"], row["scenario"]) == (planner, scenario)])
+        line[-1].set_title(f"{scenario_title(scenario)}, start of the library", fontsize=8)
+    for axes in panels[-1][:-1]:
+        axes.set_xlabel("start of the hidden car [m]", fontsize=7)
+    panels[-1][-1].set_xlabel("latency [s]", fontsize=8)
+    panels[0][0].legend(fontsize=6, loc="upper left")
+    figure.colorbar(image, ax=list(panels[:, :-1].ravel()), pad=0.01).set_label(
+        "share of runs with a collision", fontsize=8
+    )
+    return figure
+
+
+def _map(axes: Axes, rows: Sequence[Row]) -> QuadMesh:
+    starts, speeds = (sorted({number(row, name) for row in rows}) for name in ("start", "speed"))
+    shares = np.full((len(speeds), len(starts)), np.nan)
+    for row in rows:
+        place = speeds.index(number(row, "speed")), starts.index(number(row, "start"))
+        shares[place] = number(row, "collisions") / number(row, "episodes")
+    return heat_cells(axes, starts, speeds, shares, colors=MAP_COLORS, scale=Normalize(0.0, 1.0), line=0.0)
+
+
+def _marks(axes: Axes, scenario: str) -> None:
+    for symbol, label, places in MARKS:
+        start, speed = places[scenario]
+        axes.plot(start, speed, symbol, ms=5, mfc="none", mec="black", label=label)
+
+
+def _latency_curve(axes: Axes, rows: Sequence[Row]) -> None:
+    latency, low, share, high = ([number(row, name) for row in rows] for name in ("latency", "low", "share", "high"))
+    axes.fill_between(latency, low, high, color="#0b6e99", alpha=0.2, lw=0)
+    axes.plot(latency, share, "o-", color="#0b6e99", ms=3, lw=1)
+    axes.axvline(PAPER_LATENCY, color="black", lw=0.8, ls="--")
+    axes.set_ylim(-0.03, 1.03)
+    axes.tick_params(labelsize=7)
+
+
+ARM_COLORS = {
+    "none": "#6b7280",
+    "average": "#c2410c",
+    "covariance_intersection": "#0b6e99",
+    "early": "#15803d",
+}
+"""Color of each arm."""
+UNITS = {"pose error": "pose error [m], and 1° at 0.6 m", "pose drift": "pose drift [m], and 1° at 0.6 m"}
+UNITS |= {"latency": "latency [s]", "loss": "share of lost messages"}
+OVERLAPS = (0.5, 0.7)
+HIDDEN_AXES = ("pose error", "loss")
+
+
+def perception_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
+    """Draw the curves over each axis at two overlaps, then range, hidden objects and volume."""
+    curves, hidden, volumes = data["perception"], data["perception_hidden"], data["perception_volume"]
+    axes_names = list(dict.fromkeys(str(row["axis"]) for row in curves))
+    figure = Figure(figsize=(3.4 * len(axes_names), 9.0), layout="constrained")
+    panels = figure.subplots(len(OVERLAPS) + 1, len(axes_names), squeeze=False)
+    for overlap, line in zip(OVERLAPS, panels, strict=False):
+        mine = [row for row in curves if row["range"] == "all" and row["iou"] == overlap]
+        top = 1.05 * max(limits(mine, "ap")[1])
+        for name, axes in zip(axes_names, line, strict=True):
+            _curves(axes, [row for row in mine if row["axis"] == name], "ap")
+            axes.set_xlabel(UNITS.get(name, name), fontsize=8)
+            axes.set_ylim(0.0, top)
+        line[0].set_ylabel(f"average precision at {overlap:g}", fontsize=8)
+    panels[0][0].legend(fontsize=7)
+    last = panels[-1]
+    _ranges(last[0], [row for row in curves if row["axis"] == "latency" and row["value"] == 0.0])
+    for name, axes in zip(HIDDEN_AXES, last[1:], strict=False):
+        _curves(axes, [row for row in hidden if row["axis"] == name and row["iou"] == OVERLAPS[0]], "recall")
+        axes.set_xlabel(UNITS[name], fontsize=8)
+        axes.set_ylabel("recall of hidden objects at 0.5", fontsize=8)
+        axes.set_ylim(0.0, 1.0)
+    _volumes(last[3], volumes)
+    for axes in panels.ravel():
+        axes.tick_params(labelsize=7)
+        axes.grid(alpha=0.3, lw=0.5)
+    return figure
+
+
+def _curves(axes: Axes, rows: Sequence[Row], name: str) -> None:
+    """Draw one curve per arm with its interval."""
+    for arm, color in ARM_COLORS.items():
+        mine = [row for row in rows if row["arm"] == arm]
+        at, middle = ([number(row, field) for row in mine] for field in ("value", name))
+        axes.fill_between(at, *limits(mine, name), color=color, alpha=0.12, lw=0)
+        axes.plot(at, middle, "o-", color=color, ms=3, lw=1.2, label=f"{arm}, 95 %")
+
+
+def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
+    """Draw the average precision by range and arm."""
+    mine = [row for row in rows if row["iou"] == OVERLAPS[0] and row["range"] != "all"]
+    places = list(dict.fromkeys(str(row["range"]) for row in mine))
+    width = 0.8 / len(ARM_COLORS)
+    for place, (arm, color) in enumerate(ARM_COLORS.items()):
+        some = [row for row in mine if row["arm"] == arm]
+        at = [places.index(str(row["range"])) + width * (place - (len(ARM_COLORS) - 1) / 2) for row in some]
+        values = [number(row, "ap") for row in some]
+        errors = [[abs(end - value) for value, end in zip(values, ends, strict=True)] for ends in limits(some, "ap")]
+        axes.bar(at, values, width, color=color, yerr=errors, error_kw={"lw": 0.8})
+    axes.set_xticks(range(len(places)), labels=places)
+    axes.set_xlabel("distance from the ego, without faults", fontsize=8)
+    axes.set_ylabel(f"average precision at {OVERLAPS[0]:g}", fontsize=8)
+
+
+def _volumes(axes: Axes, rows: Sequence[Row]) -> None:
+    """Draw the average precision over the size of the messages; the ego alone is a horizontal line."""
+    for arm, color in ARM_COLORS.items():
+        mine = sorted((row for row in rows if row["arm"] == arm), key=lambda row: number(row, "megabytes_per_second"))
+        for overlap, style in zip(OVERLAPS, ("o-", "s--"), strict=True):
+            values = [number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
+            if arm == "none":
+                axes.axhline(values[0], color=color, lw=1, ls=style[1:])
+                continue
+            at = [number(row, "megabytes_per_second") for row in mine]
+            label = f"at {overlap:g}" if arm == "early" else None
+            axes.plot(at, values, style, color=color, ms=3, lw=1.2, label=label)
+    axes.set_xscale("log")
+    axes.set_xlabel("all messages [MB/s]", fontsize=8)
+    axes.set_ylabel("average precision", fontsize=8)
+    axes.legend(fontsize=7)
+
+
+ORDERED_COLORS = ("#0b6e99", "#c2410c")
+PAPER = "#111827"
+"""Color of the values of the paper."""
+PaperRows = Mapping[str, Sequence[Row]]
+
+
+def table_2_figure(data: PaperRows) -> Figure:
+    """Draw the means of the minimum distance by arm: one panel per planner and column of the paper."""
+    rows = data["table2"]
+    planners, arms, rules = (distinct(rows, name) for name in ("planner", "arm", "channel"))
+    columns = list(dict.fromkeys((str(row["scenario"]), str(row["detector"])) for row in rows))
+    figure = Figure(figsize=(2.9 * len(columns) + 1.2, 3.2 * len(planners)), layout="constrained")
+    panels = figure.subplots(len(planners), len(columns), sharex=True, sharey="row", squeeze=False)
+    for planner, line in zip(planners, panels, strict=True):
+        for (scenario, detector), axes in zip(columns, line, strict=True):
+            mine = _select(rows, planner=planner, scenario=scenario, detector=detector)
+            for shift, (rule, color) in enumerate(zip(rules, ORDERED_COLORS, strict=False)):
+                some = _select(mine, channel=rule)
+                _points(axes, [arms.index(str(row["arm"])) - 0.2 + 0.2 * shift for row in some], some, color, rule)
+            _paper_points(axes, arms, scenario, detector)
+            axes.set_title(f"{scenario_title(scenario)}, {detector}\n{planner}", fontsize=9)
+            axes.set_xticks(range(len(arms)), labels=arms, fontsize=8, rotation=20)
+        line[0].set_ylabel("minimum distance of centers [m]", fontsize=8)
+    panels[0][0].legend(fontsize=7)
+    return figure
+
+
+def _paper_points(axes: Axes, arms: Sequence[str], scenario: str, detector: str) -> None:
+    """Draw mean, standard deviation and the episodes of the paper."""
+    for place, arm in enumerate(arms):
+        published = TABLE_2[scenario, detector, arm]
+        at = place + 0.25
+        label = "paper: mean ± sd, episodes" if place == 0 else None
+        _paper_values(axes, [at], [published.mean], [published.sd], label)
+        axes.plot([at + 0.12] * len(published.episodes), published.episodes, "_", ms=5, color=PAPER, alpha=0.5)
+
+
+def _paper_values(
+    axes: Axes, at: Sequence[float], values: Sequence[float], spread: Sequence[float], label: str | None
+) -> None:
+    """Draw values of the paper with their standard deviations."""
+    axes.errorbar(at, values, yerr=spread, fmt="D", ms=5, mfc="none", color=PAPER, capsize=2, lw=1, label=label)
+
+
+def table_3_figure(data: PaperRows) -> Figure:
+    """Draw the success rates by senders: one panel per scenario and detector."""
+    rows = data["table3"]
+    scenarios, detectors, senders = (distinct(rows, name) for name in ("scenario", "detector", "senders"))
+    figure = Figure(figsize=(2.6 * len(scenarios) + 1.0, 3.0 * len(detectors)), layout="constrained")
+    panels = figure.subplots(len(detectors), len(scenarios), sharex=True, sharey=True, squeeze=False)
+    for detector, line in zip(detectors, panels, strict=True):
+        for scenario, axes in zip(scenarios, line, strict=True):
+            mine = _select(rows, scenario=scenario, detector=detector)
+            at = [senders.index(str(row["senders"])) for row in mine]
+            low, rate, high = ([number(row, name) for row in mine] for name in ("rate_low", "rate", "rate_high"))
+            _interval(axes, [place - 0.1 for place in at], low, rate, high, ORDERED_COLORS[0], "measured, 95 %")
+            paper, spread = ([number(row, name) for row in mine] for name in ("paper_rate", "paper_rate_sd"))
+            _paper_values(axes, [place + 0.1 for place in at], paper, spread, "paper ± sd")
+            axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
+            axes.set_xticks(range(len(senders)), labels=senders, fontsize=8)
+            axes.set_xlim(-0.5, len(senders) - 0.5)
+            axes.set_ylim(-0.05, 1.05)
+        line[0].set_ylabel("share of runs without a collision", fontsize=8)
+    panels[0][0].legend(fontsize=7, loc="lower left")
+    return figure
+
+
+def detection_figure(data: PaperRows) -> Figure:
+    """Draw the moving averages of the counts over time, with and without cooperation: one panel per column."""
+    rows = data["detection_series"]
+    scenarios, detectors, arms = (distinct(rows, name) for name in ("scenario", "detector", "arm"))
+    figure = Figure(figsize=(3.6 * len(detectors) + 1.0, 2.6 * len(scenarios)), layout="constrained")
+    panels = figure.subplots(len(scenarios), len(detectors), sharex=True, sharey=True, squeeze=False)
+    for scenario, line in zip(scenarios, panels, strict=True):
+        for detector, axes in zip(detectors, line, strict=True):
+            for arm, color in zip(arms, ORDERED_COLORS, strict=False):
+                mine = _select(rows, scenario=scenario, detector=detector, arm=arm)
+                time, mean, sd = ([number(row, name) for row in mine] for name in ("time", "mean", "sd"))
+                axes.plot(time, mean, color=color, lw=1.2, label=arm)
+                band = [value - spread for value, spread in zip(mean, sd, strict=True)]
+                top = [value + spread for value, spread in zip(mean, sd, strict=True)]
+                axes.fill_between(time, band, top, color=color, alpha=0.2, lw=0)
+                paper = COUNTS[scenario, detector, arm].mean
+                axes.axhline(paper, color=color, lw=1, ls="--", label=f"{arm}, mean of the paper")
+            axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
+            axes.set_ylim(0, 20)
+        line[0].set_ylabel("objects", fontsize=8)
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]", fontsize=8)
+    panels[0][0].legend(fontsize=6, loc="upper left", ncols=2)
+    return figure
+
+
+FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
+    "table2": table_2_figure,
+    "table3": table_3_figure,
+    "detection": detection_figure,
+    "sensitivity": sensitivity_figure,
+    "channels": channels_figure,
+    "perception": perception_figure,
+}
+"""Figure of a part, by the name of the part. The others have none."""
+
+
+def draw(part: str, report: PartReport, out: Path) -> Path | None:
+    """Draw the figure of a part into a folder and return its path; None for a part without a figure.
+
+    Raise SettingError if the file cannot be written.
+    """
+    if part not in FIGURES:
+        return None
+    path = out / f"{part}.png"
+    with write_atomically(path) as stream:
+        # Without the version of matplotlib in the file, equal results give equal files
+        FIGURES[part](report.data()).savefig(stream, format="png", dpi=130, metadata={"Software": None})
+    return path
+
+
+def _points(axes: Axes, at: Sequence[float], rows: Sequence[Row], color: str, label: str) -> None:
+    low, high = limits(rows, "mean")
+    _interval(axes, at, low, [number(row, "mean") for row in rows], high, color, f"{label}, 95 %")
+
+
+def _interval(
+    axes: Axes,
+    at: Sequence[float],
+    low: Sequence[float],
+    middle: Sequence[float],
+    high: Sequence[float],
+    color: str,
+    label: str,
+) -> None:
+    below = [value - end for value, end in zip(middle, low, strict=True)]
+    above = [end - value for value, end in zip(middle, high, strict=True)]
+    errors = [[max(0.0, one) for one in below], [max(0.0, one) for one in above]]
+    axes.errorbar(at, middle, yerr=errors, fmt="o", ms=4, color=color, capsize=3, lw=1, label=label)
+
+
+def _select(rows: Sequence[Row], **fields: str) -> list[Row]:
+    return [row for row in rows if all(row[name] == value for name, value in fields.items())]

@@ -1,0 +1,122 @@
+"""Page of the reproduction: the reports of all parts in a folder, with their figures, in one file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from markupsafe import Markup, escape
+from rich.console import Console
+
+from eidrive_reports.reproduction.episodes import EpisodeJob
+from eidrive_reports.reproduction.part import Part
+from eidrive_reports.reproduction.parts import PARTS
+from eidrive_reports.reproduction.provenance import read_provenance
+from eidrive_scenario.api.common import Diagnostic, SettingError, load_json
+from eidrive_scenario.api.experiments import resolve_scenario, run_jobs
+from eidrive_scenario.api.pages import ReportedRun, png_address, run_of_result, write_page, write_replays, write_report
+from eidrive_scenario.api.run import run_and_save
+
+
+def replays_page(name: str) -> str:
+    """Return the path of the report about the recorded runs of a part, in the folder of the results."""
+    return f"replays_{name}/report.html"
+
+
+def write_part_replays(
+    part: Part, out: Path, detectors: Sequence[str], *, workers: int | None = None, console: Console | None = None
+) -> Path:
+    """Run each case with the seed 1 and a recording, and write a report with their replays. Return its path.
+
+    Raise the exceptions of `run_jobs`, and SettingError if a file cannot be written.
+    """
+    page = out / replays_page(part.name)
+    with TemporaryDirectory() as recordings:
+        task = partial(_recorded_run, below=Path(recordings))
+        runs = run_jobs(part.jobs(1, detectors), task, workers=workers, console=console, title=f"{part.name}, replays")
+        linked, omitted = write_replays(runs, page.parent)
+    return write_report(linked, page, omitted=omitted)
+
+
+def _recorded_run(job: EpisodeJob, below: Path) -> ReportedRun:
+    result = run_and_save(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings, below=below)
+    return run_of_result(result, job.scenario)
+
+
+PAGE = "index.html"
+"""Name of the page in the folder of the results."""
+
+
+def write_paper_page(out: Path) -> Path:
+    """Write the page of a folder from the JSON files and figures of its parts. Return its path.
+
+    Raise SettingError if a JSON file is damaged, or if the page cannot be written.
+    """
+    origins = read_provenance(out)
+    parts = [_part(out, name, origins.get(name, {})) for name in PARTS if (out / f"{name}.json").is_file()]
+    title = "Reproduction of the EI-Drive paper"
+    return write_page(out / PAGE, "reproduction.html.jinja", title=title, parts=parts, duration=_duration(origins))
+
+
+def _duration(origins: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the number of runs and the duration of all parts; empty if one was not computed in a single call."""
+    known = [origins[name] for name in PARTS if name in origins]
+    if not known or any(one.get("runs") != one.get("runs_of_last_call") for one in known):
+        return ""
+    runs, seconds = (sum(float(one[name]) for one in known) for name in ("runs", "last_call_s"))
+    processes = max(int(one.get("processes") or 1) for one in known)
+    duration = f"{seconds:.0f} seconds" if seconds < 120.0 else f"{seconds / 60.0:.0f} minutes"
+    return f"{runs:,.0f} runs in {duration} on {processes} process{'es' if processes > 1 else ''}"
+
+
+def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
+    path, figure = out / f"{name}.json", out / f"{name}.png"
+    try:
+        report = load_json(path.read_bytes())
+        sections = [
+            {
+                "title": str(section["title"]),
+                "paragraphs": [_with_code(str(text)) for text in section["paragraphs"]],
+                "columns": [str(title) for title in section["columns"]],
+                "rows": [[str(cell) for cell in row] for row in section["rows"]],
+            }
+            for section in report["sections"]
+        ]
+        title = str(report["title"])
+    except (ValueError, KeyError, TypeError) as error:
+        hint = "run `eidrive reproduce` for this part again"
+        raise SettingError(Diagnostic(f"the file is damaged: {error!r}", hint, str(path))) from error
+    return {
+        "name": name,
+        "title": title,
+        "sections": sections,
+        "figure": png_address(figure.read_bytes()) if figure.is_file() else "",
+        "origin": ", ".join(_origin(origin)),
+        "replays": replays_page(name) if (out / replays_page(name)).is_file() else "",
+    }
+
+
+def _origin(origin: Mapping[str, Any]) -> list[str]:
+    """Return version, commit, seeds and durations as texts, without unknown ones."""
+    texts = {
+        "version": "eidrive-scenario {}",
+        "commit": "commit {}",
+        "seeds": "seeds {}",
+        "runs": "{} runs",
+        "all_runs_s": "{} s of one process",
+        "runs_of_last_call": "last call {} runs",
+        "last_call_s": "in {} s",
+        "processes": "on {} processes",
+    }
+    return [text.format(origin[key]) for key, text in texts.items() if origin.get(key) is not None]
+
+
+def _with_code(text: str) -> Markup:
+    """Return a paragraph as HTML, with words between backticks as code."""
+    parts = text.split("`")
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if number % 2 else escape(part) for number, part in enumerate(parts)
+    )

@@ -1,0 +1,50 @@
+"""Parts of the reproduction, in the order of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from eidrive_reports.reproduction import (
+    channels,
+    detection,
+    ei,
+    perception,
+    pipeline,
+    sensitivity,
+    table_2,
+    table_3,
+)
+from eidrive_reports.reproduction.part import Part
+from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, suggestion
+
+MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels, perception)
+PARTS = {module.PART.name: module.PART for module in MODULES}
+"""Parts by name."""
+ALL = "all"
+"""Name of all parts together."""
+
+
+def selected_parts(names: Sequence[str]) -> tuple[Part, ...]:
+    """Return the parts of these names in the order of the paper. Raise SettingError for an unknown name."""
+    _check("part", names, (*PARTS, ALL))
+    return tuple(part for name, part in PARTS.items() if ALL in names or name in names)
+
+
+def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the detectors of a part among these names; its default without names.
+
+    Raise SettingError for a name that no part uses, or if the part uses none of them.
+    """
+    _check("--detectors", names, dict.fromkeys(name for one in PARTS.values() for name in one.detectors))
+    found = tuple(name for name in part.detectors if name in names) if names else part.default
+    if not found:
+        message = f"--detectors: part {part.name} uses none of them (got {quoted(','.join(names))})"
+        raise SettingError(Diagnostic(message, f"known: {', '.join(part.detectors)}"))
+    return found
+
+
+def _check(what: str, names: Iterable[str], known: Iterable[str]) -> None:
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            raise SettingError(Diagnostic(f"{what}: unknown name {quoted(name)}", suggestion(name, known)))

@@ -1,0 +1,153 @@
+"""Runs, record and files of the parts of the reproduction."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO, Self
+
+import msgspec
+from rich.console import Console
+
+from eidrive_reports.reproduction.episodes import Episode, run_episode
+from eidrive_reports.reproduction.layout import PartReport, Section, as_csv
+from eidrive_reports.reproduction.part import Part
+from eidrive_reports.reproduction.provenance import read_provenance, write_provenance
+from eidrive_scenario.api.common import Diagnostic, SettingError, exclusive, write_atomically
+from eidrive_scenario.api.experiments import cores, run_jobs
+
+
+class Record:
+    """Episodes of a record file, and the open file to which further ones are added."""
+
+    def __init__(self, stream: BinaryIO, episodes: dict[tuple[str, str, int, str], Episode]) -> None:
+        self._stream = stream
+        self.episodes = episodes
+        """Episodes by their key."""
+
+    def add(self, episode: Episode) -> None:
+        """Add an episode to the file. It is complete on the disk after the return, so that a kill loses no other."""
+        self._stream.write(msgspec.json.encode(episode) + b"\n")
+        self._stream.flush()
+        self.episodes[episode.key] = episode
+
+    @classmethod
+    @contextmanager
+    def open(cls, path: Path, *, restart: bool = False) -> Iterator[Self]:
+        """Open a record and lock it against other processes; `restart` discards its episodes.
+
+        An incomplete last line, as a killed process leaves it, is removed. Raise SettingError if any other line is
+        invalid, if the file cannot be written, or if another process writes it.
+        """
+        if path.exists() and not path.is_file():
+            raise SettingError(Diagnostic("cannot write: not a regular file", "choose another folder", str(path)))
+        with ExitStack() as stack:
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                stack.enter_context(exclusive(path))
+                stream = stack.enter_context(path.open("ab"))
+                content = b"" if restart else path.read_bytes()
+            except OSError as error:
+                message = f"cannot write: {error.strerror}"
+                raise SettingError(Diagnostic(message, "choose another folder", str(path))) from error
+            complete = content[: content.rfind(b"\n") + 1]
+            episodes = _parse(path, complete)
+            stream.truncate(len(complete))
+            yield cls(stream, episodes)
+
+
+def _parse(path: Path, content: bytes) -> dict[tuple[str, str, int, str], Episode]:
+    episodes = {}
+    for number, line in enumerate(content.splitlines(), 1):
+        try:
+            episode = msgspec.json.decode(line, type=Episode)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            hint = "remove the line, or start again with --restart"
+            raise SettingError(Diagnostic(f"the record is damaged: {error}", hint, str(path), number)) from error
+        episodes[episode.key] = episode
+    return episodes
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """Part with its episodes in the order of the jobs.
+
+    added      number of episodes that this call has run; the others are those of the record
+    unused     number of episodes of the record with other settings, seeds or code
+    elapsed_s  duration of the call [s]
+    """
+
+    report: PartReport
+    episodes: tuple[Episode, ...]
+    added: int
+    unused: int
+    elapsed_s: float
+
+    @property
+    def computed_s(self) -> float:
+        """Sum of the durations of all episodes [s]."""
+        return sum(episode.wall_s for episode in self.episodes)
+
+
+def reproduce(
+    part: Part,
+    out: Path,
+    *,
+    episodes: int,
+    detectors: Sequence[str],
+    workers: int | None = None,
+    restart: bool = False,
+    console: Console | None = None,
+) -> Reproduced:
+    """Run the episodes of a part that its record lacks, and write its report and tables into the folder `out`.
+
+    restart  whether the record is discarded first
+
+    The report depends on the episodes only, so a second call writes the same files. Raise SettingError if a file
+    cannot be written or the record is damaged, and the exceptions of `run_jobs`.
+    """
+    start = time.perf_counter()
+    read_provenance(out)  # a damaged file is an error before the runs, not after them
+    jobs = part.jobs(episodes, detectors)
+    with Record.open(out / f"{part.name}.jsonl", restart=restart) as record:
+        known = len(record.episodes)
+        left = [job for job in jobs if job.key not in record.episodes]
+        if left:
+            run_jobs(left, run_episode, workers=workers, console=console, title=part.name, finished=record.add)
+        found = tuple(record.episodes[job.key] for job in jobs)
+    report = part.report(found, detectors)
+    report = replace(report, sections=(Section("Question", (part.question,)), *report.sections))
+    _write_report(part, out, report)
+    unused = known - (len(jobs) - len(left))
+    done = Reproduced(report, found, len(left), unused, time.perf_counter() - start)
+    write_provenance(
+        out,
+        part.name,
+        {
+            "seeds": f"1 to {episodes}",
+            "detectors": list(detectors),
+            "runs": len(found),
+            "all_runs_s": round(done.computed_s, 1),
+        },
+        added=done.added,
+        elapsed_s=done.elapsed_s,
+        processes=min(workers or cores(), max(1, done.added)),
+    )
+    return done
+
+
+def _write_report(part: Part, out: Path, report: PartReport) -> None:
+    """Write Markdown, and the tables as CSV files and as JSON."""
+    tables = report.data()
+    texts = {
+        f"{part.name}.md": report.markdown(),
+        f"{part.name}.json": json.dumps(report.as_json(), indent=1) + "\n",
+    }
+    texts |= {f"{name}.csv": as_csv(rows) for name, rows in tables.items()}
+    for name, text in texts.items():
+        with write_atomically(out / name) as stream:
+            stream.write(text.encode())

@@ -1,0 +1,42 @@
+"""Table of learned detectors in closed loop."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from eidrive_reports.closed_loop import Row, jobs, main, table
+
+
+def row(seed: int, collisions: int, **given: object) -> Row:
+    values = {"scenario": "coop/scenario_1", "detector": "oracle", "channel": "none", "distance": 1.0, **given}
+    return Row(seed=seed, collisions=collisions, false_tracks=2.0 * seed, brakings=2, without_cause=seed % 2, **values)  # type: ignore[arg-type]
+
+
+def test_table_has_one_line_per_arm_with_counts_and_means() -> None:
+    """The 95 % Wilson interval of 1 of 2 is 0.09 to 0.91."""
+    lines = table([row(1, 0), row(2, 3), row(1, 0, channel="ideal")]).splitlines()
+    assert lines[2:] == [
+        "| `oracle` | scenario_1 | `none` | 1 of 2 | 0.09 to 0.91 | 3.0 | 1 of 4 |",
+        "| `oracle` | scenario_1 | `ideal` | 1 of 1 | 0.21 to 1.00 | 2.0 | 1 of 2 |",
+    ]
+
+
+def test_jobs_of_seed_contain_all_arms() -> None:
+    assert len(jobs(("yolov5", "ssd"), ("none", "ideal"), 1)) == 8
+    assert {job.settings.detector for job in jobs(("yolov5",), ("none",), 3)} == {"yolov5"}
+
+
+def test_main_with_oracle_avoids_collisions_only_by_cooperation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The oracle detector replaces the networks. A second call adds no runs."""
+    arguments = ["--out", str(tmp_path), "--seeds", "1", "--detectors", "oracle", "--workers", "1"]
+    main(arguments)
+    main(arguments)
+    rows = [json.loads(line) for line in (tmp_path / "closed_loop.jsonl").read_text().splitlines()]
+    assert len(rows) == 4
+    assert {(one["channel"], one["collisions"] == 0) for one in rows} == {("none", False), ("ideal", True)}
+    assert all(one["without_cause"] == 0 and one["false_tracks"] == 0.0 for one in rows)
+    assert (tmp_path / "closed_loop.md").read_text() in capsys.readouterr().out

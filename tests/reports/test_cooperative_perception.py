@@ -1,0 +1,246 @@
+"""Average precision of cooperative perception: protocol, records, intervals and receivers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from eidrive_reports.cooperative_perception.receivers import Condition, moved
+from eidrive_reports.cooperative_perception.scores import (
+    RANGES,
+    PerceptionRecord,
+    Pool,
+    Tally,
+    Truth,
+    range_class,
+    sample_codes,
+)
+from eidrive_reports.cooperative_perception.trial import run_trial, with_properties
+from lxml import etree
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.pose_noise import PoseNoise, PoseNoiseProcess
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.simulation import RunSettings
+
+Place = tuple[float, float, float]
+NAME = "condition"
+ORIGIN = np.zeros(2)
+
+
+def boxes(*places: Place) -> Array:
+    """Return boxes of 4.5 m x 2 m at x, y and yaw."""
+    return np.array([(x, y, 0.75, 4.5, 2.0, 1.5, yaw) for x, y, yaw in places]).reshape(-1, 7)
+
+
+def detected(places: list[Place], scores: list[float]) -> Detections:
+    count = len(places)
+    none = np.full((count, 2), np.nan)
+    return Detections(0.0, boxes(*places), np.array(scores), ("car",) * count, none, np.full((count, 2, 2), np.nan))
+
+
+def truth(*places: Place, hit: bool = True, hidden: bool = False) -> Truth:
+    found = boxes(*places)
+    every = np.ones(len(found), dtype=bool)
+    return Truth(found, range_class(found, ORIGIN), every & hit, every & hidden)
+
+
+def record(*frames: tuple[Detections, Truth]) -> PerceptionRecord:
+    samples = [sample_codes(found, objects, ORIGIN) for found, objects in frames]
+    truths = [objects for _, objects in frames]
+    places = np.concatenate([objects.place[objects.counted] for objects in truths])
+    hit = np.concatenate([objects.place[objects.counted & objects.hit] for objects in truths])
+    tally = Tally(
+        b"".join(scores.astype("<u2").tobytes() for scores, _, _ in samples),
+        b"".join(codes.astype("<u2").tobytes() for _, codes, _ in samples),
+        tuple(int(count) for count in np.sum([hidden for _, _, hidden in samples], axis=0)),
+        0.5,
+    )
+    counts, hits = (tuple(int(one) for one in np.bincount(group, minlength=len(RANGES))) for group in (places, hit))
+    hidden = sum(int(objects.hidden.sum()) for objects in truths)
+    return PerceptionRecord(len(frames), counts, hits, hidden, {NAME: tally})
+
+
+def precision(*frames: tuple[Detections, Truth]) -> list[float]:
+    """Return the average precision at 0.3, 0.5 and 0.7 over all ranges."""
+    pool = Pool([record(*frames)], NAME)
+    return [pool.precision(overlap).value for overlap in range(3)]
+
+
+GOLDEN = (
+    (
+        detected([(0.3, 0.0, 0.0), (50.0, 0.0, 0.0), (21.2, 0.0, 0.0)], [0.9, 0.3, 0.6]),
+        truth((0.0, 0.0, 0.0), (20.0, 0.0, 0.0)),
+    ),
+    (
+        detected([(0.0, 10.0, 0.05), (-40.0, 0.0, 0.0), (30.0, 5.2, 0.0)], [0.95, 0.8, 0.5]),
+        truth((0.0, 10.0, 0.0), (30.0, 5.0, 0.0)),
+    ),
+)
+"""Two frames whose average precision OpenCOOD's evaluation (31ba160) states."""
+
+
+def test_golden_frames_have_the_precision_of_opencood() -> None:
+    pool = Pool([record(*GOLDEN)], NAME)
+    found = [pool.precision(overlap) for overlap in range(3)]
+    assert [round(one.value, 4) for one in found] == [0.9, 0.9, 0.65], "all detections sorted by score"
+    assert [round(one.local, 4) for one in found] == [0.8542, 0.8542, 0.5], "sorted within each frame only"
+
+
+@pytest.mark.parametrize(
+    ("shift", "expected"), [(0.79, [1, 1, 1]), (0.80, [1, 1, 0]), (1.49, [1, 1, 0]), (1.51, [1, 0, 0])]
+)
+def test_shifted_box_is_correct_up_to_the_law(shift: float, expected: list[int]) -> None:
+    """A shift s of a box of 4.5 m leaves an overlap of (4.5 - s) / (4.5 + s)."""
+    assert precision((detected([(10.0 + shift, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0)))) == expected
+
+
+def test_correct_detections_count_in_the_range_of_their_objects() -> None:
+    found = detected([(30.2, 0.0, 0.0), (60.0, 0.0, 0.0), (0.0, 99.0, 0.0)], [0.9, 0.8, 0.7])
+    pool = Pool([record((found, truth((29.9, 0.0, 0.0), (0.0, 40.0, 0.0), (0.0, 99.0, 0.0))))], NAME)
+    assert [pool.precision(1, place).value for place in range(3)] == [1.0, 0.0, 0.5]
+    assert [pool.precision(1, place).objects for place in range(3)] == [1, 1, 1]
+
+
+def test_objects_and_detections_beyond_the_last_range_are_ignored() -> None:
+    far = detected([(10.0, 0.0, 0.0), (99.8, 0.0, 0.0), (130.0, 0.0, 0.0)], [0.5, 0.8, 0.9])
+    pool = Pool([record((far, truth((10.0, 0.0, 0.0), (100.2, 0.0, 0.0))))], NAME)
+    assert pool.precision(1).value == 1.0
+    assert pool.precision(1).objects == 1
+
+
+def test_second_truth_contains_hit_objects_only() -> None:
+    """The object without a hit is missed by the first truth; its detection does not count for the second."""
+    seen, unseen = truth((10.0, 0.0, 0.0)), truth((20.0, 0.0, 0.0), hit=False)
+    frames = (detected([(10.0, 0.0, 0.0)], [0.5]), seen), (detected([(20.0, 0.0, 0.0)], [0.9]), unseen)
+    pool = Pool([record(*frames)], NAME)
+    assert pool.precision_of_hit_objects().value == 1.0
+    assert pool.precision_of_hit_objects().objects == 1
+    missed = Pool([record(frames[0], (detected([], []), unseen))], NAME)
+    assert missed.precision(1).value == 0.5
+    assert missed.precision_of_hit_objects().value == 1.0
+
+
+def test_recall_of_hidden_objects() -> None:
+    hidden = truth((10.0, 0.0, 0.0), (20.0, 0.0, 0.0), hidden=True)
+    found = detected([(10.0, 0.0, 0.0), (21.0, 0.0, 0.0)], [0.1, 0.9])
+    pool = Pool([record((found, hidden))], NAME)
+    recalls = [pool.hidden_recall(overlap) for overlap in range(3)]
+    assert [(one.found, one.objects, one.value) for one in recalls] == [(2, 2, 1.0), (2, 2, 1.0), (1, 2, 0.5)]
+    assert math.isnan(Pool([record(GOLDEN[0])], NAME).hidden_recall(0).value)
+
+
+def test_precision_of_equal_scores_does_not_depend_on_the_order_of_frames() -> None:
+    """One right and one wrong detection of one score, in two frames of one object."""
+    right = detected([(10.0, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0))
+    wrong = detected([(50.0, 0.0, 0.0)], [0.9]), truth()
+    assert precision(right, wrong) == precision(wrong, right) == [0.5, 0.5, 0.5]
+
+
+def test_detections_of_one_score_count_in_their_own_ranges() -> None:
+    """The second detection overlaps its object more and takes part first; the first one is wrong and beyond 50 m."""
+    found = detected([(60.0, 0.0, 0.0), (10.0, 0.0, 0.0)], [0.9, 0.9])
+    pool = Pool([record((found, truth((10.0, 0.0, 0.0))))], NAME)
+    assert (pool.precision(1, 0).value, pool.precision(1).value) == (1.0, 0.5)
+
+
+def test_interval_follows_from_runs_without_each_other() -> None:
+    """Runs with precisions 1 and 0: without one of them the precision is 0 or 1. One run has no interval."""
+    good = record((detected([(10.0, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0))))
+    bad = record((detected([], []), truth((10.0, 0.0, 0.0))))
+    one = Pool([good, bad], NAME).precision(1)
+    assert (one.value, one.low, one.high) == (0.5, 0.0, 1.0)
+    same = Pool([record(*GOLDEN)] * 3, NAME).precision(2)
+    assert (same.low, same.high) == pytest.approx((0.65, 0.65)), "equal runs have no spread"
+    alone = Pool([good], NAME)
+    assert math.isnan(alone.precision(1).low)
+    assert alone.megabytes_per_second == 0.5
+
+
+def test_interval_of_runs_that_all_find_everything_is_wilsons() -> None:
+    """Of 10 runs without a miss, Wilson's interval of 10 of 10 is 72 % to 100 %; of 0 of 10 it is 0 to 28 %."""
+    hidden = truth((10.0, 0.0, 0.0), hidden=True)
+    good = record((detected([(10.0, 0.0, 0.0)], [0.9]), hidden))
+    bad = record((detected([], []), hidden))
+    for runs, low, high in (([good] * 10, 0.722, 1.0), ([bad] * 10, 0.0, 0.278)):
+        pool = Pool(runs, NAME)
+        for one in (pool.precision(1), pool.hidden_recall(1)):
+            assert (one.low, one.high) == pytest.approx((low, high), abs=1e-3)
+
+
+def test_moved_detections_keep_their_place_relative_to_the_station() -> None:
+    found = detected([(12.0, 3.0, 0.4)], [0.9])
+    before = EgoState(0.0, np.array([2.0, 1.0, 0.0]), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+    after = EgoState(0.0, np.array([2.5, 0.5, 0.0]), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
+    there = moved(found, before, after)
+    assert there.boxes[0, 6] == pytest.approx(0.6)
+    assert np.linalg.norm(there.boxes[0, :2] - after.position[:2]) == pytest.approx(math.hypot(10.0, 2.0))
+    assert moved(there, after, before).boxes == pytest.approx(found.boxes)
+
+
+def test_pose_error_lowers_the_precision_at_the_larger_overlap_first() -> None:
+    """Fifty cars, all reported by a station with a pose error. Below a shift of 0.2 m all overlaps are above 0.7."""
+    places = [(10.0 * number % 80, 5.0 * (number // 8), 0.3 * number) for number in range(50)]
+    exact, objects = detected(places, [0.9] * 50), truth(*places)
+    ego = EgoState(0.0, np.array([40.0, 15.0, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def at(deviation: float) -> list[float]:
+        noise = PoseNoiseProcess(PoseNoise(position=deviation, yaw=deviation), "RSU", 1)
+        frames = []
+        for number in range(20):
+            x, y, yaw = noise.error(0.1 * number).tolist()
+            assumed = EgoState(0.0, ego.position + np.array([x, y, 0.0]), yaw, 0.0, 0.0, 0.0, 0.0, 0.0)
+            frames.append((moved(exact, ego, assumed), objects))
+        return precision(*frames)
+
+    none, small, large = at(0.0), at(0.2), at(0.6)
+    assert none == [1.0, 1.0, 1.0]
+    assert small[2] < small[1] <= small[0]
+    assert large[2] < large[1] < large[0] < 1.0
+    assert all(more < less for more, less in zip(large, small, strict=True))
+
+
+def test_properties_are_those_of_all_stations() -> None:
+    root = etree.fromstring(with_properties("coop/scenario_4", {"detector": "lidar", "tracker": "none"}))
+    stations = [held for held in root.iter("Properties") if any(one.get("value") == "eidrive" for one in held)]
+    assert len(stations) == 4
+    for held in stations:
+        values = [(one.get("name"), one.get("value")) for one in held if one.get("name") in ("detector", "tracker")]
+        assert sorted(values) == [("detector", "lidar"), ("tracker", "none")]
+
+
+def faulty(arm: str) -> list[Condition]:
+    """Return an arm with each fault alone."""
+    return [Condition(arm, latency=0.3), Condition(arm, loss=0.5), Condition(arm, deviation=0.6)]
+
+
+@pytest.fixture(scope="module")
+def trial() -> PerceptionRecord:
+    """One frame of scenario 4 under few conditions."""
+    arms = [Condition(arm) for arm in ("none", "average", "covariance_intersection", "early")]
+    settings = RunSettings(detector="lidar", time_limit=1.0)
+    return run_trial("coop/scenario_4", 1, settings, "Ego", [*arms, *faulty("none"), *faulty("early")])[1]
+
+
+def test_no_fusion_is_equal_under_all_faults(trial: PerceptionRecord) -> None:
+    alone = trial.tallies[Condition("none").name]
+    assert len(alone.scores) > 0
+    assert all(trial.tallies[one.name] == alone for one in faulty("none"))
+
+
+def test_messages_find_objects_hidden_to_the_ego(trial: PerceptionRecord) -> None:
+    assert trial.frames == 1
+    assert trial.hidden > 0
+    found = {arm: trial.tallies[Condition(arm).name].hidden[0] for arm in ("none", "average", "early")}
+    assert found["none"] == 0
+    assert min(found["average"], found["early"]) > 0
+
+
+def test_points_need_more_bytes_than_boxes_and_no_fusion_none(trial: PerceptionRecord) -> None:
+    volume = {arm: trial.tallies[Condition(arm).name].megabytes_per_second for arm in ("none", "average", "early")}
+    assert volume["none"] == 0.0
+    assert volume["early"] > 10.0 * volume["average"] > 0.0
+    lossy = trial.tallies[Condition("early", loss=0.5).name]
+    assert lossy.megabytes_per_second == pytest.approx(volume["early"]), "lost messages are transmitted, too"

@@ -1,0 +1,167 @@
+"""Report on cooperative perception, from records with known detections, and shapes of known curves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from eidrive_reports.cooperative_perception.receivers import ARMS, AXES, COMPARED, all_conditions
+from eidrive_reports.cooperative_perception.scores import PerceptionRecord, Tally
+from eidrive_reports.reproduction import perception, pose_errors
+from eidrive_reports.reproduction.episodes import Episode
+from eidrive_reports.reproduction.figures import draw
+from eidrive_reports.reproduction.layout import Row
+from eidrive_reports.reproduction.perception_shapes import crossing, shapes
+from eidrive_reports.reproduction.provenance import job_digest
+
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+CORRECT = 0b11_001_001_001
+"""Code of a detection that is correct at all overlaps and for both truths, in the first range."""
+
+
+def tally(found: int, size: float) -> Tally:
+    """Return this number of correct detections, and hidden objects of which half are found."""
+    scores, codes = np.full(found, 60_000, dtype="<u2"), np.full(found, CORRECT, dtype="<u2")
+    return Tally(scores.tobytes(), codes.tobytes(), (2, 2, 1), size)
+
+
+def episodes() -> list[Episode]:
+    """Return two runs with ten objects: seven found with messages, four without."""
+    tallies = {
+        one.name: tally(7 if ARMS[one.arm].cooperates else 4, {"early": 0.5, "none": 0.0}.get(one.arm, 0.01))
+        for one in all_conditions()
+    }
+    measured = PerceptionRecord(5, (10, 0, 0), (9, 0, 0), 4, tallies)
+    return [
+        Episode(scene, "lidar", seed, "0" * 16, "", 8.0, 40.0, {}, perception=measured)
+        for scene in perception.SCENES
+        for seed in (1, 2)
+    ]
+
+
+def test_report_states_precision_recall_and_volume(tmp_path: Path) -> None:
+    report = perception.report(episodes(), perception.DETECTORS)
+    data = report.data()
+    arms = {str(row["arm"]): row for row in data["perception_arms"]}
+    assert {name: row["ap_50"] for name, row in arms.items()} == pytest.approx(
+        {name: 0.7 if arm.cooperates else 0.4 for name, arm in ARMS.items()}
+    )
+    assert arms["none"]["ap_50_hit"] == pytest.approx(4 / 9)
+    assert arms["none"]["ap_50_range_1"] is None, "no object in this range"
+    assert {row["recall"] for row in data["perception_hidden"] if row["iou"] == 0.7} == {0.25}
+    text = report.markdown()
+    assert "Points need 50 times the bytes of boxes (0.500 and 0.010 MB/s over all links)" in text
+    assert "4 scenes of the library with 2 seeds each" in text
+    assert "40 frames with 80 objects. The lidar of any station hits 72 of them; 32 are hidden" in text
+    path = draw("perception", report, tmp_path)
+    assert path is not None
+    assert path.stat().st_size > 10_000
+
+
+def test_conditions_are_part_of_the_digest() -> None:
+    conditions = all_conditions()
+    settings = RunSettings(detector="lidar")
+    digests = {job_digest("coop/scenario_4", settings, conditions=conditions[:count]) for count in (0, 1, 2)}
+    assert len(digests) == 3
+    assert len({one.name for one in conditions}) == len(conditions)
+
+
+def curves(arms: dict[str, list[float]], *, steeper: float) -> list[Row]:
+    """Return curves that are equal on all axes; at 0.7 they lose `steeper` times as much as at 0.5."""
+    rows: list[Row] = []
+    for axis, (_, _, values) in AXES.items():
+        for arm in COMPARED:
+            course = np.interp(values, np.linspace(0.0, max(values), len(arms[arm])), arms[arm])
+            for overlap, factor in ((0.3, 1.0), (0.5, 1.0), (0.7, steeper)):
+                for value, precision in zip(values, course.tolist(), strict=True):
+                    ap = max(0.0, course[0] - factor * (course[0] - precision))
+                    rows.append({"arm": arm, "axis": axis, "value": value, "range": "all", "iou": overlap, "ap": ap})
+    return rows
+
+
+VOLUMES: list[Row] = [
+    {"arm": arm, "cell": None, "megabytes_per_second": size, "ap_50": ap}
+    for arm in ("average", "covariance_intersection", "early")
+    for size, ap in ((1.0, 0.7), (0.5, 0.68), (0.2, 0.5))
+]
+PUBLISHED = {
+    "none": [0.4, 0.4],
+    "average": [0.6, 0.1, 0.05],
+    "covariance_intersection": [0.65, 0.3, 0.2],
+    "early": [0.7, 0.3, 0.2],
+}
+"""Curves with the shapes of the literature."""
+
+
+def holding(found: tuple[Row, ...]) -> list[bool]:
+    return [row["holds"] == "yes" for row in found]
+
+
+def test_all_shapes_hold_for_curves_of_the_literature() -> None:
+    assert all(holding(shapes(curves(PUBLISHED, steeper=1.5), VOLUMES)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "steeper", "broken"),
+    [
+        ({"none": [0.4, 0.39]}, 1.5, "no fusion is flat over all axes"),
+        ({}, 0.5, "AP 0.7 falls before AP 0.5"),
+        ({"covariance_intersection": [0.6, 0.05, 0.0]}, 1.5, "compensated latency is at least as good"),
+        ({"early": [0.5, 0.3, 0.2]}, 1.5, "no fusion < late (average) < early"),
+        ({"average": [0.6, 0.6, 0.59]}, 1.5, "of whole messages is not mild"),
+    ],
+)
+def test_shape_does_not_hold_for_other_curves(changes: dict[str, list[float]], steeper: float, broken: str) -> None:
+    found = shapes(curves({**PUBLISHED, **changes}, steeper=steeper), VOLUMES)
+    assert any(broken in str(row["shape"]) and row["holds"] == "no" for row in found)
+
+
+def test_crossing_is_interpolated() -> None:
+    assert crossing({0.0: 0.8, 0.2: 0.6, 0.4: 0.2}, 0.5) == pytest.approx(0.25)
+    assert crossing({0.0: 0.8, 0.2: 0.6}, 0.5) is None
+    assert crossing({0.0: 0.4, 0.2: 0.2}, 0.5) == 0.0
+
+
+def test_closed_loop_rows_summarize_runs_of_an_arm() -> None:
+    """Two runs of one arm: least speeds 9.9 and 6.1 m/s, mean 8.0; one of them brakes twice and collides."""
+    arm = next(arm for arm in pose_errors.arms() if arm.deviation == 0.2)
+    drives = [
+        Episode(
+            pose_errors.SCENE,
+            arm.name,
+            seed,
+            "0" * 16,
+            "",
+            17.0,
+            5.0,
+            {"min_speed.Ego": speed, "false_braking.Ego.brakings": brakings, "collision.count": brakings / 2},
+        )
+        for seed, speed, brakings in ((1, 9.9, 0.0), (2, 6.1, 2.0))
+    ]
+    (row,) = pose_errors.rows(drives)
+    assert (row["detector"], row["tracker"], row["deviation"]) == (arm.detector, arm.tracker, 0.2)
+    assert (row["runs"], row["least_speed"], row["brakings"], row["collisions"]) == (2, 6.1, 2, 1)
+    assert row["mean_least_speed"] == pytest.approx(8.0)
+
+
+def test_closed_loop_covers_each_tracker_and_fusion_at_all_errors() -> None:
+    drives = pose_errors.cases(perception.DETECTORS)
+    assert len({case.arm for case in drives}) == len(drives)
+    cells = {(arm.tracker, arm.fusion, arm.deviation) for arm in pose_errors.arms() if arm.detector == "oracle"}
+    expected = {
+        (tracker, fusion, deviation)
+        for tracker in ("none", "cv", "ctrv")
+        for fusion in ("average", "covariance_intersection")
+        for deviation in (0.0, 0.05, 0.2, 0.4, 0.6)
+    }
+    assert cells == expected
+    assert {arm.fusion for arm in pose_errors.arms() if arm.detector == "lidar"} >= {"early"}
+    assert pose_errors.cases(()) == [case for case in drives if not case.arm.startswith("lidar")]
+
+
+def test_closed_loop_receives_messages() -> None:
+    arm = next(arm for arm in pose_errors.arms() if arm.deviation == 0.2)
+    with Simulation(pose_errors.SCENE, settings=arm.settings) as simulation:
+        assert any(simulation.tick()[0].steps["Ego"].inbox for _ in range(30))

@@ -1,0 +1,138 @@
+"""Reproduction of the paper: record, digests, tables and parts."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from eidrive_reports.reproduction.episodes import ObjectCounter
+from eidrive_reports.reproduction.layout import Column, DataTable, Row, as_csv, plain
+from eidrive_reports.reproduction.part import Part
+from eidrive_reports.reproduction.parts import ALL, PARTS, selected_detectors, selected_parts
+from eidrive_reports.reproduction.provenance import job_digest
+from eidrive_reports.reproduction.reproduce import Record
+from known_episodes import episode
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.simulation import RunSettings
+
+# Record
+
+
+def test_record_returns_the_episodes_of_earlier_calls(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "part.jsonl"
+    added = [episode(seed=seed, center=1.0 / 3.0) for seed in (1, 2)]
+    with Record.open(path) as record:
+        assert record.episodes == {}
+        for one in added:
+            record.add(one)
+    with Record.open(path) as record:
+        assert list(record.episodes.values()) == added
+    with Record.open(path, restart=True) as record:
+        assert record.episodes == {}
+    assert path.read_bytes() == b""
+
+
+def test_incomplete_last_line_of_a_killed_process_is_removed(tmp_path: Path) -> None:
+    path = tmp_path / "part.jsonl"
+    with Record.open(path) as record:
+        record.add(episode(seed=1))
+        record.add(episode(seed=2))
+    complete = path.read_bytes()
+    path.write_bytes(complete[:-20])
+    with Record.open(path) as record:
+        assert [one.seed for one in record.episodes.values()] == [1]
+        record.add(episode(seed=2))
+    assert path.read_bytes() == complete
+
+
+@pytest.mark.parametrize("line", [b"{}", b"nonsense", b"\xff\xfe", b'{"scenario": 1}', b"[" * 5000])
+def test_damaged_record_is_an_error_with_its_line(tmp_path: Path, line: bytes) -> None:
+    path = tmp_path / "part.jsonl"
+    with Record.open(path) as record:
+        record.add(episode())
+    path.write_bytes(path.read_bytes() + line + b"\n")
+    with pytest.raises(SettingError, match=r"part\.jsonl:2: the record is damaged: .*--restart"), Record.open(path):
+        pass
+    with Record.open(path, restart=True) as record:
+        assert record.episodes == {}
+
+
+def test_record_of_another_process_and_unwritable_folders_are_errors(tmp_path: Path) -> None:
+    path = tmp_path / "part.jsonl"
+    with Record.open(path), pytest.raises(SettingError, match="another run writes this file"), Record.open(path):
+        pass
+    with pytest.raises(SettingError, match="cannot write: File exists"), Record.open(path / "below.jsonl"):
+        pass
+    os.mkfifo(tmp_path / "pipe")
+    for other in (tmp_path, tmp_path / "pipe"):
+        with pytest.raises(SettingError, match="cannot write: not a regular file"), Record.open(other):
+            pass
+
+
+def test_digest_distinguishes_settings_and_scenarios() -> None:
+    digests = {
+        job_digest("coop/scenario_1", RunSettings()),
+        job_digest("coop/scenario_2", RunSettings()),
+        job_digest("coop/scenario_1", RunSettings(channel="ideal")),
+        job_digest("coop/scenario_1", RunSettings(dt=0.03)),
+    }
+    assert len(digests) == 4
+    assert job_digest("coop/scenario_1", RunSettings()) in digests
+
+
+def test_counter_counts_objects_after_fusion_while_the_station_is_present() -> None:
+    counter = ObjectCounter("Ego")
+    for classes in (None, [], ["car", "misc", "van", "bicycle"]):
+        steps = {} if classes is None else {"Ego": SimpleNamespace(fused=SimpleNamespace(classes=classes))}
+        counter.observe(SimpleNamespace(steps=steps))  # type: ignore[arg-type]
+    counter.close()
+    assert counter.counts == [0, 3]
+
+
+# Layout
+
+
+def test_csv_has_all_digits_and_markdown_the_format() -> None:
+    rows: tuple[Row, ...] = (
+        {"name": "a", "value": 1.0 / 3.0, "low": None, "holds": True},
+        {"name": "b", "value": 2.0, "low": 1.0},
+    )
+    columns = (plain("name", "name"), Column("range", "{low:.1f} to {value:.2f}", ("low", "value")))
+    lines = DataTable("t", columns, rows).markdown().splitlines()
+    assert lines == ["| name | range |", "|---|---|", "| a | - |", "| b | 1.0 to 2.00 |"]
+    read = list(csv.DictReader(io.StringIO(as_csv(rows[:1]))))
+    assert read == [{"name": "a", "value": repr(1.0 / 3.0), "low": "", "holds": "true"}]
+    assert float(read[0]["value"]) == 1.0 / 3.0
+    assert as_csv([]) == ""
+
+
+# Parts
+
+
+def test_parts_are_in_the_order_of_the_paper() -> None:
+    assert selected_parts([ALL]) == tuple(PARTS.values())
+    assert [part.name for part in selected_parts(["table3", "table2", "table3"])] == ["table2", "table3"]
+    with pytest.raises(SettingError, match="unknown name 'tabel2'; did you mean 'table2'"):
+        selected_parts(["tabel2"])
+
+
+def test_detectors_are_those_of_the_part() -> None:
+    part = PARTS["table2"]
+    assert selected_detectors(part, []) == ("oracle", "yolov5")
+    assert selected_detectors(part, ["yolov5", "oracle"]) == ("oracle", "yolov5")
+    with pytest.raises(SettingError, match="unknown name 'yolo'"):
+        selected_detectors(part, ["yolo"])
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.name)
+def test_jobs_are_distinct_and_ordered_by_seed(part: Part) -> None:
+    jobs = part.jobs(2, part.detectors)
+    assert len({job.key for job in jobs}) == len({(job.scenario, job.arm, job.seed) for job in jobs}) == len(jobs)
+    episodes = [job.seed % 1000 for job in jobs]
+    assert episodes == sorted(episodes)
+    assert set(episodes) == {1, 2}
