@@ -11,20 +11,21 @@ from eidrive_scenario.experiments.average_precision import (
 )
 from eidrive_scenario.experiments.repetitions import Job, cores, jobs_of, run_jobs
 from eidrive_scenario.experiments.single_run import as_json_text
+from eidrive_scenario.experiments.statistics.intervals import (
+    Proportion,
+    Summary,
+    interval_text,
+    jackknife_interval,
+    mean_interval,
+    summarize,
+    wilson,
+)
 from eidrive_scenario.experiments.statistics.paired import (
     PairedDifference,
     PairedVerdicts,
     paired_difference,
     paired_ratio,
     paired_spread,
-)
-from eidrive_scenario.experiments.statistics.proportions import Proportion, wilson
-from eidrive_scenario.experiments.statistics.samples import (
-    Summary,
-    interval_text,
-    jackknife_interval,
-    mean_interval,
-    summarize,
 )
 from eidrive_scenario.library import (
     LibraryScenario,

@@ -44,7 +44,7 @@ def compare(
 
 def lines_of(found: Comparison) -> list[str]:
     """Return the comparison as text."""
-    from eidrive_scenario.experiments.statistics.samples import interval_text
+    from eidrive_scenario.experiments.statistics.intervals import interval_text
 
     counts, pairs = found.verdicts, found.verdicts.pairs
     rates = [(counts.both + only) / pairs for only in (counts.only_first, counts.only_second)]

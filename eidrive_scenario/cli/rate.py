@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import FAILED, PASSED
-from eidrive_scenario.experiments.statistics.proportions import anytime_interval
+from eidrive_scenario.experiments.statistics.intervals import anytime_interval
 from eidrive_scenario.experiments.statistics.sequential import LIMIT, Decision, RatioTest
 from eidrive_scenario.experiments.statistics.sequential import success_rate as test_of_rate
 from eidrive_scenario.experiments.success_rate import decision_text

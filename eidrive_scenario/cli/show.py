@@ -163,7 +163,7 @@ def view(
     if has_pictures:
         from eidrive_scenario.recording.run_files import RESULT, result_of
         from eidrive_scenario.reporting.replay import film
-        from eidrive_scenario.reporting.run_report.reported_run import parse_run
+        from eidrive_scenario.reporting.run_report.reported_runs import parse_run
 
         result = result_of(path)
         outcome = parse_run(result, path.with_name(RESULT)) if result is not None else None

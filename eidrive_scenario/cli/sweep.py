@@ -103,7 +103,7 @@ def sweep(
 
     Example: eidrive sweep coop/scenario_1 --vary channel.delay.seconds=0:1:0.1 --store s.db
     """
-    from eidrive_scenario.experiments.sweeps.worker_start import start_server
+    from eidrive_scenario.experiments.sweeps.workers import start_server
 
     if scheduler is None and not dry_run:
         start_server()  # First, as it imports for as long as the imports below
@@ -112,16 +112,13 @@ def sweep(
     from eidrive_scenario.cli.sweep_search import Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
     from eidrive_scenario.experiments.run_folder import check_writable
-    from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis
+    from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis, points_of, with_types
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
-    from eidrive_scenario.experiments.sweeps.designs import points_of
-    from eidrive_scenario.experiments.sweeps.execution import KeptFiles
     from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
     from eidrive_scenario.experiments.sweeps.searches import BATCH
     from eidrive_scenario.experiments.sweeps.store import ResultStore
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
-    from eidrive_scenario.experiments.sweeps.typed_axes import with_types
-    from eidrive_scenario.experiments.sweeps.workers import LocalWorkers, Workers
+    from eidrive_scenario.experiments.sweeps.workers import KeptFiles, LocalWorkers, Workers
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.simulation import RunSettings
     from eidrive_scenario.simulation.added_settings import parse_drive

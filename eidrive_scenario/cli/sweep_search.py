@@ -10,13 +10,11 @@ from typing import Self
 from eidrive_scenario.cli.streams import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, check_different
-from eidrive_scenario.experiments.sweeps.boundary import Boundary
-from eidrive_scenario.experiments.sweeps.execution import KeptFiles
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
-from eidrive_scenario.experiments.sweeps.searches import Execute, falsify, find_boundary
+from eidrive_scenario.experiments.sweeps.searches import Boundary, Execute, falsify, find_boundary
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
-from eidrive_scenario.experiments.sweeps.workers import Workers
+from eidrive_scenario.experiments.sweeps.workers import KeptFiles, Workers
 
 MOST_RUNS = 200
 """Default maximum number of runs of a search."""

@@ -8,9 +8,9 @@ from pathlib import Path
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.store import is_store
 from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinished_runs
-from eidrive_scenario.reporting.replay.run_replays import write_replays
+from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.report import write_report
-from eidrive_scenario.reporting.run_report.reported_run import read_runs
+from eidrive_scenario.reporting.run_report.reported_runs import read_runs
 
 
 def report_files(
@@ -30,7 +30,7 @@ def report_files(
     omitted = [f"{path}: the run did not end" for path in unfinished_runs(locations)]
     unjudged: list[str] = []
     if stores:
-        from eidrive_scenario.reporting.run_report.sweep_runs import read_sweeps
+        from eidrive_scenario.reporting.run_report.reported_runs import read_sweeps
 
         swept, unjudged = read_sweeps(stores)
         results += swept

@@ -23,7 +23,7 @@ from rich.console import Console
 
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.repetitions import Job, jobs_of
-from eidrive_scenario.experiments.statistics.samples import summarize
+from eidrive_scenario.experiments.statistics.intervals import summarize
 from eidrive_scenario.simulation import RunResult, RunSettings
 
 DETECTORS = ("oracle", "yolov5")

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.stats import binom, binomtest, norm
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.experiments.statistics.samples import jackknife_interval, mean_interval
+from eidrive_scenario.experiments.statistics.intervals import jackknife_interval, mean_interval
 
 LEAST_PAIRS = 5
 """Minimum number of pairs for the interval of a difference of standard deviations, of which fewer say too little."""

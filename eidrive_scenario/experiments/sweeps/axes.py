@@ -1,16 +1,25 @@
-"""Axes of a sweep: what varies, and over which values."""
+"""Axes of a sweep: what varies, over which values, and which combinations of them a design runs."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
+from itertools import product
+from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted
 from eidrive_scenario.library import library_path
+from eidrive_scenario.openscenario import load_distribution, load_scenario
+from eidrive_scenario.openscenario.model import ParameterType
+from eidrive_scenario.randomness import integer_key
 from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.v2x.profile import NO_COOPERATION, load_profile
 
@@ -236,3 +245,97 @@ def _seconds(name: str, value: Scalar) -> float:
 
 def _error(text: str, hint: str) -> SettingError:
     return SettingError(Diagnostic(f"--vary: {quoted(text)}", hint))
+
+
+_WHOLE = frozenset({ParameterType.INTEGER, ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType.UNSIGNED_SHORT})
+"""Types whose values are whole numbers."""
+
+
+def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = False) -> tuple[Axis, ...]:
+    """Return the axes, of which intervals of parameters with an integer type consist of whole numbers.
+
+    scenario  file of the scenario or of the distribution. Its errors are left to the plan of the sweep
+
+    Raise SettingError for such an interval without a whole number.
+    """
+    if not any(axis.is_interval and not is_setting(axis.name) for axis in axes):
+        return tuple(axes)
+    names: set[str] = set()
+    with suppress(InputError):
+        source = load_distribution(scenario).scenario if is_distribution else scenario
+        declared = load_scenario(source).document.parameter_declarations
+        if declared is not None:
+            names = {one.name for one in declared.parameter_declaration if one.parameter_type in _WHOLE}
+    return tuple(_typed_axis(axis, names) for axis in axes)
+
+
+def _typed_axis(axis: Axis, names: set[str]) -> Axis:
+    if not axis.is_interval or is_setting(axis.name) or axis.name.removeprefix(PARAMETER) not in names:
+        return axis
+    typed = replace(axis, is_whole=True)
+    low, high = typed.ends
+    if low >= high:
+        message = f"--vary: {axis.name} is a whole number, and {axis.low:g}:{axis.high:g} has fewer than two of them"
+        raise SettingError(Diagnostic(message, "give a larger interval"))
+    return typed
+
+
+GRID = "grid"
+MOST_POINTS = 1_000_000
+"""Maximum number of combinations of a sweep."""
+
+
+def _latin_hypercube(axes: int, count: int, rng: np.random.Generator) -> Array:
+    from scipy.stats import qmc
+
+    return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(count))
+
+
+def _sobol(axes: int, count: int, rng: np.random.Generator) -> Array:
+    from scipy.stats import qmc
+
+    # The first points of a longer sequence are those of a shorter one, so that more samples add points.
+    complete = 1 << max(count - 1, 0).bit_length()
+    return np.asarray(qmc.Sobol(axes, rng=rng).random(complete)[:count])
+
+
+_SAMPLED: Mapping[str, Callable[[int, int, np.random.Generator], Array]] = {"lhs": _latin_hypercube, "sobol": _sobol}
+DESIGNS = (GRID, *_SAMPLED)
+"""Names of the designs: grid, Latin hypercube, and scrambled Sobol sequence."""
+
+
+def points_of(axes: Sequence[Axis], design: str, samples: int | None, seed: int) -> list[Point]:
+    """Return the combinations of a design; one without axes.
+
+    design   one of DESIGNS. The grid contains all combinations of lists and ranges; the last axis varies fastest
+    samples  number of sampled combinations
+    seed     seed of the sampling
+
+    Raise SettingError for an unknown design, an interval in a grid, or a number of samples that does not fit.
+    """
+    if design not in DESIGNS:
+        raise SettingError(Diagnostic(f"--design: unknown design {design!r}", f"expected {', '.join(DESIGNS)}"))
+    if design == GRID:
+        return _grid(axes, samples)
+    if not axes:
+        raise SettingError(Diagnostic(f"--design {design} without --vary", "give the axes of the design"))
+    if samples is None or not 1 <= samples <= MOST_POINTS:
+        raise SettingError(
+            Diagnostic(f"--design {design}: --samples is {samples}", f"expected 1 to {MOST_POINTS} combinations")
+        )
+    shares = _SAMPLED[design](len(axes), samples, np.random.default_rng(integer_key(seed, "design", design, size=16)))
+    return [{axis.name: axis.at(float(share)) for axis, share in zip(axes, row, strict=True)} for row in shares]
+
+
+def _grid(axes: Sequence[Axis], samples: int | None) -> list[Point]:
+    if samples is not None:
+        raise SettingError(Diagnostic("--samples has no effect in a grid", "select --design lhs or sobol"))
+    for axis in axes:
+        if axis.is_interval:
+            hint = f"give a step ({axis.name}={axis.low:g}:{axis.high:g}:STEP), or --design lhs or sobol"
+            raise SettingError(Diagnostic(f"--vary: {axis.name} is an interval in a grid", hint))
+    count = int(np.prod([len(axis.values) for axis in axes], dtype=np.float64))
+    if count > MOST_POINTS:
+        raise SettingError(Diagnostic(f"the grid has {count} combinations", f"at most {MOST_POINTS} are possible"))
+    names = [axis.name for axis in axes]
+    return [dict(zip(names, values, strict=True)) for values in product(*(axis.values for axis in axes))]

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 import msgspec
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
+from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.optional_imports import optional_import

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.execution import KeptFiles, crashed, execute, hung
 from eidrive_scenario.experiments.sweeps.hang_reports import HungRunError
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import (
@@ -20,10 +19,10 @@ from eidrive_scenario.experiments.sweeps.store import (
     PASSED,
     REPEATABLE,
     ResultStore,
+    RunWriter,
     StoredRun,
 )
-from eidrive_scenario.experiments.sweeps.workers import Workers
-from eidrive_scenario.experiments.sweeps.writing import RunWriter
+from eidrive_scenario.experiments.sweeps.workers import KeptFiles, Workers, crashed, execute, hung
 
 JUDGED = frozenset({PASSED, FAILED, EXCLUDED})
 """Outcomes with a verdict, and those of runs that constraints exclude."""

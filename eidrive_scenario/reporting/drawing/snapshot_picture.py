@@ -9,8 +9,7 @@ import numpy as np
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import footprint
-from eidrive_scenario.reporting.drawing.canvas import Canvas, Image
-from eidrive_scenario.reporting.drawing.ellipse import ellipse_of_95_percent
+from eidrive_scenario.reporting.drawing.canvas import Canvas, Image, ellipse_of_95_percent
 from eidrive_scenario.reporting.drawing.top_view import (
     FUSED,
     LINK,

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
+from numbers import Real
+from subprocess import DEVNULL
 from typing import TYPE_CHECKING, Any, Self
 
-from eidrive_scenario.errors import InputError, SimulationError
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, SimulationError, quoted
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
-from eidrive_scenario.reporting.live.browser import open_in_browser
-from eidrive_scenario.reporting.live.feed import Feed
-from eidrive_scenario.reporting.live.pace import Pace
-from eidrive_scenario.reporting.live.server import LiveServer
+from eidrive_scenario.reporting.live.server import Feed, LiveServer
 from eidrive_scenario.reporting.page import render_page
 from eidrive_scenario.reporting.replay.frame_data import (
     UNDRAWABLE,
@@ -28,14 +30,69 @@ from eidrive_scenario.reporting.replay.frame_data import (
     packed,
     replay_data,
 )
-from eidrive_scenario.reporting.replay.page import station_settings
-from eidrive_scenario.reporting.replay.page_values import TEMPLATE, decisive_instant, page_values
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
+from eidrive_scenario.reporting.replay.page import TEMPLATE, decisive_instant, page_values, station_settings
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
 from eidrive_scenario.simulation.run import RunResult
 
 if TYPE_CHECKING:
     from eidrive_scenario.simulation.simulation import Simulation
+
+
+def open_in_browser(address: str) -> None:
+    """Open an address in the default browser, if there is one, without waiting.
+
+    A separate process keeps output of the browser off the terminal, and the interruption of this process off the
+    browser. A browser for terminals ends, as it has no terminal. The variable BROWSER selects another program.
+    """
+    if sys.executable:
+        threading.Thread(target=_open, args=(address,), name="eidrive browser", daemon=True).start()
+
+
+def _open(address: str) -> None:
+    command = [sys.executable, "-I", "-m", "webbrowser", address]
+    subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True, check=False)
+
+
+_MAX_LAG = 0.25
+"""Time that a slow run catches up at most [s]."""
+_SLEEP = 0.5
+"""Longest sleep without a return to the interpreter, which can then raise an interruption [s]."""
+
+
+class Pace:
+    """Delay of a run, so that `speed` simulated seconds take a second; `math.inf` is as fast as possible.
+
+    A run that is slower than that is not delayed. Raise SettingError if the speed is not a number above 0.
+    """
+
+    def __init__(self, speed: float) -> None:
+        if not _is_speed(speed):
+            message = f"the speed of the live view is {quoted(speed)}"
+            raise SettingError(Diagnostic(message, "give a factor above 0; infinity is as fast as possible"))
+        self._speed = float(speed)
+        self._start: float | None = None
+        """Instant of the clock at which the simulated time was 0 [s]."""
+
+    def delay(self, simulated: float) -> float:
+        """Return the time until a simulated time is due [s], at least 0."""
+        if math.isinf(self._speed):
+            return 0.0
+        now, due = time.monotonic(), simulated / self._speed
+        if self._start is None or now - self._start - due > _MAX_LAG:
+            self._start = now - due
+        return max(0.0, self._start + due - now)
+
+    def wait(self, simulated: float) -> None:
+        """Sleep until a simulated time is due [s]."""
+        while (left := self.delay(simulated)) > 0.0:
+            time.sleep(min(left, _SLEEP))
+
+
+def _is_speed(value: object) -> bool:
+    # bool is a subclass of int, but True is not a factor
+    return not isinstance(value, bool) and isinstance(value, Real) and float(value) > 0.0
+
 
 WAIT = 5.0
 """Default of the maximum time for which the start of a run waits for a page [s]."""

@@ -20,10 +20,9 @@ from eidrive_scenario.reporting.drawing.canvas import Image
 from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
-from eidrive_scenario.reporting.replay.page import readable_roads, run_settings, station_settings
-from eidrive_scenario.reporting.replay.page_values import decisive_instant
+from eidrive_scenario.reporting.replay.page import decisive_instant, readable_roads, run_settings, station_settings
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.tolerances import TIME_TOLERANCE

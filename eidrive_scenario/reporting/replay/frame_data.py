@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,93 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.drawing.ellipse import ellipse_of_95_percent
-from eidrive_scenario.reporting.replay.messages import MessageList
+from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
-from eidrive_scenario.reporting.replay.timeline import Timeline
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
+from eidrive_scenario.storyboard.state.states import ElementState, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
+
+MOST = 40_000
+"""Maximum number of messages in a page."""
+Row = list[float | str | None]
+
+
+class MessageList:
+    """Messages in the order of their outcomes: [sent, sender, receiver, arrives or None if it is lost, reason].
+
+    Times are in s. The reason is that of a loss. Messages of a station to itself are omitted. `omitted` is the number
+    of messages after the first MOST, `count` that of the others.
+    """
+
+    def __init__(self) -> None:
+        self._rows: list[Row] = []
+        self.count = 0
+        self.omitted = 0
+
+    def observe(self, events: Iterable[LinkEvent]) -> None:
+        """Add the outcomes of one frame."""
+        for event in events:
+            if event.sender == event.receiver or not math.isfinite(event.sent):
+                continue
+            if self.count >= MOST:
+                self.omitted += 1
+                continue
+            delivered = event.outcome == "delivered" and event.arrives is not None and math.isfinite(event.arrives)
+            arrives = round(event.arrives, 3) if delivered and event.arrives is not None else None
+            self._rows.append(
+                [round(event.sent, 3), event.sender, event.receiver, arrives, "" if delivered else event.reason]
+            )
+            self.count += 1
+
+    def take(self) -> list[Row]:
+        """Return the messages since the last call."""
+        rows, self._rows = self._rows, []
+        return rows
+
+
+@dataclass
+class _Element:
+    """Element of the storyboard with the start, the end and the reason of each interval in which it was running."""
+
+    kind: str
+    intervals: list[list[Any]] = field(default_factory=list)
+
+
+class Timeline:
+    """Intervals in which the elements of a storyboard were running, by path, in the order of their first start."""
+
+    def __init__(self) -> None:
+        self._elements: dict[str, _Element] = {}
+        self._changed: set[str] = set()
+
+    def observe(self, changes: Iterable[StateChange]) -> None:
+        """Add the changes of one frame."""
+        for change in changes:
+            if not math.isfinite(change.time):
+                continue
+            time = round(change.time, 4)
+            starts = change.after is ElementState.RUNNING and change.before is not ElementState.RUNNING
+            ends = change.before is ElementState.RUNNING and change.after is not ElementState.RUNNING
+            if starts:
+                element = self._elements.setdefault(change.path, _Element(change.kind))
+                element.intervals.append([time, None, change.why, ""])
+                self._changed.add(change.path)
+            elif ends and change.path in self._elements:
+                interval = self._elements[change.path].intervals[-1]
+                interval[1], interval[3] = time, change.why
+                self._changed.add(change.path)
+
+    def take(self) -> list[list[Any]]:
+        """Return [path, kind, intervals] of each element with a change since the last call.
+
+        An interval is [start, end or None, reason of the start, of the end].
+        """
+        changed, self._changed = self._changed, set()
+        if not changed:
+            return []
+        return [[path, found.kind, found.intervals] for path, found in self._elements.items() if path in changed]
+
 
 _LARGEST_PAGE = 64 * 2**20
 """Approximate maximum size of the frames in a page [bytes]."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+import os
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, unquote
 
 from pydantic import ValidationError
 
@@ -15,19 +19,143 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.recording.recording import Recording, open_recording
+from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, result_of
 from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.reporting.drawing.canvas import HOUSE
 from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
-from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.reporting.drawing.top_view import (
+    AREA,
+    FUSED,
+    GROUND,
+    LANE,
+    LANES,
+    LINK,
+    LOST,
+    OWN,
+    PAINT,
+    RECEIVED,
+    WHITE,
+    RoadDrawing,
+    is_broken,
+)
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.replay.camera_files import camera_files
-from eidrive_scenario.reporting.replay.frame_data import describe_error, replay_data
-from eidrive_scenario.reporting.replay.page_values import TEMPLATE, decisive_instant, page_values
-from eidrive_scenario.reporting.run_report.reported_run import parse_run
+from eidrive_scenario.reporting.replay.frame_data import Data, describe_error, packed, replay_data
+from eidrive_scenario.reporting.replay.series import closest_approach
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.simulation.recorded_outcome import CONTEXT, TRAILERS, recorded_outcome
 from eidrive_scenario.v2x.messages.message import LinkEvent
+
+_NAME = re.compile(r"(?P<camera>.+)-(?P<tick>\d+)\.jpg")
+
+
+def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
+    """Return the images in the folder of a run, by station and camera: their ticks in order, and the part of their
+    address before the tick, relative to the folder `page` of the page.
+
+    The result is empty without images.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    folder = run / IMAGES
+    if not folder.is_dir():
+        return found
+    for station in sorted(path for path in folder.iterdir() if path.is_dir()):
+        ticks: dict[str, list[int]] = {}
+        for entry in os.scandir(station):
+            match = _NAME.fullmatch(entry.name)
+            if match is not None:
+                ticks.setdefault(match["camera"], []).append(int(match["tick"]))
+        if ticks:
+            relative = quote(os.fsencode(Path(os.path.relpath(station, page)).as_posix()))
+            found[unquote(station.name)] = {
+                unquote(camera): {"address": f"{relative}/{quote(os.fsencode(camera))}-", "ticks": sorted(numbers)}
+                for camera, numbers in sorted(ticks.items())
+            }
+    return found
+
+
+TEMPLATE = "replay/page.html.jinja"
+COLORS = {
+    "own": OWN,
+    "received": RECEIVED,
+    "link": LINK,
+    "lost": LOST,
+    "area": AREA,
+    "fused": FUSED,
+    "house": HOUSE,
+    "ground": GROUND,
+}
+
+
+def page_values(
+    scenario: str,
+    seed: int,
+    settings: Mapping[str, Any],
+    *,
+    facts: Mapping[str, str],
+    command: str,
+    result: ReportedRun | None,
+    roads: RoadDrawing,
+    data: Data,
+    images: Mapping[str, Any],
+    notices: Sequence[str] = (),
+    complete: bool = True,
+    live: bool = False,
+) -> dict[str, Any]:
+    """Return the values of the template `TEMPLATE`.
+
+    settings  resolved settings of the run; empty if they are unknown
+    facts     facts about the run that the page lists
+    data      of all frames, see `replay_data`; of no frame for a live page
+    images    see `camera_files`
+    notices   damage of a recording, or what a live page does not show
+    complete  whether the run has ended, or is still in progress
+    live      whether the page receives the data of the frames from a server
+    """
+    return {
+        "title": f"{shorten(scenario, 200)}, seed {seed}",
+        "result": result,
+        "facts": facts,
+        "settings": json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
+        "command": command,
+        "notices": notices,
+        "complete": complete,
+        "live": live,
+        "data": {**packed(data), "roads": _roads(roads), "colors": COLORS, "images": images},
+    }
+
+
+def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[str]) -> dict[str, Any] | None:
+    """Return the decisive instant of a run: its first contact, the smallest distance that a criterion measured, or the
+    smallest gap of a driven vehicle; None without any of them.
+
+    names  names of the actors
+    """
+    if result is not None and data["contact"] is None:
+        approach = closest_approach(result.metrics, [verdict.value for verdict in result.criteria], names)
+        if approach is not None:
+            return approach
+    found: dict[str, Any] | None = data["decisive"]
+    return found
+
+
+def _roads(roads: RoadDrawing) -> dict[str, Any]:
+    return {
+        "levels": [_level(level) for level in roads.levels],
+        "houses": [[round(height, 2), outline.round(2).tolist()] for outline, height in roads.houses],
+    }
+
+
+def _level(roads: RoadDrawing) -> dict[str, Any]:
+    """Return lanes and road marks of one level."""
+    return {
+        "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
+        "lines": [
+            [is_broken(kind), PAINT.get(color, WHITE), line.round(2).tolist()] for kind, color, line in roads.markings
+        ],
+    }
 
 
 @dataclass(frozen=True)
@@ -150,3 +278,39 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     hidden = ("format", "parameters", "settings", "command", CONTEXT, TRAILERS)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
+
+
+FOLDER = "replays"
+"""Folder of the replays beside the report."""
+MOST = 200
+"""Maximum number of replays of a report; runs that did not pass come first."""
+
+
+def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[ReportedRun], list[str]]:
+    """Write the replay of each run with a recording into a folder `beside` the report.
+
+    Return the runs with the addresses of their replays, and the reasons for which recordings have none.
+    """
+    linked = list(runs)
+    omitted: list[str] = []
+    taken: set[str] = set()
+    recordings = [
+        (index, run.folder / RECORDING)
+        for index, run in sorted(enumerate(runs), key=lambda entry: entry[1].passed)
+        if run.folder is not None and (run.folder / RECORDING).is_file()
+    ]
+    for index, recording in recordings[:MOST]:
+        name = recording.parent.name
+        while name in taken:
+            name += "-"
+        taken.add(name)
+        page = beside / FOLDER / f"{name}.html"
+        try:
+            make_replay(open_recording(recording), page, result_of(recording), result_file=recording.with_name(RESULT))
+        except InputError as error:
+            omitted.append(f"{recording}: {error.diagnostics[0].message}; the run has no replay")
+            continue
+        linked[index] = runs[index].model_copy(update={"replay": f"{FOLDER}/{quote(os.fsencode(page.name))}"})
+    if len(recordings) > MOST:
+        omitted.append(f"{len(recordings) - MOST} passed or later runs have no replay: `eidrive view` writes it")
+    return linked, omitted

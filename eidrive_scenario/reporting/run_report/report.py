@@ -11,11 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.experiments.statistics.samples import Summary, summarize
+from eidrive_scenario.experiments.statistics.intervals import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix, success_rate
-from eidrive_scenario.reporting.run_report.rate_pictures import rate_curves, rate_maps
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
+from eidrive_scenario.reporting.run_report.rates import (
+    parameter_matrix,
+    rate_curves,
+    rate_maps,
+    scenario_matrix,
+    success_rate,
+)
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 PREFERRED = ("min_distance", "time_to_collision", "collision.count", "messages.lost")

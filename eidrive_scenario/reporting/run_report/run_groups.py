@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, flow_text, shorten
 
 _LEFT_OUT = ("seed", "run", "drawn", "varied", "scenario", "channel", "detector", "planner", "cooperate")

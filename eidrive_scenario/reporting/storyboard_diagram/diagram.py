@@ -7,7 +7,6 @@ from html import escape
 from pathlib import Path
 
 from eidrive_scenario.files.atomic import write_atomically
-from eidrive_scenario.reporting.storyboard_diagram.boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
 from eidrive_scenario.reporting.storyboard_diagram.layout import (
     GAP,
     INIT_WIDTH,
@@ -16,11 +15,16 @@ from eidrive_scenario.reporting.storyboard_diagram.layout import (
     TEXT,
     TITLE,
     Arrow,
+    BoxLine,
     DiagramLayout,
     Placed,
+    Role,
     TextLine,
+    init_boxes,
     layout_diagram,
     sized,
+    stop_lines,
+    story_boxes,
     text_lines,
 )
 from eidrive_scenario.storyboard.storyboard import Storyboard

@@ -19,6 +19,13 @@ from eidrive_reports.cooperative_perception.scores import FULL_SCORE, Perception
 from scipy.stats import binom
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.experiments.statistics.intervals import (
+    Proportion,
+    anytime_interval,
+    clopper_pearson,
+    mean_interval,
+    wilson,
+)
 from eidrive_scenario.experiments.statistics.paired import (
     LEAST_PAIRS,
     PairedDifference,
@@ -27,14 +34,7 @@ from eidrive_scenario.experiments.statistics.paired import (
     paired_ratio,
     paired_spread,
 )
-from eidrive_scenario.experiments.statistics.proportions import (
-    Proportion,
-    anytime_interval,
-    clopper_pearson,
-    wilson,
-)
-from eidrive_scenario.experiments.statistics.samples import mean_interval
-from eidrive_scenario.experiments.sweeps.boundary import BoundarySearch
+from eidrive_scenario.experiments.sweeps.searches import BoundarySearch
 from eidrive_scenario.randomness import generator
 
 SAMPLES = 3000

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.experiments.statistics.proportions import anytime_interval, clopper_pearson, wilson
+from eidrive_scenario.experiments.statistics.intervals import anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.randomness import generator
 
 KNOWN = [

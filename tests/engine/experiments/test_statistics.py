@@ -8,14 +8,19 @@ from statistics import NormalDist
 
 import pytest
 
+from eidrive_scenario.experiments.statistics.intervals import (
+    interval_text,
+    jackknife_interval,
+    mean_interval,
+    summarize,
+    wilson,
+)
 from eidrive_scenario.experiments.statistics.paired import (
     PairedDifference,
     paired_difference,
     paired_ratio,
     paired_spread,
 )
-from eidrive_scenario.experiments.statistics.proportions import wilson
-from eidrive_scenario.experiments.statistics.samples import interval_text, jackknife_interval, mean_interval, summarize
 
 Compare = Callable[[list[float], list[float]], PairedDifference]
 SQRT_3 = math.sqrt(3.0)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
-from eidrive_scenario.reporting.drawing.bridges import Strip, bridge_spans
 from eidrive_scenario.reporting.drawing.canvas import Canvas
-from eidrive_scenario.reporting.drawing.road_drawing import road_drawing
+from eidrive_scenario.reporting.drawing.road_drawing import Strip, bridge_spans, road_drawing
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.reading.document import parse_road_map
 

@@ -8,18 +8,18 @@ from itertools import pairwise
 import pytest
 from lxml import etree
 
-from eidrive_scenario.reporting.drawing.chart import (
+from eidrive_scenario.reporting.drawing.charts import (
     BOTTOM,
     HEIGHT,
     LEFT,
     NAME_SPACING,
+    PAGE_COLORS,
     RIGHT,
     TOP,
     WIDTH,
     ChartSeries,
     line_chart,
 )
-from eidrive_scenario.reporting.drawing.inline_svg import PAGE_COLORS
 
 SVG = "{http://www.w3.org/2000/svg}"
 

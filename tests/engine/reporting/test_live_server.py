@@ -12,8 +12,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.reporting.live.feed import Feed
-from eidrive_scenario.reporting.live.server import LiveServer
+from eidrive_scenario.reporting.live.server import Feed, LiveServer
 
 PAGE = b"<h1>run</h1>"
 PATIENCE = 20.0

@@ -21,8 +21,8 @@ from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import result_of
-from eidrive_scenario.reporting.live import pace
-from eidrive_scenario.reporting.live.pace import Pace
+from eidrive_scenario.reporting.live import live_view
+from eidrive_scenario.reporting.live.live_view import Pace
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
@@ -251,7 +251,7 @@ class Clock:
 def test_pace_delays_simulated_time_by_speed(monkeypatch: pytest.MonkeyPatch) -> None:
     """At twice real time 3 s take 1.5 s of the clock."""
     clock = Clock()
-    monkeypatch.setattr(pace, "time", clock)
+    monkeypatch.setattr(live_view, "time", clock)
     double = Pace(2.0)
     for tick in range(61):
         double.wait(0.05 * tick)
@@ -261,7 +261,7 @@ def test_pace_delays_simulated_time_by_speed(monkeypatch: pytest.MonkeyPatch) ->
 def test_pace_of_slow_run_catches_up_quarter_second(monkeypatch: pytest.MonkeyPatch) -> None:
     """A pause of 0.2 s is caught up; after one of 5 s the pace restarts."""
     clock = Clock()
-    monkeypatch.setattr(pace, "time", clock)
+    monkeypatch.setattr(live_view, "time", clock)
     real = Pace(1.0)
     real.wait(0.0)
     clock.now = 101.2

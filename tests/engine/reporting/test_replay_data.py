@@ -15,11 +15,9 @@ from eidrive_scenario.evaluation.nearest_actor import nearest_body, nearest_pair
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.replay.camera_files import camera_files
-from eidrive_scenario.reporting.replay.frame_data import packed, replay_data
-from eidrive_scenario.reporting.replay.messages import MessageList
+from eidrive_scenario.reporting.replay.frame_data import MessageList, Timeline, packed, replay_data
+from eidrive_scenario.reporting.replay.page import camera_files
 from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
-from eidrive_scenario.reporting.replay.timeline import Timeline
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world.view import Contact
@@ -225,7 +223,7 @@ def test_messages_have_arrival_or_reason_of_loss() -> None:
 
 
 def test_number_of_messages_in_page_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("eidrive_scenario.reporting.replay.messages.MOST", 3)
+    monkeypatch.setattr("eidrive_scenario.reporting.replay.frame_data.MOST", 3)
     messages = MessageList()
     for number in range(5):
         messages.observe([LinkEvent("RSU", "Ego", number, 0.1 * number, "delivered", 1.0, "", 200)])

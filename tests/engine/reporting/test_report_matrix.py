@@ -12,10 +12,10 @@ from lxml import html
 
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.replay.run_replays import write_replays
-from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix
+from eidrive_scenario.reporting.replay.page import write_replays
+from eidrive_scenario.reporting.run_report.rates import parameter_matrix, scenario_matrix
 from eidrive_scenario.reporting.run_report.report import write_report
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run, read_runs
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run, read_runs
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 Play = Callable[..., list[Frame]]
@@ -116,7 +116,7 @@ def test_damaged_recording_is_reported_without_replay(tmp_path: Path) -> None:
 def test_failed_runs_have_replays_before_passed_ones(
     street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("eidrive_scenario.reporting.replay.run_replays.MOST", 2)
+    monkeypatch.setattr("eidrive_scenario.reporting.replay.page.MOST", 2)
     outcomes = {"a": True, "b": False, "c": True, "d": False}
     files = [stored_run(tmp_path, name, street(1)[:3], passed=passed) for name, passed in outcomes.items()]
     linked, omitted = write_replays(read_runs(files)[0], tmp_path / "out")

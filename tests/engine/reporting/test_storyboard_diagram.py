@@ -21,10 +21,19 @@ from storyboard_xml import (
 )
 
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.reporting.storyboard_diagram.boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
 from eidrive_scenario.reporting.storyboard_diagram.diagram import storyboard_diagram, write_storyboard_diagram
-from eidrive_scenario.reporting.storyboard_diagram.layout import DiagramLayout, layout_diagram, text_lines
-from eidrive_scenario.reporting.storyboard_diagram.text_width import width_of, wrap_text
+from eidrive_scenario.reporting.storyboard_diagram.layout import (
+    BoxLine,
+    DiagramLayout,
+    Role,
+    init_boxes,
+    layout_diagram,
+    stop_lines,
+    story_boxes,
+    text_lines,
+    width_of,
+    wrap_text,
+)
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 SET = '<GlobalAction><VariableAction variableRef="v"><SetAction value="1"/></VariableAction></GlobalAction>'

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from eidrive_scenario import wall_limit as wall_limit_module
 from eidrive_scenario.api.criteria import Criterion, Frame, Verdict
-from eidrive_scenario.experiments.sweeps.execution import KeptFiles, execute
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.workers import KeptFiles, execute
 from eidrive_scenario.registry import registry
 
 

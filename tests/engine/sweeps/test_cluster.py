@@ -18,13 +18,12 @@ import pytest
 from sweep_workers import InProcess
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.axes import parse_axes
+from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
-from eidrive_scenario.experiments.sweeps.designs import points_of
-from eidrive_scenario.experiments.sweeps.execution import KeptFiles, execute
 from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepJob, plan_of, versions
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+from eidrive_scenario.experiments.sweeps.workers import KeptFiles, execute
 from eidrive_scenario.project import VARIABLE
 from eidrive_scenario.registry import registry, use_project
 from eidrive_scenario.simulation import RunSettings

@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import qmc
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axes
-from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axes, points_of
 
 AXES = (Axis("a", low=0.0, high=1.0), Axis("b", low=-1.0, high=3.0), Axis("kind", ("x", "y")))
 

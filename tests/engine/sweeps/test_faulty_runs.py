@@ -15,13 +15,11 @@ from command_fixtures import Eidrive, eidrive
 from sweep_workers import InProcess
 
 from eidrive_scenario.cli.interruption import interrupt_once
-from eidrive_scenario.experiments.sweeps.axes import parse_axes
-from eidrive_scenario.experiments.sweeps.designs import points_of
-from eidrive_scenario.experiments.sweeps.execution import KeptFiles, execute
+from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
-from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
+from eidrive_scenario.experiments.sweeps.workers import KeptFiles, LocalWorkers, execute
 from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings
 

@@ -8,8 +8,7 @@ import pytest
 from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, Point, parse_axes
-from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.axes import Axis, Point, parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.jobs import SweepPlan, plan_of
 from eidrive_scenario.simulation import RunSettings
 

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from eidrive_scenario.api.run import read_results
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.statistics.proportions import anytime_interval, wilson
+from eidrive_scenario.experiments.statistics.intervals import anytime_interval, wilson
 from eidrive_scenario.experiments.sweeps.results import stored_runs, summaries, write_parquet
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 

@@ -15,8 +15,7 @@ import pytest
 from sweep_workers import InProcess
 
 from eidrive_scenario.errors import ConstraintError, InputError, SettingError
-from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes
-from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, versions
 from eidrive_scenario.experiments.sweeps.results import summaries
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun

@@ -15,9 +15,9 @@ from lxml import html
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.reporting.report_files import report_files
-from eidrive_scenario.reporting.run_report import report, sweep_runs
-from eidrive_scenario.reporting.run_report.levels import RANGES, levels_of
-from eidrive_scenario.reporting.run_report.sweep_runs import read_sweeps
+from eidrive_scenario.reporting.run_report import report, reported_runs
+from eidrive_scenario.reporting.run_report.rates import RANGES, levels_of
+from eidrive_scenario.reporting.run_report.reported_runs import read_sweeps
 
 __all__ = ["eidrive"]
 
@@ -236,6 +236,6 @@ def test_large_sweep_lists_failed_runs_first(tmp_path: Path, monkeypatch: pytest
 
 
 def test_too_large_sweep_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep_runs, "MOST_RUNS", 2)
+    monkeypatch.setattr(reported_runs, "MOST_RUNS", 2)
     with pytest.raises(SettingError, match="more than 2 runs"):
         page_of(tmp_path, [row(number, True, Speed=number) for number in range(3)])

@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis
-from eidrive_scenario.experiments.sweeps.designs import points_of
-from eidrive_scenario.experiments.sweeps.typed_axes import with_types
+from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis, points_of, with_types
 
 COUNT = Axis("Count", low=0.5, high=4.5)
 

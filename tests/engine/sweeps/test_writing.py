@@ -11,8 +11,7 @@ from msgspec.structs import replace
 from sweep_runs import RUN, opened
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
-from eidrive_scenario.experiments.sweeps.writing import RunWriter
+from eidrive_scenario.experiments.sweeps.store import ResultStore, RunWriter, StoredRun
 
 RUNS = [replace(RUN, key=str(number) * 64, number=number) for number in range(5)]
 

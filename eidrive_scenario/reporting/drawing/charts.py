@@ -1,0 +1,279 @@
+"""Line charts and heat maps as inline SVG of a page, drawn by matplotlib in the colors of the page."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.experiments.statistics.intervals import Proportion
+
+PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
+"""CSS variables of the page, whose values depend on its light or dark scheme, by the color that matplotlib draws."""
+AXIS, GRID, TEXT, PAPER = PAGE_COLORS
+PAGE_STYLE: dict[Any, Any] = {
+    "axes.edgecolor": AXIS,
+    "axes.labelcolor": TEXT,
+    "axes.spines.left": False,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "font.size": 9.0,
+    "grid.color": GRID,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "eidrive",
+    "text.parse_math": False,
+    "xtick.color": AXIS,
+    "xtick.labelcolor": TEXT,
+    "ytick.labelcolor": TEXT,
+    "ytick.left": False,
+}
+"""Settings of matplotlib for figures of a page."""
+
+
+def inline_svg(figure: Figure, title: str, *, kind: str = "chart", above: str = "") -> str:
+    """Return a figure as an SVG element with the colors and fonts of the page, and without ids of its groups.
+
+    kind   class of the element
+    above  SVG elements that are drawn last, in points from the upper left corner
+    """
+    buffer = io.StringIO()
+    without_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(buffer, format="svg", transparent=True, metadata=without_metadata)
+    svg = buffer.getvalue()
+    svg = svg[svg.index("<defs>") : svg.rindex("</svg>")]
+    svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # applies to all elements of a page
+    svg = re.sub(r'<g id="(series|mark|name)">', r'<g class="\1">', svg)
+    svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
+    svg = re.sub(r"font: (?:bold |700 )([\d.]+px)[^;\"]*", r"font-weight: 700; font-size: \1", svg)
+    svg = re.sub(r" ?font(?:-family)?: [^;\"]*;", "", svg)
+    svg = svg.replace("xlink:href", "href")
+    for color, variable in PAGE_COLORS.items():
+        svg = svg.replace(color, f"var({variable}, {color})")
+    width, height = 72.0 * figure.get_size_inches()
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" class="{kind}" viewBox="0 0 {width:g} {height:g}" role="img">'
+    return f"{head}<title>{escape(title)}</title>{svg}{above}</svg>"
+
+
+WIDTH, HEIGHT = 11.0, 3.0
+"""Size of the chart [in]; a page scales it to its own width."""
+LEFT, RIGHT, TOP, BOTTOM = 0.047, 0.873, 0.95, 0.14
+"""Edges of the axes as fractions of the size. The names of the series are to the right of them."""
+WIDE = 0.975
+"""Right edge of the axes without names; half of the number at the end of the axis is beyond it."""
+NAME_SPACING = 11.5
+"""Minimum vertical distance between names [pt]."""
+
+
+@dataclass(frozen=True)
+class ChartSeries:
+    """Series of a chart: points (x, y), and the index of an optional marked point.
+
+    low, high  limits of the interval of each y, drawn as a band; () without intervals
+    """
+
+    name: str
+    color: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    dashed: bool = False
+    mark: int | None = None
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+
+
+def line_chart(
+    lines: Sequence[ChartSeries],
+    *,
+    x_title: str,
+    y_title: str,
+    x_range: tuple[float, float] | None = None,
+    y_range: tuple[float, float] | None = None,
+    named: bool = True,
+    points: bool = False,
+) -> str:
+    """Return the series as an SVG element. A line is interrupted at points outside the ranges.
+
+    named   whether the names of the series are written beside their ends; without them the page needs a legend
+    points  whether each point is marked
+    """
+    with rc_context(PAGE_STYLE):
+        figure = Figure(figsize=(WIDTH, HEIGHT))
+        axes = figure.add_axes((LEFT, BOTTOM, (RIGHT if named else WIDE) - LEFT, TOP - BOTTOM))
+        axes.set_xlim(x_range or _extent([value for line in lines for value in line.x]))
+        axes.set_ylim(y_range or (0.0, _extent([value for line in lines for value in line.y])[1]))
+        axes.set_xlabel(x_title)
+        axes.set_ylabel(y_title)
+        axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        axes.grid(axis="y")
+        axes.set_axisbelow(True)
+        ends = [end for line in sorted(lines, key=lambda line: line.dashed) if (end := _draw(axes, line)) is not None]
+        for line in lines if points else ():
+            axes.plot(line.x, line.y, "o", color=line.color, ms=4.0, clip_on=False, zorder=3.0, gid="mark")
+        if named:
+            _draw_names(axes, ends)
+        return inline_svg(figure, f"{y_title} over {x_title}")
+
+
+def _draw(axes: Axes, line: ChartSeries) -> tuple[float, float, ChartSeries] | None:
+    """Draw a series and return its last point inside the ranges, or None without such a point."""
+    x, y = np.asarray(line.x, dtype=np.float64), np.asarray(line.y, dtype=np.float64)
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    inside = (left <= x) & (x <= right) & (bottom <= y) & (y <= top)
+    if not inside.any():
+        return None
+    if line.low:
+        axes.fill_between(x, line.low, line.high, color=line.color, alpha=0.16, lw=0.0)
+    style = (0.0, (3.6, 3.6)) if line.dashed else "-"
+    axes.plot(x, np.where(inside, y, np.nan), color=line.color, lw=1.6, ls=style, gid="series")
+    if line.mark is not None:
+        point = [x[line.mark]], [y[line.mark]]
+        axes.plot(*point, "o", color=line.color, ms=6.5, mec=PAPER, mew=1.1, clip_on=False, zorder=3.0, gid="mark")
+    last = int(np.flatnonzero(inside)[-1])
+    return float(x[last]), float(y[last]), line
+
+
+def _draw_names(axes: Axes, ends: Sequence[tuple[float, float, ChartSeries]]) -> None:
+    """Write the names of the series beside their last points, with a minimum distance between names."""
+    bottom, top = axes.get_ylim()
+    height = 72.0 * HEIGHT * (TOP - BOTTOM)
+    previous = math.inf
+    for x, y, line in sorted(ends, key=lambda end: -end[1]):
+        previous = min(height * (y - bottom) / ((top - bottom) or 1.0), previous - NAME_SPACING)
+        axes.annotate(
+            line.name,
+            (x, y),
+            (1.015, previous),
+            textcoords=("axes fraction", "axes points"),
+            color=line.color,
+            weight="bold",
+            va="center",
+            arrowprops={"arrowstyle": "-", "color": line.color, "alpha": 0.6, "relpos": (0.0, 0.5), "shrinkA": 0.0},
+            annotation_clip=False,
+            gid="name",
+        )
+
+
+def _extent(values: Sequence[float]) -> tuple[float, float]:
+    return (min(values), max(values)) if values else (0.0, 1.0)
+
+
+def heat_cells(
+    axes: Axes,
+    xs: Sequence[float],
+    ys: Sequence[float],
+    values: Array,
+    *,
+    colors: str | Colormap,
+    scale: Normalize,
+    line: float = 0.5,
+) -> QuadMesh:
+    """Draw values (len(ys), len(xs)) as rectangles around sorted xs and ys. NaN draws none.
+
+    line  width of the white lines between cells [pt]
+    """
+    style: dict[str, Any] = {"edgecolors": "white", "linewidth": line} if line else {}
+    return axes.pcolormesh(cell_edges(xs), cell_edges(ys), values, cmap=colors, norm=scale, **style)
+
+
+def cell_edges(values: Sequence[float]) -> Array:
+    """Return the edges of cells around sorted values."""
+    if len(values) == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    inner = (np.array(values[1:]) + np.array(values[:-1])) / 2.0
+    return np.concatenate([[2 * values[0] - inner[0]], inner, [2 * values[-1] - inner[-1]]])
+
+
+WIDTH, HEIGHT = 6.2, 4.0
+"""Size of the map [in]; a page scales it to its own width."""
+LEFT, RIGHT, TOP, BOTTOM = 0.11, 0.82, 0.975, 0.13
+"""Edges of the axes as fractions of the size. The color bar is to the right of them."""
+COLORS = "cividis"
+"""Color map from 0 (blue) to 1 (yellow), which color-blind readers can distinguish."""
+MOST_NUMBERS = 12
+"""Maximum number of columns and of rows whose cells contain their percentage."""
+_BRIGHT = 0.55
+"""Rate from which the text of a cell is dark."""
+
+
+def rate_map(
+    xs: Sequence[float],
+    ys: Sequence[float],
+    rates: Mapping[tuple[int, int], Proportion],
+    *,
+    x_title: str,
+    y_title: str,
+    names: tuple[Sequence[str], Sequence[str]],
+) -> str:
+    """Return an SVG element with one cell per rate, at (column, row). A tooltip of each has its interval.
+
+    names  texts of the values of columns and rows, for the tooltips
+    """
+    shares = np.full((len(ys), len(xs)), np.nan)
+    for (column, row), rate in rates.items():
+        shares[row, column] = rate.share
+    with rc_context(PAGE_STYLE):
+        figure = Figure(figsize=(WIDTH, HEIGHT), dpi=72.0)
+        axes = figure.add_axes((LEFT, BOTTOM, RIGHT - LEFT, TOP - BOTTOM))
+        mesh = heat_cells(axes, xs, ys, shares, colors=COLORS, scale=Normalize(0.0, 1.0))
+        axes.set_xlabel(x_title)
+        axes.set_ylabel(y_title)
+        axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
+        axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
+        beside = figure.add_axes((RIGHT + 0.03, BOTTOM, 0.03, TOP - BOTTOM))
+        bar = figure.colorbar(mesh, cax=beside, format=PercentFormatter(1.0))
+        bar.set_label("success rate")
+        beside.tick_params(length=0.0)
+        bar.outline.set_visible(False)
+        if max(len(xs), len(ys)) <= MOST_NUMBERS:
+            _write_numbers(axes, xs, ys, shares)
+        above = _tooltips(axes, xs, ys, rates, (x_title, y_title), names)
+        return inline_svg(figure, f"success rate over {x_title} and {y_title}", kind="map", above=above)
+
+
+def _write_numbers(axes: Axes, xs: Sequence[float], ys: Sequence[float], shares: Array) -> None:
+    colors = matplotlib.colormaps[COLORS]
+    for row, y in enumerate(ys):
+        for column, x in enumerate(xs):
+            share = float(shares[row, column])
+            if not np.isnan(share):
+                color = colors(0.0) if share > _BRIGHT else "#fffffe"
+                axes.text(x, y, f"{100.0 * share:.0f}", color=color, ha="center", va="center", fontsize=8.0)
+
+
+def _tooltips(
+    axes: Axes,
+    xs: Sequence[float],
+    ys: Sequence[float],
+    rates: Mapping[tuple[int, int], Proportion],
+    titles: tuple[str, str],
+    names: tuple[Sequence[str], Sequence[str]],
+) -> str:
+    """Return transparent rectangles above the cells, whose titles a browser shows."""
+    height = 72.0 * HEIGHT
+    across = axes.transData.transform([(edge, 0.0) for edge in cell_edges(xs)])[:, 0]
+    down = height - axes.transData.transform([(0.0, edge) for edge in cell_edges(ys)])[:, 1]
+    found = []
+    for (column, row), rate in sorted(rates.items()):
+        values = ", ".join(
+            f"{title} {name[place]}" for title, name, place in zip(titles, names, (column, row), strict=True)
+        )
+        text = f"{values}: {rate.successes} of {rate.trials} passed, 95 % interval {rate.low:.2f} to {rate.high:.2f}"
+        place = f'x="{across[column]:.2f}" y="{down[row + 1]:.2f}"'
+        size = f'width="{across[column + 1] - across[column]:.2f}" height="{down[row] - down[row + 1]:.2f}"'
+        found.append(f'<rect {place} {size} fill="transparent"><title>{escape(text)}</title></rect>')
+    return "".join(found)

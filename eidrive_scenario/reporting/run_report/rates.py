@@ -1,0 +1,290 @@
+"""Success rates of runs over one or two variables: a table, a curve, heat maps."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+
+from markupsafe import Markup
+
+from eidrive_scenario.experiments.statistics.intervals import Proportion, wilson
+from eidrive_scenario.reporting.drawing.charts import ChartSeries, line_chart, rate_map
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
+from eidrive_scenario.reporting.run_report.run_groups import RunGroup
+
+MOST_VALUES = 24
+"""Maximum number of values that are shown one by one."""
+RANGES = 10
+"""Number of ranges of equal width of an axis with more values."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Values of an axis with numbers, in ascending order.
+
+    centers  value, or center of the range, of each level
+    labels   its text
+    start, width  lower end of the first range and width of each; width 0 for single values
+    """
+
+    name: str
+    centers: tuple[float, ...]
+    labels: tuple[str, ...]
+    start: float = 0.0
+    width: float = 0.0
+
+    def index(self, run: ReportedRun) -> int:
+        """Return the position of the level of a run. Raise ValueError for a run without this value."""
+        value = run.value_of(self.name)
+        if not isinstance(value, int | float):
+            raise ValueError(f"no number {self.name}")
+        if self.width:
+            return min(int((value - self.start) / self.width), len(self.centers) - 1)
+        return self.centers.index(float(value))
+
+
+def levels_of(runs: Sequence[ReportedRun], name: str) -> Levels | None:
+    """Return the levels of an axis; None if a run has no number for it."""
+    values = [run.value_of(name) for run in runs]
+    numbers = {value for value in values if isinstance(value, int | float)}
+    if not values or not all(isinstance(value, int | float) for value in values):
+        return None
+    if len(numbers) <= MOST_VALUES:
+        ordered = sorted(numbers)
+        return Levels(name, tuple(map(float, ordered)), tuple(map(_level_label, ordered)))
+    start, end = float(min(numbers)), float(max(numbers))
+    width = (end - start) / RANGES
+    ends = [start + width * index for index in range(RANGES + 1)]
+    centers = tuple((low + high) / 2.0 for low, high in pairwise(ends))
+    labels = tuple(f"{low:.3g} … {high:.3g}" for low, high in pairwise(ends))
+    return Levels(name, centers, labels, start, width)
+
+
+def _level_label(value: float) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.6g}"
+
+
+MOST_COLUMNS, MOST_CELLS = 40, 4000
+"""Maximum number of columns and cells of a matrix in a page."""
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Success rates with their 95 % intervals (Wilson): one cell per row and column, None without runs.
+
+    corner  names of the variables of the rows and columns
+    """
+
+    corner: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[Proportion | None, ...]], ...]
+
+
+def scenario_matrix(groups: Sequence[RunGroup]) -> Matrix | None:
+    """Return the matrix of scenarios and settings; None for one scenario, one setting or too many settings."""
+    names = [(group.scenario, _name(group)) for group in groups]
+    detailed = len(set(names)) < len(names)
+    found: dict[str, dict[str, list[ReportedRun]]] = {}
+    for group in groups:
+        found.setdefault(group.scenario, {}).setdefault(_name(group, detailed=detailed), []).extend(group.distinct)
+    return _matrix("scenario", found, least_rows=2)
+
+
+def _name(group: RunGroup, *, detailed: bool = False) -> str:
+    """Return the channel and the settings in which a group differs, `detailed` with those of the channel."""
+    own = [f"{name}: {value}" for name, value in group.differing.items() if detailed or not name.startswith("channel.")]
+    return " · ".join([group.channel or "no channel", *own])
+
+
+def parameter_matrix(runs: Sequence[ReportedRun], varied: Sequence[str]) -> Matrix | None:
+    """Return the matrix of one or two varied parameters; None for other runs.
+
+    Many different numbers are combined to ranges. Values drawn at random, of which none occurs twice, have no matrix.
+    """
+    if not 1 <= len(varied) <= 2:
+        return None
+    down = varied[1] if len(varied) == 2 else ""
+    across, along = _label(runs, varied[0]), _label(runs, down) if down else lambda run: "passed"
+    found: dict[str, dict[str, list[ReportedRun]]] = {}
+    for run in runs:
+        found.setdefault(along(run), {}).setdefault(across(run), []).append(run)
+    columns = {name for cells in found.values() for name in cells}
+    if not all(run.is_swept for run in runs) and len(runs) <= max(len(columns), len(found)):
+        return None
+    return _matrix(f"{down} \\ {varied[0]}" if down else varied[0], found, least_rows=1)
+
+
+def axis_matrix(groups: Sequence[RunGroup], axis: str) -> Matrix | None:
+    """Return the matrix of the groups of a scenario over the axis of a sweep, with one row per group."""
+    across = _label([run for group in groups for run in group.distinct], axis)
+    found: dict[str, dict[str, list[ReportedRun]]] = {}
+    for group, name in zip(groups, group_names(groups), strict=True):
+        for run in group.distinct:
+            found.setdefault(name, {}).setdefault(across(run), []).append(run)
+    return _matrix(axis, found, least_rows=1, ordered=False)
+
+
+def group_names(groups: Sequence[RunGroup]) -> list[str]:
+    """Return a name for each group of a scenario, with as many settings as differ."""
+    names = [_name(group) for group in groups]
+    return names if len(set(names)) == len(names) else [_name(group, detailed=True) for group in groups]
+
+
+def _label(runs: Sequence[ReportedRun], name: str) -> Callable[[ReportedRun], str]:
+    """Return the function that returns the text of a value of a run."""
+    levels = levels_of(runs, name)
+    if levels is None:
+        return lambda run: str(value) if (value := run.value_of(name)) is not None else ""
+    return lambda run: levels.labels[levels.index(run)]
+
+
+def _matrix(
+    corner: str, found: Mapping[str, Mapping[str, Sequence[ReportedRun]]], least_rows: int, *, ordered: bool = True
+) -> Matrix | None:
+    columns = sorted({name for cells in found.values() for name in cells}, key=_order)
+    if len(found) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(found) * len(columns) > MOST_CELLS:
+        return None
+    names = sorted(found, key=_order) if ordered else list(found)
+    rows = [(name, tuple([success_rate(found[name].get(column, ())) for column in columns])) for name in names]
+    return Matrix(corner, tuple(columns), tuple(rows))
+
+
+def success_rate(runs: Sequence[ReportedRun]) -> Proportion | None:
+    """Return the share of passed runs among those that are judged; None if there is none."""
+    judged = [run.passed for run in runs if run.is_judged]
+    return wilson(sum(judged), len(judged)) if judged else None
+
+
+def _order(text: str) -> tuple[int, float, str]:
+    """Return the key that sorts numbers, and ranges by their start, before other texts."""
+    try:
+        return 0, float(text.partition(" … ")[0]), text
+    except ValueError:
+        return 1, 0.0, text
+
+
+COLORS = ("#0284c7", "#d97706", "#059669", "#a855f7", "#dc2626", "#64748b", "#be185d", "#65a30d")
+"""Colors of the curves, each readable on light and dark ground."""
+MOST_AXES = 4
+"""Maximum number of axes whose pairs have heat maps."""
+
+
+@dataclass(frozen=True)
+class RateCurves:
+    """Curves of the groups of a scenario over one axis, with the table of their values.
+
+    legend  name and color of each curve; empty for a single one
+    omitted number of groups without a curve
+    """
+
+    scenario: str
+    axis: str
+    chart: Markup
+    legend: tuple[tuple[str, str], ...]
+    matrix: Matrix | None
+    omitted: int
+
+
+@dataclass(frozen=True)
+class RateMap:
+    """Heat map of two axes, with the table of its values, whose rows are in the order of the map.
+
+    pooled  names of the other axes, over whose values the runs are combined
+    """
+
+    chart: Markup
+    matrix: Matrix
+    pooled: tuple[str, ...]
+
+
+def rate_curves(groups: Sequence[RunGroup]) -> Iterator[RateCurves]:
+    """Yield the curves of each scenario whose groups vary one number only."""
+    by_axis: dict[tuple[str, str], list[RunGroup]] = defaultdict(list)
+    for group in groups:
+        if len(group.numbers) == 1:
+            by_axis[group.scenario, group.numbers[0]].append(group)
+    for (scenario, axis), members in by_axis.items():
+        names = group_names(members)
+        lines = [
+            line
+            for group, name, color in zip(members, names, COLORS, strict=False)
+            if (line := _line(group.distinct, axis, name, color)) is not None
+        ]
+        if not lines:
+            continue
+        yield RateCurves(
+            scenario,
+            axis,
+            Markup(
+                line_chart(
+                    lines,
+                    x_title=axis,
+                    y_title="success rate",
+                    x_range=_range([value for line in lines for value in line.x]),
+                    y_range=(0.0, 1.0),
+                    named=False,
+                    points=True,
+                )
+            ),
+            tuple((line.name, line.color) for line in lines) if len(lines) > 1 else (),
+            axis_matrix(members, axis),
+            len(members) - len(lines),
+        )
+
+
+def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> ChartSeries | None:
+    """Return the rates of a group at each level; None without judged runs, and if no value of other runs than those of
+    a sweep occurs twice."""
+    levels = levels_of(runs, axis)
+    if levels is None or (not runs[0].is_swept and len(levels.centers) == len(runs)):
+        return None
+    found: dict[int, list[bool]] = defaultdict(list)
+    for run in runs:
+        if run.is_judged:
+            found[levels.index(run)].append(run.passed)
+    if not found:
+        return None
+    rates = {level: wilson(sum(passed), len(passed)) for level, passed in sorted(found.items())}
+    return ChartSeries(
+        name,
+        color,
+        tuple(levels.centers[level] for level in rates),
+        tuple(rate.share for rate in rates.values()),
+        low=tuple(rate.low for rate in rates.values()),
+        high=tuple(rate.high for rate in rates.values()),
+    )
+
+
+def _range(values: Sequence[float]) -> tuple[float, float]:
+    """Return the limits of the axis, with a width for a single value."""
+    low, high = min(values), max(values)
+    return (low, high) if low < high else (low - 0.5, high + 0.5)
+
+
+def rate_maps(group: RunGroup) -> Iterator[RateMap]:
+    """Yield the heat map of each pair of numbers that vary in a group; none for more than four."""
+    if not 2 <= len(group.numbers) <= MOST_AXES:
+        return
+    for pair in combinations(group.numbers, 2):
+        matrix = parameter_matrix(group.distinct, pair)
+        columns, rows = (levels_of(group.distinct, name) for name in pair)
+        if matrix is None or columns is None or rows is None:
+            continue
+        passed: dict[tuple[int, int], list[bool]] = defaultdict(list)
+        for run in (run for run in group.distinct if run.is_judged):
+            passed[columns.index(run), rows.index(run)].append(run.passed)
+        if not passed:
+            continue
+        rates: dict[tuple[int, int], Proportion] = {place: wilson(sum(one), len(one)) for place, one in passed.items()}
+        svg = rate_map(
+            columns.centers,
+            rows.centers,
+            rates,
+            x_title=pair[0],
+            y_title=pair[1],
+            names=(columns.labels, rows.labels),
+        )
+        upwards = replace(matrix, rows=matrix.rows[::-1])
+        yield RateMap(Markup(svg), upwards, tuple(name for name in group.varied if name not in pair))
