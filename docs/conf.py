@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -77,14 +76,7 @@ def _skip(app: Any, kind: str, name: str, thing: Any, skip: bool, options: Any) 
     return True if kind == "module" and page and _OWNERS.get(name, page) != page else None
 
 
-def _copy_pictures(app: Any, error: Exception | None) -> None:
-    """Copy the pictures of the library to where the table of the README, which is plain HTML, has them."""
-    if error is None:
-        shutil.copytree(Path(app.srcdir) / "library", Path(app.outdir) / "docs" / "library", dirs_exist_ok=True)
-
-
 def setup(app: Any) -> None:
-    """Connect the conversion of docstrings, the selection of members and the copy of pictures."""
-    app.connect("build-finished", _copy_pictures)
+    """Connect the conversion of docstrings and the selection of members."""
     app.connect("autodoc-process-docstring", _convert)
     app.connect("autodoc-skip-member", _skip)

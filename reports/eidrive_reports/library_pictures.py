@@ -1,4 +1,4 @@
-"""Pictures of the scenarios of the library, and their table in README.md.
+"""Pictures of the scenarios of the library, and their page docs/library.md.
 
 `python -m eidrive_reports.library_pictures` in the checkout runs each scenario once, and draws its actors
 and their paths from above.
@@ -10,7 +10,6 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from html import escape
 from pathlib import Path
 
 import cv2
@@ -83,10 +82,16 @@ def _window(run: RunPaths, colors: Mapping[str, str], ratio: float) -> Window:
     return Window(found.left - wider, found.right + wider, found.bottom - higher, found.top + higher)
 
 
-BEGIN, END = "<!-- library: begin -->\n", "<!-- library: end -->\n"
-"""Lines of the README around the table."""
+PAGE = "docs/library.md"
+"""Page of the scenarios in the checkout."""
 FOLDER = "docs/library"
 """Folder of the pictures in the checkout."""
+INTRODUCTION = """# Scenarios of the library
+
+`eidrive list scenarios` lists them; the parameters are described in the files and in [scenario_files.md](scenario_files.md). Blue is the
+ego, orange are stations that send messages, red are pedestrians, light gray is background traffic; lines are paths.
+`make library-pictures` draws them.
+"""
 COLUMNS = 3
 """Scenarios in a row of the table."""
 EGO_NAME = "Ego"
@@ -121,37 +126,27 @@ def file_name(scenario: LibraryScenario) -> str:
     return scenario.name.replace("/", "_") + ".png"
 
 
-def table(scenarios: Sequence[LibraryScenario]) -> str:
-    """Return the table of the scenarios with their pictures, one heading per family."""
-    lines: list[str] = []
+def library_page(scenarios: Sequence[LibraryScenario]) -> str:
+    """Return the page of the scenarios with their pictures, one table per family."""
+    lines = [INTRODUCTION]
     for family in dict.fromkeys(scenario.family for scenario in scenarios):
-        members = [scenario for scenario in scenarios if scenario.family == family]
-        lines += [f"### `xosc/{family}`", "", "<table>"]
-        for first in range(0, len(members), COLUMNS):
-            cells = "".join(
-                f'<td width="{100 // COLUMNS}%"><img src="{FOLDER}/{file_name(each)}" alt="{escape(each.name)}"><br>'
-                f"<code>{escape(each.name)}</code>: {escape(each.description)}</td>\n"
-                for each in members[first : first + COLUMNS]
-            )
-            lines.append(f"<tr>\n{cells}</tr>")
-        lines += ["</table>", ""]
+        cells = [
+            f"![{scenario.name}](library/{file_name(scenario)}) `{scenario.name}`: {scenario.description}".replace("|", "\\|")
+            for scenario in scenarios
+            if scenario.family == family
+        ]
+        cells += [""] * (-len(cells) % COLUMNS)
+        lines += [f"## `xosc/{family}`", "", "| | | |", "|---|---|---|"]
+        lines += [f"| {' | '.join(cells[first : first + COLUMNS])} |" for first in range(0, len(cells), COLUMNS)]
+        lines += [""]
     return "\n".join(lines)
 
 
-def with_table(readme: str, scenarios: Sequence[LibraryScenario]) -> str:
-    """Return the README with the current table. Raise SettingError if the lines around the table are missing."""
-    before, begin, rest = readme.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end):
-        raise SettingError(Diagnostic(f"the lines {BEGIN.strip()} and {END.strip()} are missing", "", "README.md"))
-    return f"{before}{BEGIN}\n{table(scenarios)}\n{END}{after}"
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the pictures and the table. Return 0, or 2 if an input is invalid or a file cannot be written."""
-    parser = argparse.ArgumentParser(description="Draw the scenarios of the library, and update their table.")
+    """Write the pictures and the page. Return 0, or 2 if an input is invalid or a file cannot be written."""
+    parser = argparse.ArgumentParser(description="Draw the scenarios of the library, and write their page.")
     parser.add_argument("names", nargs="*", help="scenarios to draw, such as coop/scenario_1 (default: all)")
-    parser.add_argument("--root", type=Path, default=Path(), help="folder with README.md")
+    parser.add_argument("--root", type=Path, default=Path(), help="folder of the checkout")
     options = parser.parse_args(arguments)
     scenarios = describe_scenarios()
     unknown = set(options.names) - {scenario.name for scenario in scenarios}
@@ -166,10 +161,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with write_atomically(path) as stream:
                 stream.write(encoded.tobytes())
             typer.echo(f"wrote {path}")
-        readme = options.root / "README.md"
-        text = with_table(readme.read_text(encoding="utf-8"), scenarios)
-        with write_atomically(readme) as stream:
-            stream.write(text.encode())
+        with write_atomically(options.root / PAGE) as stream:
+            stream.write(library_page(scenarios).encode())
     except (InputError, OSError) as error:
         typer.echo(str(error), err=True)
         return 2

@@ -1,4 +1,4 @@
-"""Pictures of the library's scenarios and their table in README.md."""
+"""Pictures of the library's scenarios and their page."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ import cv2
 import numpy as np
 import pytest
 from eidrive_reports.library_pictures import (
-    BEGIN,
     EGO,
-    END,
+    PAGE,
     OTHER,
     TRAFFIC,
     RunPaths,
     file_name,
     main,
     run_picture,
-    with_table,
+    library_page,
 )
 
 from eidrive_scenario.errors import SettingError
@@ -56,34 +55,25 @@ def test_picture_has_actors_paths_and_lanes_at_their_places() -> None:
     assert at(20.0, -12.0) == color(GROUND)
 
 
-def test_readme_lists_all_scenarios_with_pictures() -> None:
+def test_page_lists_all_scenarios_with_pictures() -> None:
     scenarios = describe_scenarios()
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert with_table(readme, scenarios) == readme, "make library-pictures updates the table"
+    assert library_page(scenarios) == (ROOT / PAGE).read_text(encoding="utf-8"), "make library-pictures updates the page"
     pictures = {path.name: path.stat().st_size for path in (ROOT / "docs" / "library").iterdir()}
     assert set(pictures) == {file_name(scenario) for scenario in scenarios}
     assert max(pictures.values()) < 40_000
 
 
-def test_table_escapes_descriptions_and_keeps_other_text() -> None:
-    scenario = LibraryScenario("a/b", "a", "<less> & more")
-    text = with_table(f"before\n{BEGIN}old\n{END}after", [scenario])
-    assert text.startswith(f"before\n{BEGIN}")
-    assert text.endswith(f"{END}after")
-    assert "&lt;less&gt; &amp; more" in text
-    assert "docs/library/a_b.png" in text
-    assert "old" not in text
-    with pytest.raises(SettingError, match="are missing"):
-        with_table("no table", [scenario])
+def test_page_escapes_bars_of_tables() -> None:
+    assert "car \\| truck |" in library_page([LibraryScenario("a/b", "a", "car | truck")])
 
 
 def test_command_draws_selected_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "README.md").write_text(f"{BEGIN}{END}", encoding="utf-8")
     assert main(["pipeline/scenario_1", "--root", str(tmp_path)]) == 0
     (path,) = (tmp_path / "docs" / "library").iterdir()
     image = cv2.imread(str(path))
     assert image is not None
     assert image.shape == (300, 480, 3)
-    assert "pipeline/scenario_1" in (tmp_path / "README.md").read_text(encoding="utf-8")
-    assert main(["pipeline/scenario_1", "--root", str(tmp_path / "none")]) == 2
-    assert "README.md" in capsys.readouterr().err
+    assert "pipeline/scenario_1" in (tmp_path / PAGE).read_text(encoding="utf-8")
+    (tmp_path / "file").touch()
+    assert main(["pipeline/scenario_1", "--root", str(tmp_path / "file")]) == 2
+    assert "file" in capsys.readouterr().err
