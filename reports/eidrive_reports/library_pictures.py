@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import typer
 
-from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, write_atomically
+from eidrive_scenario.api.common import InputError, write_atomically
 from eidrive_scenario.api.experiments import LibraryScenario, describe_scenarios
 from eidrive_scenario.api.pages import Canvas, Image, RoadDrawing, Window, house_outline, road_drawing
 from eidrive_scenario.api.run import Simulation, buildings
@@ -88,9 +88,9 @@ FOLDER = "docs/library"
 """Folder of the pictures in the checkout."""
 INTRODUCTION = """# Scenarios of the library
 
-`eidrive list scenarios` lists them; the parameters are described in the files and in [scenario_files.md](scenario_files.md). Blue is the
-ego, orange are stations that send messages, red are pedestrians, light gray is background traffic; lines are paths.
-`make library-pictures` draws them.
+`eidrive list scenarios` lists them; the parameters are described in the files and in
+[scenario_files.md](scenario_files.md). Blue is the ego, orange are stations that send messages, red are pedestrians,
+light gray is background traffic; lines are paths. `make library-pictures` draws them.
 """
 COLUMNS = 3
 """Scenarios in a row of the table."""
@@ -131,7 +131,9 @@ def library_page(scenarios: Sequence[LibraryScenario]) -> str:
     lines = [INTRODUCTION]
     for family in dict.fromkeys(scenario.family for scenario in scenarios):
         cells = [
-            f"![{scenario.name}](library/{file_name(scenario)}) `{scenario.name}`: {scenario.description}".replace("|", "\\|")
+            f"![{scenario.name}](library/{file_name(scenario)}) `{scenario.name}`: {scenario.description}".replace(
+                "|", "\\|"
+            )
             for scenario in scenarios
             if scenario.family == family
         ]

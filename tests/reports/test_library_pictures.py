@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 from eidrive_reports.library_pictures import (
     EGO,
-    PAGE,
     OTHER,
+    PAGE,
     TRAFFIC,
     RunPaths,
     file_name,
+    library_page,
     main,
     run_picture,
-    library_page,
 )
 
-from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import LibraryScenario, describe_scenarios
 from eidrive_scenario.reporting.drawing.top_view import GROUND, LANE, RoadDrawing
 
@@ -57,7 +56,9 @@ def test_picture_has_actors_paths_and_lanes_at_their_places() -> None:
 
 def test_page_lists_all_scenarios_with_pictures() -> None:
     scenarios = describe_scenarios()
-    assert library_page(scenarios) == (ROOT / PAGE).read_text(encoding="utf-8"), "make library-pictures updates the page"
+    assert library_page(scenarios) == (ROOT / PAGE).read_text(encoding="utf-8"), (
+        "make library-pictures updates the page"
+    )
     pictures = {path.name: path.stat().st_size for path in (ROOT / "docs" / "library").iterdir()}
     assert set(pictures) == {file_name(scenario) for scenario in scenarios}
     assert max(pictures.values()) < 40_000
