@@ -55,6 +55,8 @@ def test_paths_exist(page: Path) -> None:
     missing = [
         path
         for path in named
-        if not path.startswith(GENERATED) and not any((base / path).exists() for base in (ROOT, ENGINE))
+        if not path.startswith(GENERATED)
+        and not any((base / path).exists() for base in (ROOT, ENGINE))
+        and not (ROOT / "xosc" / f"{path}.xosc").is_file()  # the name of a scenario of the library
     ]
     assert missing == []

@@ -1,25 +1,36 @@
-"""README.md: agreement of its lists with the command line, the pytest plugin and the files of the project."""
+"""README.md and the tables of options: agreement with the command line, the pytest plugin and the files of the project."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+from eidrive_scenario.cli.command_table import CommandTable
 from eidrive_scenario.cli.show import Names
 from eidrive_scenario.pytest_plugin.options import OPTIONS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
+PYTEST = (ROOT / "docs" / "pytest.md").read_text(encoding="utf-8")
 
 
-def test_readme_lists_every_kind_of_names() -> None:
-    row = next(line for line in README.splitlines() if line.startswith("| `eidrive list"))
+def test_readme_is_short() -> None:
+    assert len(README.splitlines()) <= 150
+
+
+def test_page_lists_every_command() -> None:
+    assert re.findall(r"^\| `eidrive ([a-z]+)", COMMANDS, re.MULTILINE) == list(CommandTable())
+
+
+def test_page_lists_every_kind_of_names() -> None:
+    row = next(line for line in COMMANDS.splitlines() if line.startswith("| `eidrive list"))
     listed = re.findall(r"`(?:eidrive list )?([a-z_]+)`", row)
     assert sorted(listed) == sorted([*Names, "check"])
 
 
-def test_readme_lists_every_option_of_the_pytest_plugin() -> None:
-    table = README[README.index("| option | effect |") :].split("\n## ")[0]
+def test_page_lists_every_option_of_the_pytest_plugin() -> None:
+    table = PYTEST[PYTEST.index("| option | effect |") :].split("\n\n")[0]
     listed = re.findall(r"^\| `(--eidrive-[a-z-]+)", table, re.MULTILINE)
     assert sorted(listed) == sorted(option.flag for option in OPTIONS)
 

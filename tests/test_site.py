@@ -33,10 +33,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_site_has_every_page_and_picture(site: Path) -> None:
     for page in (ROOT / "docs").glob("*.md"):
         assert (site / f"{page.stem}.html").is_file()
-    index = (site / "index.html").read_text(encoding="utf-8")
+    library = (site / "library.html").read_text(encoding="utf-8")
     for picture in (ROOT / "docs" / "library").glob("*.png"):
-        assert f'src="docs/library/{picture.name}"' in index
-        assert (site / "docs" / "library" / picture.name).is_file()
+        assert f'src="_images/{picture.name}"' in library
+        assert (site / "_images" / picture.name).is_file()
 
 
 def test_reference_describes_each_public_name_once(site: Path) -> None:

@@ -1,0 +1,10 @@
+# The command `eidrive` for machines without Python 3.11: docker run --rm eidrive run coop/scenario_1
+#
+#     docker build -t eidrive .
+#     docker run --rm -v "$PWD:/work" eidrive run my_scenario.xosc --out runs
+FROM python:3.11-slim
+COPY . /src
+RUN pip install --no-cache-dir -c /src/constraints.txt "/src[onnx,export,tables]" && rm -rf /src
+WORKDIR /work
+ENTRYPOINT ["eidrive"]
+CMD ["--help"]
