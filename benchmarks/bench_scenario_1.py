@@ -38,8 +38,7 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world import World
-from eidrive_scenario.world.physics.bodies import quaternion
-from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect
+from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect, quaternion
 from eidrive_scenario.world.view import ActorState
 
 SCENARIO = "coop/scenario_1"
@@ -111,18 +110,19 @@ def record_calls(trace: Trace) -> Iterator[None]:
 @contextmanager
 def without_shortcuts() -> Iterator[None]:
     """Give each building a separate body, and cast all rays of sensors."""
-    if not hasattr(World, "is_free"):  # An older commit, measured by `compare.py`
+    from eidrive_scenario.world.physics import scenery
+
+    if not hasattr(scenery, "MAX_BOXES"):  # An older commit, measured by `compare.py`
         yield
         return
-    from eidrive_scenario.world.physics import building_bodies
 
-    is_free, most = World.is_free, building_bodies.MOST
+    is_free, most = World.is_free, scenery.MAX_BOXES
     World.is_free = lambda world, own, origin, target: False  # type: ignore[assignment, method-assign]
-    building_bodies.MOST = 1
+    scenery.MAX_BOXES = 1
     try:
         yield
     finally:
-        World.is_free, building_bodies.MOST = is_free, most  # type: ignore[method-assign]
+        World.is_free, scenery.MAX_BOXES = is_free, most  # type: ignore[method-assign]
 
 
 def timed_run(simulation: Simulation) -> list[float]:

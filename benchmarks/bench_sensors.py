@@ -18,10 +18,10 @@ from eidrive_reports.weather_sheet import street
 
 from eidrive_scenario.library import names
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering.renderer import Renderer
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
-from eidrive_scenario.world.render.renderer import Renderer
 from eidrive_scenario.world.weather import load_weather
 
 SIZES = ((320, 192), (512, 384), (640, 360), (800, 600))

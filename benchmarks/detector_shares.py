@@ -14,9 +14,9 @@ from detector_runs import AS_EI_DRIVE, DEFAULT, SCENARIO, RunTime, run
 from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.lidar.detector import LidarDetector
+from eidrive_scenario.rendering.scene import SceneImage
 from eidrive_scenario.sensing.camera import Camera, ImageSensor
 from eidrive_scenario.sensing.lidar import Lidar
-from eidrive_scenario.world.scene import UndrawnImage
 
 CASES = (
     ("yolov5", DEFAULT),
@@ -25,7 +25,7 @@ CASES = (
     ("yolov5", AS_EI_DRIVE),
 )
 PARTS: dict[str, tuple[tuple[type, str], ...]] = {
-    "images": ((Camera, "read"), (UndrawnImage, "draw"), (ImageSensor, "develop")),
+    "images": ((Camera, "read"), (SceneImage, "draw"), (ImageSensor, "develop")),
     "network": ((ImageNetwork, "find"),),
     "detector": ((LearnedDetector, "detect"), (LidarDetector, "detect")),
     "lidar": ((Lidar, "read"),),

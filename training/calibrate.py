@@ -26,6 +26,7 @@ from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_n
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import DESCRIPTION
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.settings import CameraSettings
@@ -67,7 +68,7 @@ def distant_vehicles(camera: CameraSettings, worlds: int) -> Iterator[Distant]:
         with tempfile.TemporaryDirectory() as folder:
             site = random_place(rng, Path(folder))
         positions = LanePositions.of(site.roads)
-        with World(site.roads) as world:
+        with World(site.roads, picture_maker=picture_maker) as world:
             site.build_houses(world)
             world.set_weather(Weather(name="clear"))
             for _ in range(PER_WORLD):

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
+from eidrive_scenario.rendering.meshes import actor_mesh
+from eidrive_scenario.rendering.meshes.signs import sign_face
+from eidrive_scenario.rendering.scene import FIRST_LABEL
 from eidrive_scenario.roads.model.signal_states import lamp_colors, lamps, lit
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.meshes import actor_mesh
-from eidrive_scenario.world.meshes.sign_faces import sign_face
 from eidrive_scenario.world.road_objects import SignalHead
-from eidrive_scenario.world.scene.roadside import FIRST_LABEL
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.mounting import mounting
@@ -100,7 +101,7 @@ def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
         candidates = [head for head in heads if head.signal.dynamic and len(_before(positions, head, CAMERAS[0]))]
         if candidates:
             break
-    with World(place.roads) as world:
+    with World(place.roads, picture_maker=picture_maker) as world:
         place.build_houses(world)
         return [_scene(world, place, positions, heads, candidates, rng) for _ in range(PER_WORLD)]
 

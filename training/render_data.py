@@ -21,6 +21,7 @@ from rich.progress import Progress
 
 from eidrive_scenario.perception.learned.image_network import resized
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.world import World
 from eidrive_scenario.world.road_objects import signal_heads
@@ -60,7 +61,7 @@ def shots(seed: int, split: str, number: int) -> list[Shot]:
     with tempfile.TemporaryDirectory() as folder:
         place = random_place(rng, Path(folder))
     positions = LanePositions.of(place.roads)
-    with World(place.roads) as world:
+    with World(place.roads, picture_maker=picture_maker) as world:
         place.build_houses(world)
         return [shot(world, place, positions, rng) for _ in range(PER_WORLD)]
 

@@ -13,6 +13,7 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario.properties import is_agent_controller
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import Readings
@@ -88,7 +89,7 @@ def random_scenes(
         with tempfile.TemporaryDirectory() as folder:
             place = random_place(rng, Path(folder))
         positions = LanePositions.of(place.roads)
-        with World(place.roads) as world:
+        with World(place.roads, picture_maker=picture_maker) as world:
             place.build_houses(world)
             world.set_weather(weather)
             for _ in range(each):

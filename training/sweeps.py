@@ -14,6 +14,7 @@ from eidrive_scenario.experiments.average_precision import match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
@@ -51,7 +52,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
         positions = LanePositions.of(place.roads)
         view = random_view(rng, positions)
         camera = ImageSensor(CameraSettings())
-        with World(place.roads) as world:
+        with World(place.roads, picture_maker=picture_maker) as world:
             place.build_houses(world)
             actors = random_traffic(rng, positions, view)
             for spec, placement in actors:

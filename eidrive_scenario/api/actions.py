@@ -51,7 +51,7 @@ from eidrive_scenario.storyboard.state.environments import merge_environment
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.environment import Environment
-from eidrive_scenario.world.physics.multi_axle import turning_wheelbase
+from eidrive_scenario.world.physics.dynamics import turning_wheelbase
 
 __all__ = [
     "LONGEST_WAY",

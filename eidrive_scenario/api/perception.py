@@ -13,8 +13,7 @@ from eidrive_scenario.perception.tracking.settings import TrackerKind
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
-from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.sensor import Scene, Sensor
 from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
 from eidrive_scenario.world.view import WorldView
 

@@ -20,10 +20,13 @@ from eidrive_scenario.openscenario.variation import variations
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.recording.text.csv_writer import text_of_csv
+from eidrive_scenario.rendering import picture_maker
+from eidrive_scenario.rendering.tone_mapping import ideal_image
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
 from eidrive_scenario.simulation.tick_start import TickStart
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
+from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.road_objects import buildings
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.weather import Weather, load_weather
@@ -42,6 +45,7 @@ __all__ = [
     "Frame",
     "Judgement",
     "Observer",
+    "Pinhole",
     "RateVerdict",
     "Recording",
     "RunResult",
@@ -55,12 +59,14 @@ __all__ = [
     "add_topics",
     "buildings",
     "check_scenario",
+    "ideal_image",
     "judge_recording",
     "limit_wall_time",
     "load_distribution",
     "load_for_seed",
     "load_scenario",
     "load_weather",
+    "picture_maker",
     "read_recording",
     "read_results",
     "run_and_save",

@@ -11,16 +11,14 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.imaging.exposure import develop, meter_exposure
-from eidrive_scenario.sensing.imaging.optics import Optics, lens_of
+from eidrive_scenario.sensing.imaging import Optics, develop, lens_of, meter_exposure
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading
-from eidrive_scenario.sensing.scene import Scene, UndrawnImage
-from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.sensor import Scene, Sensor
 from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.camera import CameraImage, Radiance
+from eidrive_scenario.world.camera import CameraImage, Radiance, UndrawnImage
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
 

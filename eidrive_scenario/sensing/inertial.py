@@ -11,8 +11,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import GnssReading, ImuReading
-from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.sensor import Scene, Sensor
 from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView

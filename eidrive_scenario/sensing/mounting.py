@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.geometry import rotation_matrix
-from eidrive_scenario.sensing.settings import Mount, SensorSettings
+from eidrive_scenario.sensing.settings import CameraSettings, Mount, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
@@ -77,3 +79,16 @@ def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
         "roof": (-0.5, 0.0, top + ABOVE_ROOF),
     }[mount]
     return Mounting(center_x + x, center_y + y, z, yaw)
+
+
+def view_sectors(sensors: Iterable[SensorSettings], spec: ActorSpec) -> tuple[ViewSector, ...]:
+    """Return the sectors of sensors on a body. A sensor without a setting for its opening angle covers all directions,
+    one without `range` is not limited."""
+    found = []
+    for settings in sensors:
+        mount = mounting(settings, spec, "front" if isinstance(settings, CameraSettings) else "roof")
+        angle = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0)))
+        found.append(
+            ViewSector(mount.x, mount.y, mount.z, mount.yaw, angle / 2.0, getattr(settings, "range", math.inf))
+        )
+    return tuple(found)

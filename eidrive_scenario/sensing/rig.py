@@ -8,8 +8,7 @@ from typing import Any
 
 from eidrive_scenario.registry import construct
 from eidrive_scenario.sensing.readings import FIELDS, EgoState, Readings
-from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.sensor import Sensor, check_unique, sensor_class
+from eidrive_scenario.sensing.sensor import Scene, Sensor, check_unique, sensor_class
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView

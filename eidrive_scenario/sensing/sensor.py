@@ -1,17 +1,55 @@
-"""Interface of sensors (abstract base class `Sensor`), and their settings in the properties of a controller."""
+"""Interface of sensors (abstract base class `Sensor`), of their settings, and of the scene that they measure."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar, Protocol, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.extension_settings import settings_type_of, validate_by_kind
 from eidrive_scenario.registry import registry
-from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.camera import Pinhole, Radiance, UndrawnImage
+from eidrive_scenario.world.view import RayHits, WorldView
+from eidrive_scenario.world.weather import Weather
+
+Point = tuple[float, float, float]
+
+
+class Scene(Protocol):
+    """Part of the world that sensors measure."""
+
+    @property
+    def weather(self) -> Weather:
+        """Current weather."""
+
+    def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHits:
+        """Cast rays from (M, 3) to (M, 3) [m] for the sensor of this name, from which some actors may be hidden."""
+
+    def scan(
+        self, own: int, apex: Array, origins: Array, targets: Array, near: NDArray[np.bool_], *, sensor: str = ""
+    ) -> RayHits:
+        """Return the same as `raycast` for many rays on lines through one point (3,) of the actor in the row `own`.
+
+        near  (M,) rays that may hit this actor
+        """
+
+    def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> Sequence[int]:
+        """Return the same rows as `raycast`, for a few rays in scalar arithmetic."""
+
+    def is_free(self, own: int, origin: Point, target: int) -> bool:
+        """Return True if certainly nothing is between a point of an actor and the box of another, by their rows."""
+
+    def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
+        """Return the light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""
+
+    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> UndrawnImage:
+        """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""
 
 
 class Sensor(ABC):

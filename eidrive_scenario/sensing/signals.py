@@ -12,11 +12,11 @@ from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.sensing.crossing import starts_behind_bodies
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import SignalReading
-from eidrive_scenario.sensing.scene import NOTHING, Scene
+from eidrive_scenario.sensing.sensor import Scene
 from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.road_objects import signal_heads
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.view import NOTHING, WorldView
 
 SIGNAL_KINDS = frozenset({"light", "stop sign"})
 
@@ -63,7 +63,7 @@ class SignalSensor:
         # A light beside a truck is lower than its roof.
         starts = starts_behind_bodies(np.broadcast_to(origin, (1, *faces.shape)), faces[None], view, np.array([row]))[0]
         hits = scene.raycast(starts, faces)
-        visible = near[np.asarray(hits.rows) == NOTHING]
+        visible = near[hits.rows == NOTHING]
         return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in visible.tolist())
 
 

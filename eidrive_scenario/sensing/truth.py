@@ -13,11 +13,10 @@ from eidrive_scenario.geometry import BOX_SAMPLES, points_of_boxes
 from eidrive_scenario.sensing.crossing import few_ray_starts, starts_behind_bodies, tilted
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
-from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
-from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.sensor import Point, Scene, Sensor
 from eidrive_scenario.sensing.settings import SensorSettings, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.view import NOTHING, WorldView
 
 INSET = 0.9
 """Position of the sampled corners as a share of the distance from center to corner, so that a ray to one hits the body.

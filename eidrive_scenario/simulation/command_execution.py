@@ -24,8 +24,7 @@ from eidrive_scenario.simulation.commands import CHANNEL, PREFIX, DeclaredCriter
 from eidrive_scenario.simulation.run_setup import RunSetup
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.world import World
-from eidrive_scenario.world.environment import Environment
-from eidrive_scenario.world.environment_weather import weather_from_environment
+from eidrive_scenario.world.environment import Environment, weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 

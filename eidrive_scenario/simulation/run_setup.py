@@ -18,6 +18,7 @@ from eidrive_scenario.evaluation.criteria_parser import (
 from eidrive_scenario.evaluation.progress_demand import progress_warnings
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.commands import DeclaredCriteria, check_added_criteria, check_commands
@@ -105,7 +106,7 @@ def set_up_run(
         map(str, [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)])
     )
     can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)
-    world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
+    world = World(roads, dt=settings.dt, entities=storyboard.road_objects, picture_maker=picture_maker)
     if weather is not None:
         world.set_weather(weather)
     return RunSetup(

@@ -1,22 +1,27 @@
-"""Ideal camera and its images."""
+"""Ideal camera, its images, and the interface to the maker of these pictures."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.view import ActorState
+from eidrive_scenario.world.weather import Weather
 
 
 class CameraImage(NamedTuple):
     """Image: rgb (H, W, 3), depth (H, W) along the optical axis [m] with inf for no hit, segmentation (H, W) of rows or
     -1.
 
-    Heads of traffic signals have labels below -1 (see `World.signal_labels`).
+    Heads of traffic signals have labels below -1 (see `eidrive_scenario.rendering.scene.FIRST_LABEL`).
     """
 
     rgb: NDArray[np.uint8]
@@ -64,3 +69,38 @@ class Radiance(NamedTuple):
     luminance: NDArray[np.float32]
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
+
+
+class UndrawnImage(Protocol):
+    """Image whose content is fixed, so that it does not follow the world, but that is not drawn yet."""
+
+    @property
+    def digest(self) -> bytes:
+        """Digest of everything that determines the image: equal digests mean equal images."""
+
+    def draw(self) -> Radiance:
+        """Return the light that reaches the camera."""
+
+
+class VisibleState(NamedTuple):
+    """What cameras see of a world at one time [s], in addition to its static objects.
+
+    actors       specification and state of each actor, in the order of the rows of the view
+    signals      states of the traffic signals by id
+    appearances  of actors that differ from the default
+    """
+
+    time: float
+    weather: Weather
+    actors: Sequence[tuple[ActorSpec, ActorState]]
+    signals: Mapping[str, str]
+    appearances: Mapping[str, Appearance]
+
+
+class PictureMaker(Protocol):
+    """Maker of the images of all cameras in one world; `eidrive_scenario.rendering` has one."""
+
+    def image(self, state: VisibleState, pose: Array, pinhole: Pinhole, ignore: Collection[str]) -> UndrawnImage:
+        """Return the image of a camera at `pose` (4, 4). Actors in `ignore` are not drawn, but cast shadows and emit
+        light.
+        """

@@ -1,4 +1,4 @@
-"""Ground truth at one time as an immutable struct of arrays."""
+"""Ground truth at one time as an immutable struct of arrays, and first hits of rays."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 
 FEW = 16
-"""Maximum number of actors for which scalars are faster than arrays."""
+"""Maximum number of actors whose boxes are computed as scalars, which is faster. Sine and cosine of arrays differ from
+those of scalars in the last bit, so that another number changes traces.
+"""
+GROUND, NOTHING = -1, -2
+"""Rows of rays that ended at the ground or another object that is no actor, and of rays without a hit."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,13 @@ class Contact:
     """Point of contact in the world frame [m]."""
     impact_speed: float
     """Relative speed at the first contact [m/s]."""
+
+
+_MOTION: Mapping[str, int | slice] = {
+    "position": slice(0, 3), "yaw": 3, "pitch": 4, "roll": 5, "velocity": slice(6, 9), "acceleration": slice(9, 12),
+    "yaw_rate": 12, "speed": 13,
+}  # fmt: skip
+"""Fields of a view by their columns in the values of ActorState."""
 
 
 class ActorState(NamedTuple):
@@ -46,6 +57,21 @@ class ActorState(NamedTuple):
     acceleration_z: float
     yaw_rate: float
     speed: float
+
+
+class RayHits(msgspec.Struct, frozen=True):
+    """First hits of rays.
+
+    rows      (M,) row of the actor in the view; GROUND (-1) for the ground and buildings, NOTHING (-2)
+    fraction  (M,) share of the distance from origin to target, 1 without a hit
+    position  (M, 3) of the hit [m], the target without a hit
+    normal    (M, 3) of the surface, zero without a hit
+    """
+
+    rows: Integers
+    fraction: Array
+    position: Array
+    normal: Array
 
 
 class WorldView(msgspec.Struct, frozen=True, dict=True):
@@ -81,6 +107,31 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
     contacts: tuple[Contact, ...] = ()
     unseen: tuple[str, ...] = ()
     unseen_by: Mapping[str, tuple[str, ...]] = msgspec.field(default_factory=dict)
+
+    @classmethod
+    def of_states(
+        cls,
+        states: Sequence[ActorState],
+        table: Array,
+        boxes: Sequence[Sequence[float]] | None,
+        rows: Mapping[str, int],
+        **columns: Any,
+    ) -> WorldView:
+        """Return the view of actors in these states. What the caller has already is not computed from the arrays.
+
+        table    (N, 14) the same states
+        boxes    the same as `plain_boxes`, None if it is not known
+        rows     row by name
+        columns  all other fields
+        """
+        motion: dict[str, Any] = {name: table[:, part] for name, part in _MOTION.items()}
+        view = cls(**motion, **columns)
+        known: dict[str, Any] = {"states": states, "kinematics": table[:, :9], "rows": rows}
+        if boxes is not None:
+            upright = not any([state.pitch or state.roll for state in states])
+            known |= {"plain_boxes": boxes, "is_upright": upright}
+        view.__dict__.update(known)
+        return view
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:
         """Return the actors that the scenario hides from the sensor of this name."""

@@ -3,34 +3,64 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.errors import SimulationError, suggestion
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.world import render, scene
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
-from eidrive_scenario.world.actor_table import ActorTable
 from eidrive_scenario.world.appearance import Appearance, hidden_actors
-from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
-from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.camera import PictureMaker, Pinhole, Radiance, UndrawnImage, VisibleState
+from eidrive_scenario.world.physics.bodies import Body, DrivenBody, GroundUnder, ScriptedBody
+from eidrive_scenario.world.physics.body_group import BodyGroup, group_bodies
 from eidrive_scenario.world.physics.bullet import connect, disconnect
-from eidrive_scenario.world.physics.contacts import ContactsOfTick
-from eidrive_scenario.world.physics.couplings import Couplings
-from eidrive_scenario.world.physics.crossings import Crossings, find_crossings
-from eidrive_scenario.world.physics.driven_body import DrivenBody
+from eidrive_scenario.world.physics.contacts import ContactTracker, Couplings
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.free_space import FreeSpace
-from eidrive_scenario.world.physics.ground import GroundUnder
-from eidrive_scenario.world.physics.rays import RayHits, cast_rays, cast_some, first_hits
+from eidrive_scenario.world.physics.rays import Crossings, cast_rays, cast_some, find_crossings, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
-from eidrive_scenario.world.road_objects import Building, signal_heads
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.road_objects import Building
+from eidrive_scenario.world.view import FEW, GROUND, NOTHING, Contact, RayHits, WorldView
 from eidrive_scenario.world.weather import Weather
+
+
+@dataclass(frozen=True)
+class ActorTable:
+    """Data of the actors that is constant while no actor is added or removed.
+
+    columns        fields of the views: names, categories, sizes, and offsets of the boxes
+    row_of_handle  row of the actor by the number of its body in pybullet, GROUND for other bodies; the last entry, for
+                   handle -1, is NOTHING
+    row_in_list    the same as a list
+    """
+
+    bodies: BodyGroup
+    rows: Mapping[str, int]
+    columns: Mapping[str, Any]
+    row_of_handle: Integers
+    row_in_list: list[int]
+
+    @classmethod
+    def of(cls, bodies: Mapping[str, Body], highest_handle: int, dt: float) -> ActorTable:
+        """Return the table of bodies by name. `highest_handle` is that of other bodies in pybullet."""
+        order = tuple(bodies.values())
+        size = np.array([body.spec.size for body in order], dtype=float).reshape(-1, 3)
+        offset = np.array([body.spec.offset for body in order], dtype=float).reshape(-1, 3)
+        size.flags.writeable = offset.flags.writeable = False
+        categories = tuple(body.spec.category for body in order)
+        columns = {"names": tuple(bodies), "categories": categories, "size": size, "offset": offset}
+        row_of_handle = np.full(max([highest_handle, *(body.handle for body in order)]) + 2, GROUND, dtype=np.int64)
+        row_of_handle[-1] = NOTHING
+        for row, body in enumerate(order):
+            row_of_handle[body.handle] = row
+        rows = {name: row for row, name in enumerate(bodies)}
+        return cls(group_bodies(order, dt), rows, columns, row_of_handle, row_of_handle.tolist())
 
 
 class World:
@@ -40,7 +70,8 @@ class World:
     `physics_rate` seconds. All results are deterministic. Close the world after use, or use it in a `with` statement;
     otherwise its client is freed by garbage collection.
 
-    entities  ids of road objects that are actors, and thus no part of the scenery
+    entities       ids of road objects that are actors, and thus no part of the scenery
+    picture_maker  maker of the images of cameras in a world with this scenery, called for the first image
     """
 
     def __init__(
@@ -50,6 +81,7 @@ class World:
         dt: float = 0.05,
         physics_rate: float = 200.0,
         entities: Collection[str] = (),
+        picture_maker: Callable[[Scenery], PictureMaker] | None = None,
     ) -> None:
         self.dt = dt
         self.tick = 0
@@ -66,13 +98,14 @@ class World:
         self._unseen_by: Mapping[str, tuple[str, ...]] = {}
         self._friction = 1.0
         self._couplings = Couplings(self._client)
-        self._contacts = ContactsOfTick(self._couplings)
+        self._contacts = ContactTracker(self._couplings)
         self._view: WorldView | None = None
         self._table: ActorTable | None = None
         self._scenery = Scenery(self._client, roads, entities)
         self._free_space = FreeSpace(self._scenery)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
-        self._visuals: scene.Visuals | None = None
+        self._picture_maker = picture_maker
+        self._pictures: PictureMaker | None = None
         self._changed()
 
     def __enter__(self) -> World:
@@ -83,7 +116,7 @@ class World:
 
     def close(self) -> None:
         """Free the pybullet client. The world is unusable afterwards."""
-        self._visuals = None
+        self._pictures = None
         self._client = -1
         self._release()
 
@@ -163,12 +196,6 @@ class World:
             self._unseen, self._unseen_by = hidden_actors(appearances)
             self._view = None
 
-    @property
-    def signal_labels(self) -> Mapping[int, str]:
-        """Labels of the heads of traffic signals in segmentation images, with the ids of the signals."""
-        heads = signal_heads(self._roads) if self._roads is not None else ()
-        return {scene.FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
-
     def add_building(
         self, name: str, center: Vector3, size: Vector3, yaw: float = 0.0, color: Vector3 | None = None
     ) -> None:
@@ -201,13 +228,12 @@ class World:
         """Return the current view, the same object until a change."""
         self._contacts.find_added(self._bodies)
         if self._view is None:
-            contacts = self._contacts.viewed()
-            self._view = self._actors.view(self.time, self.tick, contacts, self._unseen, self._unseen_by)
+            self._view = self._view_now(self._contacts.viewed())
         return self._view
 
     def poses(self) -> WorldView:
         """Return the current view without its contacts, of which actors at one place have one for each pair."""
-        return self._view or self._actors.view(self.time, self.tick, (), self._unseen, self._unseen_by)
+        return self._view or self._view_now(())
 
     def distance(self, first: str, second: str) -> float:
         """Return the distance between the boxes of two actors [m], 0 in contact. Raise SimulationError."""
@@ -250,36 +276,41 @@ class World:
         self._refresh()
         return find_crossings(self._client, self._scenery, self.view(), begins, ends, most)
 
-    def camera(
-        self,
-        pose: Array,
-        width: int,
-        height: int,
-        fov: float,
-        near: float = 0.1,
-        far: float = 300.0,
-        *,
-        ignore: Iterable[str] = (),
-    ) -> CameraImage:
-        """Return the image of an ideal camera: automatic exposure, no noise (see `radiance` for others).
-
-        pose (4, 4) camera to world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in
-        `ignore` are not drawn. The first image creates all meshes.
-        """
-        seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
-        rgb = render.tone_map(seen.luminance * np.float32(1.0 / render.white_level(seen.luminance)))
-        return CameraImage(rgb, seen.depth, seen.segmentation)
-
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """Return the light that a camera at this pose (4, 4) receives now, with depth and labels."""
         return self.image(pose, pinhole, ignore=ignore).draw()
 
-    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> scene.UndrawnImage:
-        """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""
-        self._visuals = self._visuals or scene.Visuals(self._scenery)
+    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> UndrawnImage:
+        """Return the same image before it is drawn. It shows the current time, also if it is drawn later.
+
+        pose (4, 4) camera to world, x right, y down, z forward; actors in `ignore` are not drawn. Raise SimulationError
+        if the world has no picture maker.
+        """
+        if self._picture_maker is None:
+            raise SimulationError("the world makes no images: it was built without a picture maker")
+        if self._pictures is None:
+            self._pictures = self._picture_maker(self._scenery)
         self._update_attributes()
-        shown, fixed = scene.DisplayState(self.time, self._signals, self._appearances), np.array(pose, dtype=float)
-        return self._visuals.image(self._bodies.values(), ignore, fixed, pinhole, self._weather, shown)
+        actors = [(body.spec, body.state) for body in self._bodies.values()]
+        state = VisibleState(self.time, self._weather, actors, self._signals, self._appearances)
+        return self._pictures.image(state, np.array(pose, dtype=float), pinhole, frozenset(ignore))
+
+    def _view_now(self, contacts: tuple[Contact, ...]) -> WorldView:
+        """Return the view of the current poses and motion."""
+        bodies = self._actors.bodies
+        states, table = bodies.states()
+        return WorldView.of_states(
+            states,
+            table,
+            [body.box for body in bodies.current()] if len(states) <= FEW else None,
+            self._actors.rows,
+            time=self.time,
+            tick=self.tick,
+            contacts=contacts,
+            unseen=self._unseen,
+            unseen_by=self._unseen_by,
+            **self._actors.columns,
+        )
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)

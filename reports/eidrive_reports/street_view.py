@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from eidrive_scenario.api.common import ActorSpec, Array, Placement, RoadNetwork, SimulationError, WorldView
-from eidrive_scenario.api.run import World
+from eidrive_scenario.api.run import Pinhole, World, ideal_image, picture_maker
 
 Point = tuple[float, float, float]
 
@@ -58,12 +58,13 @@ def street_image(
     bodies  specifications of the actors by name
     fov     horizontal field of view [degrees]
     """
-    with World(roads) as world:
+    with World(roads, picture_maker=picture_maker) as world:
         for row, name in enumerate(view.names):
             x, y, z = view.position[row].tolist()
             angles = (float(view.yaw[row]), float(view.pitch[row]), float(view.roll[row]))
             world.add(bodies[name], Placement(x, y, z, *angles))
-        image = world.camera(pose, WIDTH, HEIGHT, math.radians(fov), ignore=(without,))
+        pinhole = Pinhole.of_fov(WIDTH, HEIGHT, math.radians(fov), far=300.0)
+        image = ideal_image(world.radiance(pose, pinhole, ignore=(without,)))
     encoded, png = cv2.imencode(".png", cv2.cvtColor(image.rgb, cv2.COLOR_RGB2BGR))
     if not encoded:
         raise SimulationError("image: PNG encoding failed")

@@ -18,7 +18,7 @@ from eidrive_reports.street_view import look_at
 from eidrive_scenario.api.common import ActorSpec, InputError, Placement, RoadNetwork, generator, write_atomically
 from eidrive_scenario.api.experiments import library_path
 from eidrive_scenario.api.perception import CameraSettings, ImageSensor
-from eidrive_scenario.api.run import Weather, World, load_weather
+from eidrive_scenario.api.run import Weather, World, load_weather, picture_maker
 
 ROAD = "coop_1.xodr"
 CAMERA = CameraSettings(width=640, height=360, fov=80.0, supersampling=2)
@@ -59,7 +59,7 @@ _VIEWS = (
 
 def street() -> World:
     """Return the crossing of scenario 1 with traffic. The caller closes the world."""
-    world = World(RoadNetwork.load(library_path() / "roads" / ROAD))
+    world = World(RoadNetwork.load(library_path() / "roads" / ROAD), picture_maker=picture_maker)
     for name, body, x, y, yaw in _STREET:
         shape, category, size, wheelbase, wheel = _BODIES[body]
         offset = (wheelbase / 2.0, 0.0, size[2] / 2.0)

@@ -6,7 +6,7 @@ import pytest
 
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
-from eidrive_scenario.world import actor_table
+from eidrive_scenario.world.physics import body_group
 
 
 @pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_5", "coop/scenario_7"])
@@ -15,6 +15,6 @@ def test_trace_is_independent_of_the_number_from_which_bodies_move_together(
 ) -> None:
     hashes = []
     for many in (1, 10**9):
-        monkeypatch.setattr(actor_table, "MANY", many)
+        monkeypatch.setattr(body_group, "MANY", many)
         hashes.append(run_file(resolve_scenario(name), settings=RunSettings(time_limit=10.0)).trace_hash)
     assert hashes[0] == hashes[1]

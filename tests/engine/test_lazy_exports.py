@@ -12,7 +12,7 @@ from eidrive_scenario.lazy_exports import lazy_exports
 
 @pytest.mark.parametrize(
     "package",
-    ["openscenario", "openscenario.distributions", "recording", "traffic", "world", "world.render", "world.scene"],
+    ["openscenario", "openscenario.distributions", "recording", "traffic", "world"],
 )
 def test_package_with_lazy_exports_has_all_its_names(package: str) -> None:
     module = importlib.import_module(f"eidrive_scenario.{package}")

@@ -14,8 +14,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.network import KEPT, _loaded
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.world import World
-from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect
-from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
+from eidrive_scenario.world.physics.bullet import bullet, connect, create_triangle_shape, disconnect
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 POSTS = 2000

@@ -14,9 +14,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.physics.ground import is_level
-from eidrive_scenario.world.physics.rays import NOTHING
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.view import NOTHING, WorldView
 
 Place = tuple[float, float, float]
 
@@ -44,7 +42,9 @@ def radio_environment(
 ) -> RadioEnvironment:
     """Return the antennas of stations, each with the height of its antenna or None, and their lines of sight."""
     antennas = {spec.name: antenna_position(view, spec, height) for spec, height in stations}
-    grounds = {} if is_level(roads) else {spec.name: ground_height(view, spec, roads) for spec, _ in stations}
+    grounds = {}
+    if roads is not None and not roads.is_level:
+        grounds = {spec.name: ground_height(view, spec, roads) for spec, _ in stations}
     return RadioEnvironment(antennas, partial(line_of_sight_states, world, antennas, grounds=grounds), grounds)
 
 

@@ -7,10 +7,9 @@ from bisect import bisect_right
 from typing import Any
 
 from eidrive_scenario.export.osi.schemas import Osi
-from eidrive_scenario.world.environment import Environment
-from eidrive_scenario.world.environment_weather import weather_from_environment
-from eidrive_scenario.world.render.illumination.daylight import daylight
-from eidrive_scenario.world.render.tone_mapping import LUMA
+from eidrive_scenario.rendering.daylight import daylight
+from eidrive_scenario.rendering.tone_mapping import LUMA
+from eidrive_scenario.world.environment import Environment, weather_from_environment
 from eidrive_scenario.world.weather import Weather
 
 _RAIN = (0.1, 0.5, 1.9, 8.1, 34.0, 149.0)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.world.physics.ground import is_level
 
 CELL = 0.5
 """Cell size of the mask of areas near roads [m]; larger for maps that would have more than MOST_CELLS."""
@@ -37,7 +36,7 @@ class MapContext:
         self.margin = margin
         self._roads = roads
         self._mask: NDArray[np.int8] | None = None
-        self._level = is_level(roads)
+        self._level = roads is None or roads.is_level
         if roads is not None:
             x0, y0, x1, y1 = roads.bounds()
             width, height = x1 - x0 + 2.0 * BEYOND, y1 - y0 + 2.0 * BEYOND

@@ -1,4 +1,4 @@
-"""Bodies of actors in pybullet: one rigid box per actor, and the bodies of scripted actors."""
+"""Bodies of actors: scripted ones, and vehicles that move by pedals, steering and collisions."""
 
 from __future__ import annotations
 
@@ -7,18 +7,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
-from eidrive_scenario.world.physics.bullet import bullet
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
+from eidrive_scenario.world.physics.bullet import (
+    BODY_FRICTION,
+    DRIVEN,
+    RAYS,
+    RESTITUTION,
+    SCRIPTED,
+    STATIC,
+    bullet,
+    quaternion,
+)
+from eidrive_scenario.world.physics.dynamics import Demand, track_of
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 from eidrive_scenario.world.view import ActorState
-
-RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
-"""Groups of the collision filter of pybullet; rays belong to the first by default."""
 
 UNMOVED = 1e9
 """Mass of bodies that collisions do not move [kg], and their moment of inertia [kg m²]."""
-RESTITUTION = 0.3
-"""Restitution of one body. Two rebound with its square, about 0.1, as cars above some 5 m/s."""
-BODY_FRICTION = 0.7
 STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
@@ -240,15 +246,161 @@ class ScriptedBody(Body):
         bullet.resetBaseVelocity(self.handle, moving, (0.0, 0.0, self.yaw_rate), self.client)
 
 
-def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
-    """Return x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    if pitch == 0.0 and roll == 0.0:
-        return 0.0, 0.0, sy, cy
-    cp, sp, cr, sr = math.cos(pitch / 2), math.sin(pitch / 2), math.cos(roll / 2), math.sin(roll / 2)
-    return (
-        cy * cp * sr - sy * sp * cr,
-        cy * sp * cr + sy * cp * sr,
-        sy * cp * cr - cy * sp * sr,
-        cy * cp * cr + sy * sp * sr,
-    )
+class GroundUnder:
+    """Height and slope of the ground below one vehicle, with the lane of its last position."""
+
+    def __init__(self, roads: RoadNetwork | None, height: float = 0.0) -> None:
+        self._roads = roads
+        self._last: LaneLocation | None = None
+        self._height = height
+
+    def at(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+        """Return height z [m], pitch and roll [rad] of a body at x, y with that heading.
+
+        Outside the road the ground is level at the height at which the vehicle left the road.
+        """
+        if self._roads is None:
+            return self._height, 0.0, 0.0
+        self._last = self._roads.locate_at(x, y, self._last)
+        if self._last is None:
+            return self._height, 0.0, 0.0
+        pose = self._roads.road_pose_at(self._last.road, self._last.s, self._last.t)
+        pose = pose.turned(yaw - pose.h)
+        self._height = pose.z
+        return pose.z, pose.p, pose.r
+
+
+class DrivenBody(Body):
+    """Vehicle that moves by pedals, steering and collisions.
+
+    If a collision is possible, pybullet integrates the motion step by step by `drive` and `read_back`. Otherwise
+    `coast` computes the same without pybullet.
+    """
+
+    def __init__(
+        self, client: int, spec: ActorSpec, placement: Placement, dt: float, step: float, ground: GroundUnder
+    ) -> None:
+        super().__init__(client, spec, placement, dt)
+        parameters = VehicleParameters.of(spec)
+        self.track = track_of(parameters, step)
+        self._step = step
+        self._ground = ground
+        self._lever = self.track.to_reference
+        self._motion = (0.0, 0.0, 0.0)
+        """Velocity x y of the center of gravity [m/s] and yaw rate [rad/s] of the rigid body."""
+        self._create(
+            (spec.offset[0] - self._lever, spec.offset[1], 0.0),
+            (self.x, self.y, self.z),
+            parameters.mass,
+            parameters.yaw_inertia,
+            DRIVEN,
+            SCRIPTED | DRIVEN | STATIC,
+        )
+        self.teleport(placement)
+
+    @property
+    def travel(self) -> float:
+        """Maximum displacement of any part within a tick at constant velocity without a collision [m]."""
+        vx, vy, rate = self._motion
+        return (math.hypot(vx, vy) + abs(rate) * 2.0 * self.radius) * self._dt
+
+    def teleport(self, placement: Placement) -> None:
+        """Move to the placement, rolling straight ahead. The ground determines height, pitch and roll."""
+        z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw)
+        self._pose(placement.x, placement.y, z, placement.yaw, pitch, roll)
+        self.speed, self.yaw_rate, self.acceleration = placement.speed, 0.0, (0.0, 0.0, 0.0)
+        self.velocity = self.velocity_before = self._along_heading(placement.speed)
+        self._motion = (self.velocity[0], self.velocity[1], 0.0)
+        self.moved = self.stale = True
+
+    def demand(self, control: Control, friction: float) -> Demand:
+        """Return the forces and the steering that a control requests for the steps of this tick."""
+        return self.track.demand(control, friction, self.pitch)
+
+    def drive(self, demand: Demand) -> None:
+        """Set the velocity of the rigid body for the next physics step."""
+        handle, client = self.handle, self.client
+        _, (qx, qy, qz, qw) = bullet.getBasePositionAndOrientation(handle, client)
+        (vx, vy, _), (_, _, turning) = bullet.getBaseVelocity(handle, client)
+        cos, sin = 1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz)
+        scale = 1.0 / math.sqrt(cos * cos + sin * sin)
+        cos, sin = cos * scale, sin * scale
+        forward, left, turning = self.track.advance(vx * cos + vy * sin, vy * cos - vx * sin, turning, demand)
+        rise = -math.tan(self.pitch) * forward if self.pitch else 0.0
+        velocity = (forward * cos - left * sin, forward * sin + left * cos, rise)
+        bullet.resetBaseVelocity(handle, velocity, (0.0, 0.0, turning), client)
+
+    def present_velocity(self) -> Vector3:
+        """Return the current velocity of the rigid body within a step [m/s]."""
+        velocity: Vector3 = bullet.getBaseVelocity(self.handle, self.client)[0]
+        return velocity
+
+    def read_back(self) -> None:
+        """Read pose and velocity from pybullet after a step, and set the body on the ground."""
+        (x, y, z), (qx, qy, qz, qw) = bullet.getBasePositionAndOrientation(self.handle, self.client)
+        (vx, vy, _), (_, _, rate) = bullet.getBaseVelocity(self.handle, self.client)
+        yaw = math.atan2(2.0 * (qx * qy + qw * qz), 1.0 - 2.0 * (qy * qy + qz * qz))
+        lifted = abs(z - self._arm(yaw)[2] - self.z) > 1e-6
+        self._arrive(x, y, yaw, (vx, vy, rate))
+        self.stale = bool(self.pitch or self.roll or lifted or qx or qy)
+
+    def coast(self, demand: Demand, steps: int) -> None:
+        """Move by physics steps without a possible collision.
+
+        As in pybullet, the velocity at the end of a step determines the distance of the step.
+        """
+        if self._stays(demand):
+            steps = 1
+        advance, step, before = self.track.advance, self._step, self._motion
+        arm_x, arm_y, _ = self._arm(self.yaw)
+        x, y, yaw = self.x + arm_x, self.y + arm_y, self.yaw
+        vx, vy, rate = before
+        for _ in range(steps):
+            cos, sin = math.cos(yaw), math.sin(yaw)
+            forward, left, rate = advance(vx * cos + vy * sin, vy * cos - vx * sin, rate, demand)
+            vx, vy = forward * cos - left * sin, forward * sin + left * cos
+            x += step * vx
+            y += step * vy
+            yaw += step * rate
+        self._arrive(x, y, yaw if -math.pi < yaw <= math.pi else wrap_angle(yaw), (vx, vy, rate))
+        self.stale = self.stale or self.moved or self._motion != before
+
+    def _stays(self, demand: Demand) -> bool:
+        """Return whether the vehicle stands and remains at standstill."""
+        track = self.track
+        still = self._motion == STILL and track.steering == demand.steering
+        return still and track.advance(0.0, 0.0, 0.0, demand) == STILL
+
+    def sync_pose(self) -> None:
+        """Move the rigid body to the pose of the actor."""
+        self.stale = False
+        vx, vy, rate = self._motion
+        arm_x, arm_y, arm_z = self._arm(self.yaw)
+        at = (self.x + arm_x, self.y + arm_y, self.z + arm_z)
+        turn = quaternion(self.yaw, self.pitch, self.roll)
+        bullet.resetBasePositionAndOrientation(self.handle, at, turn, self.client)
+        rise = -math.tan(self.pitch) * (vx * math.cos(self.yaw) + vy * math.sin(self.yaw)) if self.pitch else 0.0
+        bullet.resetBaseVelocity(self.handle, (vx, vy, rise), (0.0, 0.0, rate), self.client)
+
+    def _arrive(self, x: float, y: float, yaw: float, motion: Vector3) -> None:
+        """Set position, heading and motion of the center of gravity. The ground determines the rest."""
+        vx, vy, rate = self._motion = motion
+        arm_x, arm_y, _ = self._arm(yaw)
+        x, y = x - arm_x, y - arm_y
+        self.moved = (x, y, yaw) != (self.x, self.y, self.yaw)
+        height, pitch, roll = self._ground.at(x, y, yaw)
+        self._pose(x, y, height, yaw, pitch, roll)
+        self.yaw_rate = rate
+        level = vx * math.cos(yaw) + vy * math.sin(yaw)
+        self.speed = level / math.cos(pitch)
+        self._accelerate_to((vx + arm_y * rate, vy - arm_x * rate, -math.tan(pitch) * level))
+
+    def _arm(self, yaw: float) -> Vector3:
+        """Return the vector from the reference point to the center of gravity, at half the height of the box [m]."""
+        lever, height = self._lever, self.spec.offset[2]
+        cy, sy = math.cos(yaw), math.sin(yaw)
+        if self.pitch == 0.0 and self.roll == 0.0:
+            return lever * cy, lever * sy, height
+        cp, sp, cr, sr = math.cos(self.pitch), math.sin(self.pitch), math.cos(self.roll), math.sin(self.roll)
+        ahead, aside = lever * cp + height * sp * cr, -height * sr
+        return cy * ahead - sy * aside, sy * ahead + cy * aside, height * cp * cr - lever * sp

@@ -1,14 +1,26 @@
-"""Import of pybullet without its build message."""
+"""pybullet: its import without the build message, its clients, static bodies and triangle meshes."""
 
 from __future__ import annotations
 
+import math
 import os
 import sys
+from threading import Lock
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.bounded import file_in_memory
 
+RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
+"""Groups of the collision filter of pybullet; rays belong to the first by default."""
+
+RESTITUTION = 0.3
+"""Restitution of one body. Two rebound with its square, about 0.1, as cars above some 5 m/s."""
+BODY_FRICTION = 0.7
+"""Coefficient of friction of one body, whose product with that of the other counts."""
 _NOTICE = b"pybullet build time:"
 
 
@@ -65,3 +77,56 @@ def disconnect(client: int) -> None:
         _idle.append(client)
     else:
         bullet.disconnect(physicsClientId=client)
+
+
+def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
+    """Return x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    if pitch == 0.0 and roll == 0.0:
+        return 0.0, 0.0, sy, cy
+    cp, sp, cr, sr = math.cos(pitch / 2), math.sin(pitch / 2), math.cos(roll / 2), math.sin(roll / 2)
+    return (
+        cy * cp * sr - sy * sp * cr,
+        cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr,
+        cy * cp * cr + sy * sp * sr,
+    )
+
+
+def create_static_body(client: int, shape: int, group: int, meets: int, visual: int = -1) -> int:
+    """Create a body at the origin, and return its handle.
+
+    group, meets  groups of the collision filter: its own, and those of the bodies and rays that it blocks
+    visual        visual shape; -1 for the one of the collision shape
+    """
+    here = {"physicsClientId": client}
+    handle: int = bullet.createMultiBody(0.0, shape, visual, useMaximalCoordinates=1, **here)
+    bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
+    bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
+    return handle
+
+
+_vertices: list[list[float]] = []
+"""Shared vertices, as many as the largest mesh had."""
+_lock = Lock()
+
+
+def create_triangle_shape(client: int, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> int:
+    """Return the collision shape of a mesh: vertices (N, 3) [m], faces (M, 3) of rows in them."""
+    with _lock:
+        for row, vertex in enumerate(vertices.tolist()):
+            if row < len(_vertices):
+                _vertices[row][:] = vertex
+            else:
+                _vertices.append(vertex)
+        points, corners = _vertices[: len(vertices)], faces.ravel().tolist()
+        shape: int = bullet.createCollisionShape(
+            bullet.GEOM_MESH,
+            vertices=points,
+            indices=corners,
+            flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH,
+            physicsClientId=client,
+        )
+        points.clear()
+        corners.clear()
+    return shape

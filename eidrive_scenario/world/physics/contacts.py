@@ -1,4 +1,4 @@
-"""Start of contacts between boxes, with impact speeds."""
+"""Start of contacts between boxes, with impact speeds; vehicles and trailers, which may overlap."""
 
 from __future__ import annotations
 
@@ -11,9 +11,59 @@ import numpy as np
 from eidrive_scenario.geometry import box_corners, box_distance, overlap, points_in_box
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import Body
-from eidrive_scenario.world.physics.body_group import BodyGroup, SingleBodies
-from eidrive_scenario.world.physics.couplings import PARTED, Couplings
+from eidrive_scenario.world.physics.body_group import BodyGroup
+from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.view import Contact
+
+PARTED = 0.05
+"""Minimum gap after a contact before a new one is counted [m], and before a disconnected trailer collides again. It
+prevents that a scrape counts as many contacts."""
+
+Pair = frozenset[str]
+
+
+class Couplings:
+    """Pairs of a vehicle and its trailer: no collision between them is resolved, and no contact begins."""
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        self.pairs: frozenset[Pair] = frozenset()
+        """Names of connected actors."""
+        self._apart: dict[Pair, tuple[int, int]] = {}
+        """Handles of the bodies that do not collide with each other."""
+
+    @property
+    def any_affected(self) -> bool:
+        """Whether `update` has pairs to process."""
+        return bool(self.pairs or self._apart)
+
+    def attached(self, name: str) -> frozenset[str]:
+        """Return the actors that are connected to an actor directly or by others, without the actor itself."""
+        if not self.pairs:
+            return frozenset()
+        found, added = {name}, {name}
+        while added:
+            added = {other for pair in self.pairs if pair & added for other in pair} - found
+            found |= added
+        return frozenset(found - {name})
+
+    def update(self, bodies: Mapping[str, Body]) -> None:
+        """Set which bodies collide; those of a disconnected trailer and its vehicle only after they have parted."""
+        for pair in sorted(self.pairs | self._apart.keys(), key=sorted):
+            if not pair <= bodies.keys():
+                self._apart.pop(pair, None)
+                continue
+            first, second = (bodies[name] for name in sorted(pair))
+            handles = first.handle, second.handle
+            if pair not in self.pairs and box_distance(first.box, second.box) > PARTED:
+                self._collide(handles, True)
+                del self._apart[pair]
+            elif self._apart.get(pair) != handles:
+                self._collide(handles, False)
+                self._apart[pair] = handles
+
+    def _collide(self, handles: tuple[int, int], enabled: bool) -> None:
+        bullet.setCollisionFilterPair(*handles, -1, -1, int(enabled), physicsClientId=self._client)
 
 
 class Touch(NamedTuple):
@@ -23,24 +73,61 @@ class Touch(NamedTuple):
     impact_speed: float
 
 
-class ContactTracker:
-    """Tracker of starting contacts: overlaps of boxes at the ends of steps, and contacts in pybullet.
+Touches = dict[tuple[str, str], Touch]
+"""Contacts by pair of names in the order of the rows of the view, a building last."""
 
-    A contact that began while a trailer was connected to its vehicle is none until they have parted.
+
+class ContactTracker:
+    """Tracker of the contacts that start: overlaps of boxes at the ends of steps, and contacts in pybullet.
+
+    A contact that began while a trailer was connected to its vehicle is none until they have parted. The view of a tick
+    has the contacts that started in the last step, and those of actors that were added before it is taken. Contacts of
+    actors that are added later are those of the next view.
     """
 
     def __init__(self, couplings: Couplings) -> None:
         self._couplings = couplings
         self._touching: dict[tuple[str, str], None] = {}
+        self._started: tuple[Contact, ...] = ()
+        self._late: tuple[Contact, ...] = ()
+        """Contacts of actors that were added after the view was taken."""
+        self._is_viewed = False
+        self._has_added = False
+
+    def note_addition(self) -> None:
+        """Note that an actor was added. `find_added` has to be called before another change."""
+        self._has_added = True
+
+    def find_added(self, bodies: Mapping[str, Body]) -> None:
+        """Find the contacts of actors that were added since the last call, in the order of addition."""
+        if not self._has_added:
+            return
+        self._has_added = False
+        rows = {name: row for row, name in enumerate(bodies)}
+        started = self._start(BodyGroup(tuple(bodies.values())), {})
+        in_order = tuple(sorted(started, key=lambda contact: (rows[contact.second], rows[contact.first])))
+        if self._is_viewed:
+            self._late += in_order
+        else:
+            self._started += in_order
 
     def forget(self, name: str) -> None:
-        """Delete the contacts of a removed actor."""
+        """Delete the contacts of a removed actor that no view has had yet."""
         self._touching = {pair: None for pair in self._touching if name not in pair}
+        self._late = tuple(contact for contact in self._late if name not in (contact.first, contact.second))
 
-    def update(self, bodies: BodyGroup, touches: dict[tuple[str, str], Touch]) -> tuple[Contact, ...]:
-        """Return the contacts that started since the last call; `touches` are those of pybullet by pair of names."""
-        if not self._touching and not touches and not bodies.any_moved():
-            return ()
+    def step(self, bodies: BodyGroup, touches: Touches) -> None:
+        """Find the contacts that started in a step; `touches` are those of pybullet."""
+        self._started = self._late + self._start(bodies, touches)
+        self._late, self._is_viewed = (), False
+
+    def viewed(self) -> tuple[Contact, ...]:
+        """Return the contacts for the view of the tick, which is taken now."""
+        self._is_viewed = True
+        return self._started
+
+    def _start(self, bodies: BodyGroup, touches: Touches) -> tuple[Contact, ...]:
+        """Return the contacts that started since the last call."""
         begun: list[Contact] = []
         near = {(first.name, second.name): (first, second) for first, second in bodies.near_pairs(PARTED)}
         moved = bodies.moved_names() if self._touching else set()
@@ -56,66 +143,14 @@ class ContactTracker:
             if pair in self._touching or pair in touches or not overlap(first.box, second.box):
                 continue
             self._touching[pair] = None
-            if frozenset(pair) in self._couplings.pairs:
-                continue
-            begun.append(
-                Contact(
-                    *pair, _shared_point(first, second), relative_speed(first.velocity_before, second.velocity_before)
-                )
-            )
+            if frozenset(pair) not in self._couplings.pairs:
+                speed = relative_speed(first.velocity_before, second.velocity_before)
+                begun.append(Contact(*pair, _shared_point(first, second), speed))
         for pair, touch in touches.items():
             if pair not in self._touching:
                 self._touching[pair] = None
                 begun.append(Contact(*pair, touch.position, touch.impact_speed))
         return tuple(begun)
-
-
-class ContactsOfTick:
-    """Contacts that the view of a tick has: those that started in the last step, and those of actors added before it.
-
-    Contacts of actors that are added after the view was taken are those of the next view. The contacts of several added
-    actors are found at once, in the order of addition.
-    """
-
-    def __init__(self, couplings: Couplings) -> None:
-        self._tracker = ContactTracker(couplings)
-        self._started: tuple[Contact, ...] = ()
-        self._late: tuple[Contact, ...] = ()
-        """Contacts of actors that were added after the view was taken."""
-        self._is_viewed = False
-        self._has_added = False
-
-    def note_addition(self) -> None:
-        """Note that an actor was added. `find_added` has to be called before another change."""
-        self._has_added = True
-
-    def find_added(self, bodies: Mapping[str, Body]) -> None:
-        """Find the contacts of actors that were added since the last call."""
-        if not self._has_added:
-            return
-        self._has_added = False
-        rows = {name: row for row, name in enumerate(bodies)}
-        found = self._tracker.update(SingleBodies(tuple(bodies.values())), {})
-        in_order = tuple(sorted(found, key=lambda one: (rows[one.second], rows[one.first])))
-        if self._is_viewed:
-            self._late += in_order
-        else:
-            self._started += in_order
-
-    def forget(self, name: str) -> None:
-        """Delete the contacts of a removed actor that no view has had yet."""
-        self._tracker.forget(name)
-        self._late = tuple(one for one in self._late if name not in (one.first, one.second))
-
-    def step(self, bodies: BodyGroup, touches: dict[tuple[str, str], Touch]) -> None:
-        """Find the contacts that started in a step; `touches` are those of pybullet."""
-        self._started = self._late + self._tracker.update(bodies, touches)
-        self._late, self._is_viewed = (), False
-
-    def viewed(self) -> tuple[Contact, ...]:
-        """Return the contacts for the view of the tick, which is taken now."""
-        self._is_viewed = True
-        return self._started
 
 
 def _shared_point(first: Body, second: Body) -> Vector3:

@@ -9,16 +9,12 @@ from itertools import chain, repeat
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.actor import Control, Vector3
-from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.physics.body_group import BodyGroup
 from eidrive_scenario.world.physics.bullet import bullet
-from eidrive_scenario.world.physics.contacts import Touch, relative_speed
-from eidrive_scenario.world.physics.driven_body import DrivenBody
+from eidrive_scenario.world.physics.contacts import Touch, Touches, relative_speed
 from eidrive_scenario.world.physics.dynamics import Demand
 from eidrive_scenario.world.physics.scenery import Scenery
-
-Touches = dict[tuple[str, str], Touch]
-"""Contacts by pair of names in the order of the rows of the view, a building last."""
 
 _ROLL = Control()
 _MAX_IMPACT = 20.0

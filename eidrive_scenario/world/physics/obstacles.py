@@ -7,16 +7,65 @@ posts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.world.physics.bodies import DRIVEN, RAYS, STATIC, TERRAIN
-from eidrive_scenario.world.physics.spatial_grid import SQUARE, SpatialGrid
-from eidrive_scenario.world.physics.static_body import create_static_body
-from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
+from eidrive_scenario.world.physics.bullet import (
+    DRIVEN,
+    RAYS,
+    STATIC,
+    TERRAIN,
+    create_static_body,
+    create_triangle_shape,
+)
 from eidrive_scenario.world.road_objects import RoadObjectBody
+
+Thing = TypeVar("Thing")
+Cell = tuple[int, int]
+
+SQUARE = 10.0
+"""Side of a cell [m]."""
+_FAR = 300.0
+"""Reach from which on the occupied cells are searched instead of all cells in reach [m]: steps of many seconds."""
+
+
+class SpatialGrid(Generic[Thing]):
+    """Static objects, each in the cells that it may overlap."""
+
+    def __init__(self) -> None:
+        self._in_cell: dict[Cell, list[Thing]] = {}
+
+    def add(self, thing: Thing, cells: Iterable[Cell]) -> None:
+        """Add an object to these cells."""
+        for cell in dict.fromkeys(cells):
+            self._in_cell.setdefault(cell, []).append(thing)
+
+    def query(self, x: float, y: float, reach: float) -> list[Thing]:
+        """Return the objects in the cells within reach of a point [m], possibly with duplicates."""
+        found: list[Thing] = []
+        if reach > _FAR:
+            side = reach + SQUARE
+            for (column, line), things in self._in_cell.items():
+                if abs((column + 0.5) * SQUARE - x) <= side and abs((line + 0.5) * SQUARE - y) <= side:
+                    found += things
+        elif self._in_cell:
+            for cell in grid_cells(x, y, reach):
+                if cell in self._in_cell:
+                    found += self._in_cell[cell]
+        return found
+
+
+def grid_cells(x: float, y: float, reach: float) -> list[Cell]:
+    """Return the cells that overlap the square around a point with half the side `reach` [m]."""
+    left, right = math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE)
+    low, high = math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE)
+    if left == right and low == high:
+        return [(left, low)]
+    return [(column, line) for column in range(left, right + 1) for line in range(low, high + 1)]
+
 
 MAX_FACES = 20_000
 """Maximum number of faces of a collision shape; pybullet rejects much larger ones."""

@@ -1,4 +1,4 @@
-"""Ray casts through the world."""
+"""Ray casts through the world, and what lines between points cross."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.world.physics.bullet import bullet
-
-GROUND, NOTHING = -1, -2
-"""Rows of rays that ended at the ground or a building, and of rays without a hit."""
+from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.world.physics.bullet import STATIC, TERRAIN, bullet
+from eidrive_scenario.world.physics.scenery import Scenery
+from eidrive_scenario.world.view import GROUND, NOTHING, RayHits, WorldView
 
 _HANDLE, _FRACTION, _NORMAL = itemgetter(0), itemgetter(2), itemgetter(4)
 _BATCH = 16_000
@@ -26,21 +26,6 @@ distance is doubled each time.
 """
 _STEPS = 12
 """Maximum number of continuations per skipped body: 40 m after the last."""
-
-
-class RayHits(msgspec.Struct, frozen=True):
-    """First hits of rays.
-
-    rows      (M,) row of the actor in the view; GROUND (-1) for the ground and buildings, NOTHING (-2)
-    fraction  (M,) share of the distance from origin to target, 1 without a hit
-    position  (M, 3) of the hit [m], the target without a hit
-    normal    (M, 3) of the surface, zero without a hit
-    """
-
-    rows: Integers
-    fraction: Array
-    position: Array
-    normal: Array
 
 
 def cast_rays(
@@ -133,3 +118,125 @@ def cast(client: int, origins: Array, targets: Array, groups: int = -1) -> tuple
         normals = np.fromiter(chain.from_iterable(map(_NORMAL, hits)), float, 3 * len(hits))
         normal[part] = normals.reshape(-1, 3)
     return handles, fraction, normal
+
+
+TOUCH = 1e-6
+"""Depth up to which a line touches a box and does not cross it [m]."""
+_MARGIN = 0.1
+"""Distance by which circles around objects are enlarged [m]."""
+_ELEMENTS = 16_000
+"""Number of pairs of a line and a circle that are compared at once."""
+_MOST_CANDIDATES = 1_000_000
+"""Number of pairs of a line and an actor that are compared before further lines, which bounds the memory."""
+_MOST_ELEMENTS = 4_000_000
+"""Number of pairs of a line and a static object above which rays are cast instead of comparing them."""
+
+
+class Crossings(msgspec.Struct, frozen=True):
+    """Crossings of M lines.
+
+    lines    (K,) indices of lines that cross an actor, in ascending order
+    rows     (K,) rows of these actors in the view, in the order along each line
+    shares   (K,) share of the length at which the line enters the actor, 0 if it begins inside
+    scenery  (M,) share of the length at which the line meets the ground or a static object, 1 if it does not
+    """
+
+    lines: Integers
+    rows: Integers
+    shares: Array
+    scenery: Array
+
+
+def find_crossings(client: int, scenery: Scenery, view: WorldView, begins: Array, ends: Array, most: int) -> Crossings:
+    """Return what the lines from points (M, 3) to points (M, 3) cross. A line that touches an actor does not cross it.
+
+    most  number of actors after which the others on a line are left out
+
+    Static objects are found by pybullet, and actors from their boxes: a ray of pybullet also hits boxes that it passes
+    at a distance of up to a millimeter.
+    """
+    boxes = _Boxes(view)
+    step = max(_MOST_CANDIDATES // max(len(view.names), 1), 1)
+    parts = [
+        boxes.crossed(begins[start : start + step], ends[start : start + step], start, most)
+        for start in range(0, max(len(begins), 1), step)
+    ]
+    lines, rows, shares = map(np.concatenate, zip(*parts, strict=True))
+    return Crossings(lines, rows, shares, _scenery_shares(client, scenery, begins, ends))
+
+
+class _Boxes:
+    """Bounding boxes of actors in all three dimensions."""
+
+    def __init__(self, view: WorldView) -> None:
+        self._rotation = rotation_matrix(*view.kinematics[:, 3:6].T)
+        self._centers = view.position + (self._rotation @ view.offset[:, :, None])[:, :, 0]
+        self._half = view.size / 2.0
+        reach = (np.abs(self._rotation) @ self._half[:, :, None])[:, :, 0]
+        x, y, z = self._centers.T
+        self._circles = np.stack([x, y, np.hypot(reach[:, 0], reach[:, 1]), z + reach[:, 2]])
+
+    def crossed(self, begins: Array, ends: Array, first: int, most: int) -> tuple[Integers, Integers, Array]:
+        """Return lines, rows and shares of `Crossings` for lines whose first has the index `first`."""
+        lines, rows = _near(begins, ends, self._circles)
+        to_body = self._rotation[rows].transpose(0, 2, 1)
+        begin = (to_body @ (begins[lines] - self._centers[rows])[:, :, None])[:, :, 0]
+        way = (to_body @ (ends[lines] - begins[lines])[:, :, None])[:, :, 0]
+        enters, leaves = _within(begin, way, self._half[rows] - TOUCH)
+        crossed = np.flatnonzero((enters < leaves) & (enters < 1.0) & (leaves > 0.0))
+        lines, rows, shares = lines[crossed], rows[crossed], np.maximum(enters[crossed], 0.0)
+        order = np.lexsort((rows, shares, lines))
+        order = order[np.arange(len(order)) - np.searchsorted(lines[order], lines[order]) < most]
+        return lines[order] + first, rows[order], shares[order]
+
+
+def _scenery_shares(client: int, scenery: Scenery, begins: Array, ends: Array) -> Array:
+    """Return the shares (M,) of `Crossings.scenery`. Rays are cast for lines that may meet something."""
+    shares = np.ones(len(begins))
+    tested = np.arange(len(begins))
+    above = min(begins[:, 2].min(initial=1.0), ends[:, 2].min(initial=1.0)) > 0.0
+    if scenery.level and above:
+        circles = scenery.circles()
+        if circles.shape[1] * len(begins) <= _MOST_ELEMENTS:
+            tested = np.unique(_near(begins, ends, circles)[0])
+    if len(tested):
+        shares[tested] = cast(client, begins[tested], ends[tested], STATIC | TERRAIN)[1]
+    return shares
+
+
+def _near(begins: Array, ends: Array, circles: Array) -> tuple[Integers, Integers]:
+    """Return pairs of indices of lines and circles (4, K) where the line passes a circle in plan view below its top.
+
+    circles  center x, y, radius, and top of the object in the circle [m]
+    """
+    high = np.flatnonzero(circles[3] > np.minimum(begins[:, 2], ends[:, 2]).min(initial=np.inf))
+    lines, indices = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    way = ends - begins
+    square = np.maximum(way[:, 0] ** 2 + way[:, 1] ** 2, _MARGIN * _MARGIN)
+    (x, y, z), (dx, dy, rise) = begins.T, way.T
+    step = max(_ELEMENTS // max(len(begins), 1), 1)
+    for start in range(0, len(high), step):
+        some = high[start : start + step]
+        center_x, center_y, radius, top = circles[:, some, None]
+        px, py, reach = center_x - x, center_y - y, radius + _MARGIN
+        share = ((px * dx + py * dy) / square).clip(0.0, 1.0)
+        circle, line = np.nonzero((px - share * dx) ** 2 + (py - share * dy) ** 2 <= reach * reach)
+        half, share = reach[circle, 0] / np.sqrt(square[line]), share[circle, line]
+        first, last = np.maximum(share - half, 0.0), np.minimum(share + half, 1.0)
+        below = z[line] + np.minimum(rise[line] * first, rise[line] * last) < top[circle, 0]
+        lines.append(line[below])
+        indices.append(some[circle[below]])
+    return np.concatenate(lines), np.concatenate(indices)
+
+
+def _within(begin: Array, way: Array, half: Array) -> tuple[Array, Array]:
+    """Return the shares (K,) at which lines enter and leave boxes around the origin, in the frames of the boxes.
+
+    begin, way, half  (K, 3) starts, vectors to the ends, and half the sizes of the boxes [m]
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = (-half - begin) / way, (half - begin) / way
+    inside = np.abs(begin) < half
+    parallel = way == 0.0
+    low[parallel], high[parallel] = np.where(inside, -np.inf, np.inf)[parallel], np.inf
+    return np.minimum(low, high).max(axis=1), np.maximum(low, high).min(axis=1)

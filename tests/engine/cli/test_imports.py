@@ -18,7 +18,7 @@ SHORT = (*HEAVY, "msgspec", "numpy", "py_trees", "pybullet", "rich", "simpleeval
 UNUSED = (
     "eidrive_scenario.experiments.judgement", "eidrive_scenario.openscenario.distributions.expansion",
     "eidrive_scenario.recording.recording", "eidrive_scenario.traffic.background",
-    "eidrive_scenario.world.render.renderer", "eidrive_scenario.world.scene.visuals",
+    "eidrive_scenario.rendering.renderer", "eidrive_scenario.rendering.scene",
 )  # fmt: skip
 """Modules for other runs: of distributions, with recording, background traffic or cameras."""
 OTHER_COMMANDS = tuple(f"eidrive_scenario.cli.{name}" for name in ("check", "compare", "init", "reproduce", "sweep"))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import SensorSettings
@@ -69,7 +70,7 @@ def readings(
     things: list[Thing], sensors: Mapping[str, SensorSettings], *, mast: tuple[float, float, float] | None = None
 ) -> Readings:
     """Return the readings of the first object at time 0, or of a mast at x, y, yaw."""
-    with World(None, dt=0.05) as world:
+    with World(None, dt=0.05, picture_maker=picture_maker) as world:
         station = spec_of(things[0]) if mast is None else MAST
         if mast is not None:
             world.add(MAST, Placement(mast[0], mast[1], yaw=mast[2]))

@@ -17,10 +17,10 @@ from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDet
 from eidrive_scenario.perception.learned.image_memory import ImageMemory, RecentResults, StationDetections
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.settings import LearnedSettings
+from eidrive_scenario.rendering.renderer import ImageContent, Renderer
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.camera import CameraImage, Radiance
-from eidrive_scenario.world.render.renderer import ImageContent, Renderer
 
 
 @pytest.fixture

@@ -20,6 +20,7 @@ from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDet
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.registry import registry
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
@@ -48,7 +49,7 @@ def car(name: str) -> ActorSpec:
 @pytest.fixture(scope="module")
 def readings() -> Iterator[Readings]:
     """A car 14 m ahead and slightly to the left of a car with a camera and a lidar, on a clear day."""
-    with World() as world:
+    with World(picture_maker=picture_maker) as world:
         world.add(car("Ego"), Placement(0.0, 0.0))
         world.add(car("Other"), Placement(14.0, 1.5, yaw=0.4))
         yield Rig(car("Ego"), SENSORS).read(world, world.view())
@@ -129,7 +130,7 @@ def test_detect_same_image_returns_same_bits(kind: type[LearnedDetector], readin
 
 @KINDS
 def test_detect_in_empty_scene_returns_no_objects(kind: type[LearnedDetector]) -> None:
-    with World() as world:
+    with World(picture_maker=picture_maker) as world:
         world.add(car("Ego"), Placement(0.0, 0.0))
         empty = Rig(car("Ego"), SENSORS).read(world, world.view())
     assert len(create(kind).detect(empty)) == 0

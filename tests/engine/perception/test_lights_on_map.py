@@ -19,6 +19,7 @@ from eidrive_scenario.perception.learned.lamps import NONE, SHOWN, WEIGHTS, crop
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, Readings, SignalReading
@@ -54,7 +55,7 @@ def take_image(
     weather: Weather | None = None,
     others: Sequence[tuple[ActorSpec, Placement]] = (),
 ) -> CameraReading:
-    with World(roads) as world:
+    with World(roads, picture_maker=picture_maker) as world:
         for spec, placement in others:
             world.add(spec, placement)
         if weather is not None:

@@ -12,6 +12,7 @@ from opendrive_xml import junction_xml, lanes_xml, map_xml, predecessor_xml, roa
 from signal_street import CAR, EAST, ROUND, SIGNAL, WEST, light, stop_sign, street
 
 from eidrive_scenario.perception.traffic_lights import SignalsAhead, stop_lines
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
@@ -98,7 +99,7 @@ def visible_signals(
     truck: bool = False,
     kinds: frozenset[str] = SIGNAL_KINDS,
 ) -> set[str]:
-    with World(roads, dt=0.05) as world:
+    with World(roads, dt=0.05, picture_maker=picture_maker) as world:
         world.add(CAR, Placement(x, -1.75, yaw=yaw))
         if truck:
             world.add(TRUCK, Placement(x + 14, -2.5))
@@ -124,7 +125,7 @@ def test_roof_of_the_station_does_not_hide_a_lower_signal(height: float, gap: fl
     """The sensor is 4.7 m behind the front, 0.41 m above the roof; the centers of the faces are at 2.95 and 2.45 m."""
     spec = dataclasses.replace(TRUCK, size=(8.5, 2.5, height), offset=(0.0, 0.0, height / 2.0))
     roads = street(light("east", 120.0), stop_sign("stop", 120.0))
-    with World(roads, dt=0.05) as world:
+    with World(roads, dt=0.05, picture_maker=picture_maker) as world:
         world.add(spec, Placement(120.0 - gap - 4.25, -1.75))
         readings = SignalSensor(spec, roads).read(world, world.view(), 0, {"east": "green"})
     assert {reading.id for reading in readings} == {"east", "stop"}

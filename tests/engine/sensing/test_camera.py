@@ -12,17 +12,19 @@ from pydantic import ValidationError
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import Camera, ImageSensor
-from eidrive_scenario.sensing.imaging.exposure import (
+from eidrive_scenario.sensing.imaging import (
     BASE_SPEED,
     LENS,
     SATURATION,
     Exposure,
+    Optics,
     develop,
+    lens_of,
     meter_exposure,
     noise_of,
 )
-from eidrive_scenario.sensing.imaging.optics import Optics, lens_of
 from eidrive_scenario.sensing.precipitation import drops_before
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
 from eidrive_scenario.world import World
@@ -50,7 +52,7 @@ def test_capture_projects_corners_like_opencv(distortion: Any, place: tuple[floa
     The lens bends its edges by less than that.
     """
     settings = CameraSettings(width=400, height=300, fov=90, distortion=distortion)
-    with World() as world:
+    with World(picture_maker=picture_maker) as world:
         world.add(CRATE, Placement(*place))
         reading = ImageSensor(settings).capture(world, level(z=0.2), generator(1, "test"))
     rows, columns = np.nonzero(reading.segmentation == 0)
@@ -128,7 +130,7 @@ def test_optics_of_random_distortions_are_exact_or_refused() -> None:
 
 
 def test_supersampling_averages_finer_pixels() -> None:
-    with World() as world:
+    with World(picture_maker=picture_maker) as world:
         world.add(CRATE, Placement(4.0, 0.5))
         fine = CameraSettings(width=80, height=60, fov=70, supersampling=2)
         pinhole = lens_of(fine)
@@ -210,7 +212,7 @@ def test_rain_changes_image_and_dry_weather_does_not() -> None:
     settings = CameraSettings(width=200, height=150, noise=None, lens_drops=False)
 
     def images(weather: Weather) -> list[np.ndarray]:
-        with World() as world:
+        with World(picture_maker=picture_maker) as world:
             world.set_weather(weather)
             camera = ImageSensor(settings)
             return [camera.capture(world, level(), generator(seed, "rain")).rgb.astype(int) for seed in (1, 2)]
@@ -225,7 +227,7 @@ def test_image_depends_on_seed_and_sensor_name() -> None:
     spec = ActorSpec("Ego", "car", "car", (4.5, 1.8, 1.5), (1.3, 0.0, 0.75), wheelbase=2.7)
 
     def capture_bytes(seed: int, name: str = "front") -> bytes:
-        with World() as world:
+        with World(picture_maker=picture_maker) as world:
             world.add(spec, Placement(0.0, 0.0))
             world.add(CRATE, Placement(9.0, 1.0))
             world.set_weather(load_weather("storm"))

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.rig import Rig
-from eidrive_scenario.sensing.scene import Scene
+from eidrive_scenario.sensing.sensor import Scene
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -23,7 +24,7 @@ def spec(name: str, size: tuple[float, float, float] = (4.892, 1.837, 1.49), sha
 @pytest.fixture
 def world() -> Iterator[World]:
     """An ego at the origin, a fire engine 15 m ahead, a car hidden behind it and one beside that."""
-    with World(None, dt=0.05) as created:
+    with World(None, dt=0.05, picture_maker=picture_maker) as created:
         created.add(spec("Ego"), Placement(0, 0))
         created.add(spec("Truck", (8.468, 2.891, 3.827), "firetruck"), Placement(15, 0))
         created.add(spec("Hidden"), Placement(30, 0))

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from eidrive_scenario.sensing.lidar import Lidar
-from eidrive_scenario.sensing.lidar_physics import BACKSCATTER, CONTRAST, GROUND, REFLECTIVITY, extinction, returns
+from eidrive_scenario.sensing.lidar import BACKSCATTER, CONTRAST, GROUND, REFLECTIVITY, Lidar, extinction, returns
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.world.weather import Weather

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from eidrive_scenario.rendering import picture_maker
+from eidrive_scenario.rendering.renderer import Renderer
 from eidrive_scenario.sensing.camera import Camera
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.settings import CameraSettings, Mount, NoiseSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
-from eidrive_scenario.world.render.renderer import Renderer
 from eidrive_scenario.world.weather import load_weather
 
 EGO = ActorSpec("Ego", "car", "car", (4.5, 1.8, 1.5), (1.3, 0.0, 0.75), wheelbase=2.7)
@@ -43,7 +44,7 @@ def reading_of(
     *, seed: int = 1, name: str = "front", spec: ActorSpec = EGO, speed: float = 5.0, ticks: int = 0, **settings: Any
 ) -> CameraReading:
     """Return the reading of a camera in rain, behind another car."""
-    with World() as world:
+    with World(picture_maker=picture_maker) as world:
         world.set_weather(load_weather("storm"))
         world.add(spec, Placement(0.0, 0.0, speed=speed))
         world.add(OTHER, Placement(10.0, 1.0))

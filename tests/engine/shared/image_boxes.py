@@ -10,9 +10,9 @@ import numpy as np
 
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.perception.geometry.projection import pixels
+from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.meshes import actor_mesh
 
 WIDTH, HEIGHT, FOCAL = 800, 600, 400.0
 USUAL = {"car": (4.6, 1.85, 1.55), "van": (5.7, 2.1, 2.4), "truck": (8.2, 2.6, 3.5), "pedestrian": (0.55, 0.55, 1.72)}

@@ -10,8 +10,9 @@ import pytest
 from msgspec.structs import replace
 from sample_car import CarFactory
 
-from eidrive_scenario.world import World, actor_table
+from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement
+from eidrive_scenario.world.physics import body_group
 
 HALF = 40.0
 """Half the length of the square with the actors [m]."""
@@ -24,7 +25,7 @@ def test_batch_gives_the_same_bits_as_single_bodies(
 ) -> None:
     found = []
     for many in (1, 10**9):
-        monkeypatch.setattr(actor_table, "MANY", many)
+        monkeypatch.setattr(body_group, "MANY", many)
         found.append(list(_observations(car, count, driven, ticks=40)))
     assert found[0] == found[1]
     assert count < 25 or any("Contact" in text for text in found[0])
@@ -34,7 +35,7 @@ def test_batch_begins_with_many_scripted_bodies_and_ends_with_few(
     world: World, car: CarFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The velocities of the last step continue across the change."""
-    monkeypatch.setattr(actor_table, "MANY", 3)
+    monkeypatch.setattr(body_group, "MANY", 3)
     for number in range(3):
         world.add(car(f"A{number}"), Placement(0.0, 10.0 * number, speed=10.0))
         world.step({f"A{row}": Placement(0.5 * (number + 1), 10.0 * row, speed=10.0) for row in range(number + 1)}, {})
@@ -48,7 +49,7 @@ def test_batch_begins_with_many_scripted_bodies_and_ends_with_few(
 def test_bodies_of_a_batch_stay_where_pybullet_and_distances_expect_them(
     world: World, car: CarFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(actor_table, "MANY", 1)
+    monkeypatch.setattr(body_group, "MANY", 1)
     world.add(car("A"), Placement(0.0, 0.0))
     world.add(car("B"), Placement(20.0, 0.0))
     for x in (1.0, 2.0, 3.0):

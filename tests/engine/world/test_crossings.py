@@ -134,7 +134,7 @@ def test_many_lines_are_compared_in_parts(
     whole = world.crossings(begins, ends, most)
     assert whole.lines.tolist() == [line for line in range(25) for _ in range(min(most, 30 - line))]
     assert whole.rows.tolist() == [row for line in range(25) for row in range(line, min(line + most, 30))]
-    monkeypatch.setattr("eidrive_scenario.world.physics.crossings._MOST_CANDIDATES", 100)
+    monkeypatch.setattr("eidrive_scenario.world.physics.rays._MOST_CANDIDATES", 100)
     parts = world.crossings(begins, ends, most)
     assert (parts.lines.tolist(), parts.rows.tolist()) == (whole.lines.tolist(), whole.rows.tolist())
     assert parts.shares.tolist() == whole.shares.tolist()

@@ -11,10 +11,10 @@ import pytest
 from eidrive_behaviors.actions.following import largest_curvature
 
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, ExtraAxle, Placement
-from eidrive_scenario.world.meshes import actor_mesh
-from eidrive_scenario.world.physics.multi_axle import MultiAxleTrack, track_of, turning_wheelbase
+from eidrive_scenario.world.physics.dynamics import MultiAxleTrack, track_of, turning_wheelbase
 from eidrive_scenario.world.physics.vehicle_parameters import GRAVITY, VehicleParameters
 from eidrive_scenario.world.specs import actor_spec
 

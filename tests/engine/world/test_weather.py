@@ -13,8 +13,7 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import names
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.environment import Environment
-from eidrive_scenario.world.environment_weather import solar_position, weather_from_environment
+from eidrive_scenario.world.environment import Environment, solar_position, weather_from_environment
 from eidrive_scenario.world.weather import Weather, load_weather
 
 

@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from camera_image import camera_image
 from sample_car import CarFactory
 
 from eidrive_scenario.errors import SettingError, SimulationError
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement
 from eidrive_scenario.world.physics.engine import substeps_per_tick
@@ -165,13 +167,13 @@ def test_concurrent_worlds_are_identical_and_independent(car: CarFactory) -> Non
 
 def test_views_rays_and_images_do_not_change_the_run(car: CarFactory) -> None:
     def play(look: bool) -> bytes:
-        with World(dt=0.05) as world:
+        with World(dt=0.05, picture_maker=picture_maker) as world:
             world.add(car("Ego"), Placement(0.0, 0.0, speed=12.0), driven=True)
             world.add(car("Other"), Placement(12.0, 0.5), driven=True)
             for _ in range(60):
                 if look:
                     world.raycast([[-10.0, 0.0, 0.5]], [[50.0, 0.0, 0.5]])
-                    world.camera(np.eye(4), 16, 12, 1.0)
+                    camera_image(world, np.eye(4), 16, 12, 1.0)
                 world.step({}, {"Ego": Control(throttle=0.5, steering=0.02)})
             return world.view().position.tobytes()
 
@@ -183,3 +185,11 @@ def test_substeps_per_tick_of_an_immense_tick_is_an_error(dt: float) -> None:
     """All steps are computed in one call, so that the run would not return."""
     with pytest.raises(SettingError, match="give a dt of at most 100 s"):
         substeps_per_tick(dt, 200.0)
+
+
+def test_view_without_some_actors(world: World, car: CarFactory) -> None:
+    for number, name in enumerate(("A", "B", "C")):
+        world.add(car(name), Placement(10.0 * number, 0.0))
+    less = world.view().without({"B", "nobody"})
+    assert (less.names, less.position[:, 0].tolist(), less.rows["C"]) == (("A", "C"), [0.0, 20.0], 1)
+    assert world.view().without(()) is world.view()

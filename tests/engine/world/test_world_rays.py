@@ -8,6 +8,7 @@ from sample_car import CarFactory
 
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.appearance import Appearance, Visibility
 
 
 def test_ray_hits_the_first_box(world: World, car: CarFactory) -> None:
@@ -88,3 +89,13 @@ def test_many_rays_equal_geometry(world: World, car: CarFactory) -> None:
     assert hits.rows.shape == (20_000,)
     # From the origin the rear of the box covers |y| / 30 up to 0.9 / 9.1; its sides are in that shadow.
     assert (hits.rows == 0).mean() == pytest.approx(2 * 30 * 0.9 / 9.1 / 20, abs=0.002)
+
+
+def test_rays_pass_actor_hidden_from_sensors(world: World, car: CarFactory) -> None:
+    world.add(car(), Placement(8.0, 0.0))
+    world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(sensors=False))})
+    assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == -2
+    assert world.view().unseen == ("Ego",)
+    world.set_display_state({}, {})
+    assert world.view().unseen == ()
+    assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0

@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from camera_image import camera_image
 from opendrive_xml import lanes_xml, map_xml, road_xml, superelevation_xml
 from sample_car import CarFactory, Resistances
 
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement
@@ -66,7 +68,7 @@ def test_gravity_accelerates_on_slope_and_brake_holds(car: CarFactory) -> None:
 
 
 def test_superelevation_rolls_the_car(car: CarFactory) -> None:
-    with World(road(bank=0.06)) as world:
+    with World(road(bank=0.06), picture_maker=picture_maker) as world:
         world.add(car(), Placement(50.0, -4.0, yaw=math.pi, speed=5.0), driven=True)
         world.step({}, {})
         view = world.view()
@@ -77,7 +79,7 @@ def test_superelevation_rolls_the_car(car: CarFactory) -> None:
 
 def test_crest_blocks_line_of_sight(car: CarFactory) -> None:
     crest = '<elevation s="0" a="0" b="0.1" c="0" d="0"/><elevation s="100" a="10" b="-0.1" c="0" d="0"/>'
-    with World(road(crest)) as world:
+    with World(road(crest), picture_maker=picture_maker) as world:
         world.add(car("Behind"), Placement(150.0, -4.0, 5.0))
         assert world.raycast([[50.0, -4.0, 6.5]], [[151.0, -4.0, 6.0]]).rows.tolist() == [-1]
         assert world.raycast([[50.0, -4.0, 16.0]], [[151.0, -4.0, 6.0]]).rows.tolist() == [0]
@@ -88,7 +90,7 @@ def test_crest_blocks_line_of_sight(car: CarFactory) -> None:
 def test_building_of_the_map_blocks_rays() -> None:
     place = 's="50" t="20" zOffset="0" hdg="0"'
     house = f'<object id="7" type="building" name="School" {place} length="20" width="10" height="9"/>'
-    with World(road(objects=house)) as world:
+    with World(road(objects=house), picture_maker=picture_maker) as world:
         hits = world.raycast([[50.0, 0.0, 3.0], [50.0, 0.0, 12.0]], [[50.0, 40.0, 3.0], [50.0, 40.0, 12.0]])
     assert hits.rows.tolist() == [-1, -2]
     assert hits.position[0] == pytest.approx((50.0, 15.0, 3.0), abs=1e-3)
@@ -96,8 +98,8 @@ def test_building_of_the_map_blocks_rays() -> None:
 
 def test_image_shows_road_and_verge() -> None:
     pose = np.array([[0.0, 0.0, 1.0, 10.0], [-1.0, 0.0, 0.0, -4.0], [0.0, -1.0, 0.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
-    with World(road()) as world:
-        picture = world.camera(pose, 160, 120, math.radians(90))
+    with World(road(), picture_maker=picture_maker) as world:
+        picture = camera_image(world, pose, 160, 120, math.radians(90))
     middle, left = picture.rgb[115, 80].astype(int), picture.rgb[70, 2].astype(int)
     assert max(middle) - min(middle) < 15
     assert left[1] > left[0] + 10

@@ -13,9 +13,8 @@ from sample_car import CarFactory
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.physics.bodies import ScriptedBody
+from eidrive_scenario.world.physics.bodies import DrivenBody, ScriptedBody
 from eidrive_scenario.world.physics.body_group import BodyGroup
-from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics
 
 HILL = map_xml(

@@ -1,0 +1,240 @@
+"""Camera at a pose: rays through its pixels, culling of triangles, and their projection to the image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.rendering.model import MeshInstance
+from eidrive_scenario.world.camera import Pinhole
+
+Pixels = NDArray[np.intp] | slice
+"""Indices of pixels, line by line."""
+
+
+class CameraView:
+    """Camera at a pose (4, 4): camera to world, x right, y down, z forward.
+
+    place  (3,) position in the world [m]
+    x, y   (P,) of the rays through the pixels in the camera frame at depth 1, and their length
+    """
+
+    def __init__(self, pose: Array, pinhole: Pinhole) -> None:
+        self.pose = pose
+        self.pinhole = pinhole
+        self.place: Array = pose[:3, 3]
+        self.shape = (pinhole.height, pinhole.width)
+        self._turn = pose[:3, :3].astype(np.float32)
+        self.x, self.y, self.length = _own_rays(pinhole)
+
+    def rays(self, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return rays with these x and y of the camera frame in world axes, at depth 1."""
+        turn = self._turn
+        rx, ry, rz = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] for axis in range(3))
+        return rx, ry, rz
+
+    def directions(self, pixels: Pixels) -> tuple[Floats, Floats, Floats]:
+        """Return unit vectors through pixels in world axes."""
+        length = self.length[pixels]
+        rx, ry, rz = self.rays(self.x[pixels], self.y[pixels])
+        return rx / length, ry / length, rz / length
+
+
+@lru_cache(maxsize=32)
+def _own_rays(pinhole: Pinhole) -> tuple[Floats, Floats, Floats]:
+    columns = (np.arange(pinhole.width) + 0.5 - pinhole.center_x) / pinhole.focal
+    rows = (np.arange(pinhole.height) + 0.5 - pinhole.center_y) / pinhole.focal
+    x, y = (grid.ravel().astype(np.float32) for grid in np.meshgrid(columns, rows))
+    return x, y, np.sqrt(x * x + y * y + np.float32(1.0))
+
+
+def runs(pixels: NDArray[np.intp], most: int) -> list[NDArray[np.intp] | slice]:
+    """Return ascending pixel indices in parts of at most `most`. A contiguous part is a slice, which avoids copies."""
+    parts: list[NDArray[np.intp] | slice] = []
+    for start in range(0, len(pixels), most):
+        part = pixels[start : start + most]
+        first, last = int(part[0]), int(part[-1])
+        parts.append(slice(first, last + 1) if last - first + 1 == len(part) else part)
+    return parts
+
+
+_COARSE_PIXELS = 14.0
+"""Minimum diameter of a model in pixels for its full geometry; smaller ones are drawn coarsely."""
+
+
+class Surfaces(NamedTuple):
+    """Properties of N triangles: normal in the world (3, N), albedo (3, N), finish (N,), label (N,), emission (3, N)
+    [cd/m²].
+    """
+
+    normal: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    label: NDArray[np.int32]
+    glow: Floats
+
+
+class VisibleGeometry(NamedTuple):
+    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners.
+
+    Each has a row (N,) among M triangles before clipping, with normal, albedo (M, 3), finish, label (M,) and glow (M,
+    3).
+    """
+
+    x: Array
+    y: Array
+    nearness: Array
+    whose: NDArray[np.int64]
+    normal: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    label: NDArray[np.int32]
+    glow: Floats
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """Properties of all triangles."""
+        rows = self.whose
+        return Surfaces(
+            np.ascontiguousarray(self.normal[rows].T),
+            np.ascontiguousarray(self.albedo[rows].T),
+            self.finish[rows],
+            self.label[rows],
+            np.ascontiguousarray(self.glow[rows].T),
+        )
+
+
+class _Chosen(NamedTuple):
+    corners: Floats
+    normal: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    label: NDArray[np.int32]
+    glow: Floats
+
+
+def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole) -> VisibleGeometry:
+    """Return triangles that face the camera and may be in its image, clipped at its near plane."""
+    sides = _sides(pinhole)
+    chosen = []
+    for instance, pixels in _in_sight(instances, pose, pinhole, sides):
+        found = _facing(instance, pose, pinhole, sides, pixels)
+        if found is not None:
+            chosen.append(found)
+    if not chosen:
+        chosen = [_NOTHING]
+    corners, normal, albedo, finish, label, glow = (
+        np.concatenate([part[column] for part in chosen]) for column in range(len(_Chosen._fields))
+    )
+    # Corners and axes first: (3, 3, N).
+    (x, y, depth), whose = _cut(np.ascontiguousarray(corners.transpose(2, 1, 0), dtype=np.float64), pinhole.near)
+    nearness = 1.0 / depth
+    x = pinhole.focal * x * nearness + pinhole.center_x
+    y = pinhole.focal * y * nearness + pinhole.center_y
+    return VisibleGeometry(x, y, nearness, whose, normal, albedo, finish, label, glow)
+
+
+_NOTHING = _Chosen(
+    np.empty((0, 3, 3), dtype=np.float32),
+    np.empty((0, 3), dtype=np.float32),
+    np.empty((0, 3), dtype=np.float32),
+    np.empty(0, dtype=np.uint8),
+    np.empty(0, dtype=np.int32),
+    np.empty((0, 3), dtype=np.float32),
+)
+
+
+def _sides(pinhole: Pinhole) -> Array:
+    """Return inward unit normals (5, 3) of the planes through the camera and the image edges, and of the near plane."""
+    left, right = -pinhole.center_x / pinhole.focal, (pinhole.width - pinhole.center_x) / pinhole.focal
+    top, bottom = -pinhole.center_y / pinhole.focal, (pinhole.height - pinhole.center_y) / pinhole.focal
+    planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
+    found: Array = planes / np.linalg.norm(planes, axis=1, keepdims=True)
+    return found
+
+
+def _in_sight(
+    instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole, sides: Array
+) -> list[tuple[MeshInstance, float]]:
+    """Return the instances whose spheres overlap the image, with their diameters in pixels."""
+    if not instances:
+        return []
+    centers = (np.array([instance.center for instance in instances]) - pose[:3, 3]) @ pose[:3, :3]
+    radii = np.array([instance.model.radius for instance in instances])
+    seen = (centers @ sides.T >= -radii[:, None]).all(axis=1) & (centers[:, 2] - radii <= pinhole.far)
+    distance = np.maximum(np.sqrt((centers**2).sum(axis=1)), 1e-6)
+    pixels = (2.0 * pinhole.focal * radii / distance).tolist()
+    return [(instances[row], pixels[row]) for row in np.flatnonzero(seen).tolist()]
+
+
+def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float) -> _Chosen | None:
+    """Return the triangles of one instance that face the camera, corners in its frame; None if there are none."""
+    model = instance.model
+    to_camera = pose[:3, :3].T @ instance.rotation
+    shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
+    viewpoint = -(to_camera.T @ shift).astype(np.float32)
+    if model.cells is not None:
+        centers = model.cells.center @ to_camera.T + shift
+        near = (centers @ sides.T >= -model.cells.radius[:, None]).all(axis=1)
+        near &= centers[:, 2] - model.cells.radius <= pinhole.far
+        rows = model.cells.rows(near)
+        rows = rows[model.normals[rows] @ viewpoint > model.plane[rows]]
+    elif instance.label >= 0 and pixels < _COARSE_PIXELS:
+        rows = model.coarse[model.normals[model.coarse] @ viewpoint > model.plane[model.coarse]]
+    else:
+        rows = np.flatnonzero(model.normals @ viewpoint > model.plane)
+    if not len(rows):
+        return None
+    # All corners in one table: numpy multiplies a stack of small matrices individually.
+    corners = model.triangles[rows].reshape(-1, 3) @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
+    glow = np.zeros((len(rows), 3), dtype=np.float32)
+    if instance.glow:
+        by_material = np.array([instance.glow.get(name, (0.0, 0.0, 0.0)) for name in model.materials], dtype=np.float32)
+        glow = by_material[model.material[rows]]
+    return _Chosen(
+        corners.reshape(-1, 3, 3),
+        model.normals[rows] @ instance.rotation.T.astype(np.float32),
+        model.albedo[rows],
+        model.finish[rows],
+        np.full(len(rows), instance.label, dtype=np.int32),
+        glow,
+    )
+
+
+def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
+    """Return triangles (3, 3, N) by axis and corner, clipped at the near plane, and their original rows.
+
+    A triangle with one corner behind the plane becomes two, one with two corners behind it becomes one.
+    """
+    behind = corners[2] < near
+    count = behind[0].astype(np.int8) + behind[1] + behind[2]
+    whole = np.flatnonzero(count == 0)
+    if len(whole) == corners.shape[2]:
+        return corners, whole
+    parts, whose = [corners[:, :, whole]], [whole]
+    for number in (1, 2):
+        rows = np.flatnonzero(count == number)
+        if not len(rows):
+            continue
+        odd = np.argmax(behind[:, rows] if number == 1 else ~behind[:, rows], axis=0)
+        a, b, c = (corners[:, (odd + k) % 3, rows] for k in range(3))
+        ab, ac = _crossing(a, b, near), _crossing(a, c, near)
+        if number == 1:
+            parts += [np.stack([ab, b, c], axis=1), np.stack([ab, c, ac], axis=1)]
+            whose += [rows, rows]
+        else:
+            parts.append(np.stack([a, ab, ac], axis=1))
+            whose.append(rows)
+    return np.concatenate(parts, axis=2), np.concatenate(whose)
+
+
+def _crossing(first: Array, second: Array, near: float) -> Array:
+    """Return the intersections of edges between corners (3, N) with the near plane."""
+    share = (near - first[2]) / (second[2] - first[2])
+    found: Array = first + share * (second - first)
+    return found

@@ -1,1 +1,0 @@
-"""Imaging of a camera: lens, exposure, noise."""

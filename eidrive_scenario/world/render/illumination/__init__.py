@@ -1,1 +1,0 @@
-"""Light sources, shadows and the sky."""
