@@ -105,27 +105,37 @@ def linear(color: Color) -> Light:
     return red, green, blue
 
 
+class _Columns(NamedTuple):
+    """Triangles of a model: the columns that do not follow from others, with the names of Model."""
+
+    triangles: Floats
+    normals: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    material: NDArray[np.int16]
+
+    @classmethod
+    def of(cls, source: Model) -> _Columns:
+        return cls(source.triangles, source.normals, source.albedo, source.finish, source.material)
+
+
 def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
     """Return a model of triangles (K, 3, 3) by material; the palette has the colors that are not given."""
-    triangles, albedo, finish, material = [], [], [], []
-    for number, (name, solid) in enumerate(mesh.items()):
-        color = linear(colors[name] if name in colors else MATERIALS[name])
-        triangles.append(solid)
-        albedo.append(np.broadcast_to(np.array(color, dtype=np.float32), (len(solid), 3)))
-        finish.append(np.full(len(solid), finish_of(name), dtype=np.uint8))
-        material.append(np.full(len(solid), number, dtype=np.int16))
-    corners = np.concatenate(triangles)
+    palette = [linear(colors[name] if name in colors else MATERIALS[name]) for name in mesh]
+    material = np.repeat(np.arange(len(mesh), dtype=np.int16), [len(solid) for solid in mesh.values()])
+    corners = np.concatenate(list(mesh.values()))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
-    solid_ones = np.flatnonzero(length > 1e-12)
-    return _model(
-        corners[solid_ones].astype(np.float32),
-        (normals[solid_ones] / length[solid_ones, None]).astype(np.float32),
-        np.concatenate(albedo)[solid_ones],
-        np.concatenate(finish)[solid_ones],
-        np.concatenate(material)[solid_ones],
-        tuple(mesh),
+    kept = np.flatnonzero(length > 1e-12)  # triangles with an area
+    material = material[kept]
+    columns = _Columns(
+        corners[kept].astype(np.float32),
+        (normals[kept] / length[kept, None]).astype(np.float32),
+        np.array(palette, dtype=np.float32)[material],
+        np.array([finish_of(name) for name in mesh], dtype=np.uint8)[material],
+        material,
     )
+    return _model(columns, tuple(mesh))
 
 
 def merged(models: Iterable[Model]) -> Model:
@@ -133,14 +143,10 @@ def merged(models: Iterable[Model]) -> Model:
     parts = list(models)
     names = tuple(dict.fromkeys(name for part in parts for name in part.materials))
     numbers = [np.array([names.index(name) for name in part.materials], dtype=np.int16) for part in parts]
-    return _model(
-        np.concatenate([part.triangles for part in parts]),
-        np.concatenate([part.normals for part in parts]),
-        np.concatenate([part.albedo for part in parts]),
-        np.concatenate([part.finish for part in parts]),
-        np.concatenate([number[part.material] for number, part in zip(numbers, parts, strict=True)]),
-        names,
-    )
+    columns = [
+        _Columns.of(part)._replace(material=number[part.material]) for number, part in zip(numbers, parts, strict=True)
+    ]
+    return _model(_Columns(*map(np.concatenate, zip(*columns, strict=True))), names)
 
 
 def gridded(source: Model) -> Model:
@@ -152,57 +158,37 @@ def gridded(source: Model) -> Model:
     count = np.bincount(cell)
     first = np.cumsum(count) - count
     corners = source.triangles[order].astype(np.float64)
+    # The triangles of a cell are consecutive now: bounds of each group, of which a sphere encloses the box.
     low = np.minimum.reduceat(corners.min(axis=1), first, axis=0)
     high = np.maximum.reduceat(corners.max(axis=1), first, axis=0)
-    sorted_one = _model(
-        source.triangles[order],
-        source.normals[order],
-        source.albedo[order],
-        source.finish[order],
-        source.material[order],
-        source.materials,
-    )
-    return replace(sorted_one, cells=Cells(first, count, (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2))
+    by_cell = _model(_Columns._make(column[order] for column in _Columns.of(source)), source.materials)
+    return replace(by_cell, cells=Cells(first, count, (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2))
 
 
 def placed(part: Model, rotation: Array, position: Array) -> Model:
     """Return the model rotated and translated."""
     turn = rotation.T
-    return _model(
-        (part.triangles.astype(np.float64) @ turn + position).astype(np.float32),
-        (part.normals @ turn).astype(np.float32),
-        part.albedo,
-        part.finish,
-        part.material,
-        part.materials,
-    )
+    triangles = (part.triangles.astype(np.float64) @ turn + position).astype(np.float32)
+    normals = (part.normals @ turn).astype(np.float32)
+    return _model(_Columns.of(part)._replace(triangles=triangles, normals=normals), part.materials)
 
 
-def _model(
-    triangles: Floats,
-    normals: Floats,
-    albedo: Floats,
-    finish: NDArray[np.uint8],
-    material: NDArray[np.int16],
-    materials: tuple[str, ...],
-) -> Model:
+def _model(columns: _Columns, materials: tuple[str, ...]) -> Model:
+    triangles = columns.triangles
     edges = triangles[:, 1:] - triangles[:, :1]
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    # The fewest triangles with the share _COARSE_SHARE of the surface are the coarse version.
     order = np.argsort(-area, kind="stable")
     kept = int(np.searchsorted(np.cumsum(area[order]), _COARSE_SHARE * area.sum())) + 1
     corners = triangles.reshape(-1, 3).astype(np.float64)
     low, high = corners.min(axis=0), corners.max(axis=0)
     center = (low + high) / 2
     return Model(
-        triangles,
-        normals,
-        np.einsum("ki,ki->k", normals, triangles[:, 0]),
-        np.ascontiguousarray(albedo),
-        finish,
-        material,
-        materials,
-        np.sort(order[:kept]),
-        center,
-        (high - low) / 2,
-        float(np.sqrt(((corners - center) ** 2).sum(axis=1).max())),
+        **columns._asdict(),
+        plane=np.einsum("ki,ki->k", columns.normals, triangles[:, 0]),
+        materials=materials,
+        coarse=np.sort(order[:kept]),
+        center=center,
+        half=(high - low) / 2,
+        radius=float(np.sqrt(((corners - center) ** 2).sum(axis=1).max())),
     )

@@ -78,75 +78,43 @@ class Surfaces(NamedTuple):
     label: NDArray[np.int32]
     glow: Floats
 
+    @classmethod
+    def joined(cls, parts: Sequence[Surfaces]) -> Surfaces:
+        """Return the triangles of all parts in sequence."""
+        return cls(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+
+    def take(self, rows: NDArray[np.int64]) -> Surfaces:
+        """Return the properties of some triangles."""
+        return Surfaces._make(column.take(rows, axis=-1) for column in self)
+
 
 class VisibleGeometry(NamedTuple):
-    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners.
-
-    Each has a row (N,) among M triangles before clipping, with normal, albedo (M, 3), finish, label (M,) and glow (M,
-    3).
-    """
+    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners."""
 
     x: Array
     y: Array
     nearness: Array
-    whose: NDArray[np.int64]
-    normal: Floats
-    albedo: Floats
-    finish: NDArray[np.uint8]
-    label: NDArray[np.int32]
-    glow: Floats
-
-    @property
-    def surfaces(self) -> Surfaces:
-        """Properties of all triangles."""
-        rows = self.whose
-        return Surfaces(
-            np.ascontiguousarray(self.normal[rows].T),
-            np.ascontiguousarray(self.albedo[rows].T),
-            self.finish[rows],
-            self.label[rows],
-            np.ascontiguousarray(self.glow[rows].T),
-        )
-
-
-class _Chosen(NamedTuple):
-    corners: Floats
-    normal: Floats
-    albedo: Floats
-    finish: NDArray[np.uint8]
-    label: NDArray[np.int32]
-    glow: Floats
+    surfaces: Surfaces
 
 
 def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole) -> VisibleGeometry:
     """Return triangles that face the camera and may be in its image, clipped at its near plane."""
     sides = _sides(pinhole)
-    chosen = []
-    for instance, pixels in _in_sight(instances, pose, pinhole, sides):
-        found = _facing(instance, pose, pinhole, sides, pixels)
-        if found is not None:
-            chosen.append(found)
-    if not chosen:
-        chosen = [_NOTHING]
-    corners, normal, albedo, finish, label, glow = (
-        np.concatenate([part[column] for part in chosen]) for column in range(len(_Chosen._fields))
-    )
+    parts = [
+        _facing(instance, pose, pinhole, sides, pixels)
+        for instance, pixels in _in_sight(instances, pose, pinhole, sides)
+    ]
+    if not parts:
+        empty = np.empty((3, 0), dtype=np.float32)
+        none = Surfaces(empty, empty, np.empty(0, dtype=np.uint8), np.empty(0, dtype=np.int32), empty)
+        parts = [(np.empty((0, 3, 3), dtype=np.float32), none)]
+    corners = np.concatenate([part for part, _ in parts])
     # Corners and axes first: (3, 3, N).
     (x, y, depth), whose = _cut(np.ascontiguousarray(corners.transpose(2, 1, 0), dtype=np.float64), pinhole.near)
     nearness = 1.0 / depth
     x = pinhole.focal * x * nearness + pinhole.center_x
     y = pinhole.focal * y * nearness + pinhole.center_y
-    return VisibleGeometry(x, y, nearness, whose, normal, albedo, finish, label, glow)
-
-
-_NOTHING = _Chosen(
-    np.empty((0, 3, 3), dtype=np.float32),
-    np.empty((0, 3), dtype=np.float32),
-    np.empty((0, 3), dtype=np.float32),
-    np.empty(0, dtype=np.uint8),
-    np.empty(0, dtype=np.int32),
-    np.empty((0, 3), dtype=np.float32),
-)
+    return VisibleGeometry(x, y, nearness, Surfaces.joined([surfaces for _, surfaces in parts]).take(whose))
 
 
 def _sides(pinhole: Pinhole) -> Array:
@@ -172,8 +140,10 @@ def _in_sight(
     return [(instances[row], pixels[row]) for row in np.flatnonzero(seen).tolist()]
 
 
-def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float) -> _Chosen | None:
-    """Return the triangles of one instance that face the camera, corners in its frame; None if there are none."""
+def _facing(
+    instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float
+) -> tuple[Floats, Surfaces]:
+    """Return the triangles of one instance that face the camera: corners (N, 3, 3) in its frame, and properties."""
     model = instance.model
     to_camera = pose[:3, :3].T @ instance.rotation
     shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
@@ -188,22 +158,15 @@ def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array,
         rows = model.coarse[model.normals[model.coarse] @ viewpoint > model.plane[model.coarse]]
     else:
         rows = np.flatnonzero(model.normals @ viewpoint > model.plane)
-    if not len(rows):
-        return None
     # All corners in one table: numpy multiplies a stack of small matrices individually.
     corners = model.triangles[rows].reshape(-1, 3) @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
-    glow = np.zeros((len(rows), 3), dtype=np.float32)
+    glow = np.zeros((3, len(rows)), dtype=np.float32)
     if instance.glow:
         by_material = np.array([instance.glow.get(name, (0.0, 0.0, 0.0)) for name in model.materials], dtype=np.float32)
-        glow = by_material[model.material[rows]]
-    return _Chosen(
-        corners.reshape(-1, 3, 3),
-        model.normals[rows] @ instance.rotation.T.astype(np.float32),
-        model.albedo[rows],
-        model.finish[rows],
-        np.full(len(rows), instance.label, dtype=np.int32),
-        glow,
-    )
+        glow = by_material[model.material[rows]].T
+    normal = (model.normals[rows] @ instance.rotation.T.astype(np.float32)).T
+    label = np.full(len(rows), instance.label, dtype=np.int32)
+    return corners.reshape(-1, 3, 3), Surfaces(normal, model.albedo[rows].T, model.finish[rows], label, glow)
 
 
 def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Floats
-from eidrive_scenario.rendering.daylight import Daylight, daylight, dome, horizon
+from eidrive_scenario.rendering.daylight import daylight, dome, horizon
 from eidrive_scenario.rendering.lamps import Beam, Lamplight, lamplight
 from eidrive_scenario.rendering.materials import SOAKS
 from eidrive_scenario.rendering.model import MeshInstance
 from eidrive_scenario.rendering.projection import CameraView, cull_and_project, runs
 from eidrive_scenario.rendering.rasterization import Cover, rasterize, rasterize_reference
-from eidrive_scenario.rendering.shading import Lit, lit_surfaces, points_at, sampled, shade, together
-from eidrive_scenario.rendering.shadows import ShadowGrid, ShadowMap, dimmed, shadow_grid
+from eidrive_scenario.rendering.shading import Circumstances, Lit, lit_surfaces, points_at, sampled, shade, together
+from eidrive_scenario.rendering.shadows import ShadowMap, dimmed, shadow_grid
 from eidrive_scenario.rendering.surfaces import add_reflections
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.weather import Weather
@@ -58,14 +58,13 @@ class ImageContent(NamedTuple):
     ground: float
 
 
-class _Circumstances(NamedTuple):
-    """Properties that all pixels share."""
+class _Visible(NamedTuple):
+    """Visible triangles, their light, the shadows of the sun, and the share (H, W) of sky light that bodies leave."""
 
-    view: CameraView
-    weather: Weather
-    light: Daylight
-    sky: Floats
-    grid: ShadowGrid | None
+    cover: Cover
+    lit: Lit
+    shadows: ShadowMap | None
+    open_sky: Floats
 
 
 class _Canvas(NamedTuple):
@@ -128,7 +127,7 @@ class Renderer:
         light = daylight(weather)
         view = CameraView(pose, pinhole)
         grid = shadow_grid(light.towards, view) if light.sun.any() else None
-        at = _Circumstances(view, weather, light, dome(weather), grid)
+        at = Circumstances(view, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
         known = self._known(subjects, at) if self.MOST_KEPT > 0 else None
         canvas = _whole(subjects, felt, at, ground) if known is None else _renewed(known, subjects, felt, at, ground)
@@ -138,7 +137,7 @@ class Renderer:
             whole = _with_glare(whole)
         return Radiance(whole, canvas.depth.reshape(view.shape), canvas.label.reshape(view.shape))
 
-    def _known(self, subjects: Subjects, at: _Circumstances) -> _Kept | None:
+    def _known(self, subjects: Subjects, at: Circumstances) -> _Kept | None:
         """Return the cached scenery if the previous image of this camera had the same content."""
         looks = tuple(
             (each.model, each.position.tobytes(), each.label, tuple(each.glow.items())) for each in subjects.scenery
@@ -161,45 +160,45 @@ def _forget_first(memory: dict[object, Any], most: int) -> None:
         del memory[next(iter(memory))]
 
 
-def _whole(subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
+def _whole(subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
     """Return a completely drawn image."""
-    staged = cull_and_project([*subjects.scenery, *subjects.actors], at.view.pose, at.view.pinhole)
-    cover = rasterize(staged.x, staged.y, staged.nearness, at.view.pinhole.width, at.view.pinhole.height)
-    lit = lit_surfaces(staged.surfaces, at.light, at.weather)
+    cover, lit = _staged([*subjects.scenery, *subjects.actors], at)
     casters = [*subjects.standing, *subjects.actors, *subjects.unseen]
     shadows = at.grid.drawn(casters) if at.grid is not None else None
     open_sky = dimmed(_dimming(subjects), cover, lit.upright, at.view)
     canvas = _Canvas.blank(cover.triangle.size)
-    _draw(canvas, cover, lit, shadows, open_sky, beams, at, ground)
+    _draw(canvas, _Visible(cover, lit, shadows, open_sky), beams, at, ground)
     return canvas
+
+
+def _staged(instances: Sequence[MeshInstance], at: Circumstances) -> tuple[Cover, Lit]:
+    """Return the visible triangles of instances, and the light of all that face the camera."""
+    staged = cull_and_project(instances, at.view.pose, at.view.pinhole)
+    cover = rasterize(staged.x, staged.y, staged.nearness, at.view.pinhole.width, at.view.pinhole.height)
+    return cover, lit_surfaces(staged.surfaces, at.light, at.weather)
 
 
 def _dimming(subjects: Subjects) -> list[MeshInstance]:
     return [each for each in (*subjects.standing, *subjects.actors) if each.label >= 0]
 
 
-def _draw(
-    canvas: _Canvas,
-    cover: Cover,
-    lit: Lit,
-    shadows: ShadowMap | None,
-    open_sky: Floats,
-    beams: Sequence[Beam],
-    at: _Circumstances,
-    ground: float,
-) -> None:
+def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circumstances, ground: float) -> None:
     """Draw all pixels."""
+    cover, surfaces = visible.cover, visible.lit.surfaces
     triangle = cover.triangle.reshape(-1)
     for part in runs(np.flatnonzero(triangle < 0), _AT_ONCE):
         canvas.planes[:, part] = sampled(at.sky, *at.view.directions(part))
     shown = np.flatnonzero(triangle >= 0)
-    lamps = lamplight(beams, cover, lit.surfaces, at.view) if beams else None
-    if at.weather.wetness <= 0.0:
-        _paint(canvas, shown, cover, lit, shadows, open_sky, lamps, at)
+    lamps = lamplight(beams, cover, surfaces, at.view) if beams else None
+    is_dry = at.weather.wetness <= 0.0
+    _paint(canvas, shown, visible, lamps, at, fog=is_dry)
+    if is_dry:
         return
-    _paint(canvas, shown, cover, lit, shadows, open_sky, lamps, at, fog=False)
-    on_road = shown[SOAKS[lit.surfaces.finish][triangle[shown]]]
-    add_reflections(canvas.planes, on_road, cover, open_sky, at.sky, at.view, at.weather.wetness, ground)
+    on_road = shown[SOAKS[surfaces.finish][triangle[shown]]]
+    add_reflections(
+        canvas.planes, on_road, cover, at.view,
+        open_sky=visible.open_sky, dome=at.sky, wetness=at.weather.wetness, ground=ground,
+    )  # fmt: skip
     for part in runs(shown, _AT_ONCE):
         distance = at.view.length[part] * (np.float32(1.0) / cover.nearness.reshape(-1)[part])
         canvas.planes[:, part] = _through_air(canvas.planes[:, part], distance, at.weather)
@@ -208,20 +207,18 @@ def _draw(
 def _paint(
     canvas: _Canvas,
     pixels: NDArray[np.intp],
-    cover: Cover,
-    lit: Lit,
-    shadows: ShadowMap | None,
-    open_sky: Floats,
+    visible: _Visible,
     lamps: Lamplight | None,
-    at: _Circumstances,
+    at: Circumstances,
+    *,
     fog: bool = True,
 ) -> None:
     """Draw pixels with a triangle, each independently."""
+    lit = visible.lit
     for part in runs(pixels, _AT_ONCE):
-        points = points_at(part, cover, at.view)
+        points = points_at(part, visible.cover, at.view)
         shone = None if lamps is None else Lamplight(lamps.received[part], lamps.across[part])
-        sky_left = open_sky.reshape(-1)[part]
-        luminance = shade(points, lit, at.view.place, at.light, at.weather, at.sky, shadows, shone, sky_left)
+        luminance = shade(points, lit, at, visible.shadows, shone, visible.open_sky.reshape(-1)[part])
         canvas.planes[:, part] = _through_air(luminance, points.distance, at.weather) if fog else luminance
         label = lit.surfaces.label.take(points.triangle)
         beyond = np.flatnonzero(points.depth > at.view.pinhole.far)
@@ -239,12 +236,10 @@ def _through_air(luminance: Floats, distance: Floats, weather: Weather) -> Float
     return found
 
 
-def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
+def _scenery(subjects: Subjects, at: Circumstances) -> _Kept:
     """Return the image without actors, and the data that is needed to draw them."""
     view = at.view
-    staged = cull_and_project(subjects.scenery, view.pose, view.pinhole)
-    cover = rasterize(staged.x, staged.y, staged.nearness, view.pinhole.width, view.pinhole.height)
-    lit = lit_surfaces(staged.surfaces, at.light, at.weather)
+    cover, lit = _staged(subjects.scenery, at)
     canvas = _Canvas.blank(cover.triangle.size)
     heights = cells = still = None
     if at.grid is not None:
@@ -255,11 +250,11 @@ def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
         for part in runs(np.flatnonzero(cover.triangle.reshape(-1) >= 0), _AT_ONCE):
             points = points_at(part, cover, view)
             cells[part] = at.grid.numbers(points.x, points.y, points.z)
-    _draw(canvas, cover, lit, still, np.ones(view.shape, dtype=np.float32), (), at, 0.0)
+    _draw(canvas, _Visible(cover, lit, still, np.ones(view.shape, dtype=np.float32)), (), at, 0.0)
     return _Kept(cover, lit, canvas, heights, cells)
 
 
-def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
+def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
     """Return the image, redrawn in areas of actors and their shadows, or completely if neighbors emit light too."""
     view = at.view
     staged = cull_and_project(subjects.actors, view.pose, view.pinhole)
@@ -267,7 +262,7 @@ def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circu
     lit = together(known.lit, lit_surfaces(staged.surfaces, at.light, at.weather))
     triangle, nearness = known.cover.triangle.copy(), known.cover.nearness.copy()
     before = (seen.triangle >= 0) & (seen.nearness >= nearness[seen.window])
-    np.copyto(triangle[seen.window], seen.triangle + np.int32(len(known.lit.upright)), where=before)
+    np.copyto(triangle[seen.window], seen.triangle + np.int32(len(known.lit.surfaces.finish)), where=before)
     np.copyto(nearness[seen.window], seen.nearness, where=before)
     cover = Cover(triangle, nearness)
     open_sky = dimmed(_dimming(subjects), cover, lit.upright, view)
@@ -277,12 +272,13 @@ def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circu
     if at.grid is not None and known.heights is not None and known.cells is not None:
         shadows, cells = at.grid.drawn([*subjects.actors, *subjects.unseen]).over(known.heights)
         changed |= cells[known.cells].reshape(view.shape)
+    visible = _Visible(cover, lit, shadows, open_sky)
     if beams or at.weather.wetness > 0.0:
         canvas = _Canvas.blank(triangle.size)
-        _draw(canvas, cover, lit, shadows, open_sky, beams, at, ground)
+        _draw(canvas, visible, beams, at, ground)
         return canvas
     canvas = known.canvas.copy()
-    _paint(canvas, np.flatnonzero(changed), cover, lit, shadows, open_sky, None, at)
+    _paint(canvas, np.flatnonzero(changed), visible, None, at)
     return canvas
 
 

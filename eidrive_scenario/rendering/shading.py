@@ -14,7 +14,7 @@ from eidrive_scenario.rendering.lamps import Lamplight, lamp_color
 from eidrive_scenario.rendering.materials import GRAIN, MIRROR, RETURNS, SOAKS
 from eidrive_scenario.rendering.projection import CameraView, Pixels, Surfaces
 from eidrive_scenario.rendering.rasterization import Cover
-from eidrive_scenario.rendering.shadows import ShadowMap
+from eidrive_scenario.rendering.shadows import ShadowGrid, ShadowMap
 from eidrive_scenario.rendering.surfaces import DARKENING, variation
 from eidrive_scenario.world.weather import Weather
 
@@ -22,6 +22,16 @@ _STREET_LAMP = np.array([1.08, 1.0, 0.78])
 """Color of street lamps, linear sRGB."""
 _GLINT = 350.0
 """Exponent of the reflection of the sun in car paint: a spot of some four degrees."""
+
+
+class Circumstances(NamedTuple):
+    """What all pixels of an image share: camera, weather, its light, the image of the sky, and the grid of shadows."""
+
+    view: CameraView
+    weather: Weather
+    light: Daylight
+    sky: Floats
+    grid: ShadowGrid | None
 
 
 class Points(NamedTuple):
@@ -45,14 +55,19 @@ def points_at(pixels: Pixels, cover: Cover, view: CameraView) -> Points:
 
 class Lit(NamedTuple):
     """Illumination of N triangles: luminance (3, N) by sky and street lamps, additional luminance by the sun (None: no
-    sun), sum of both, and whether they face upwards (N,).
+    sun), and sum of both.
     """
 
     surfaces: Surfaces
     steady: Floats
     sunny: Floats | None
     whole: Floats
-    upright: NDArray[np.bool_]
+
+    @property
+    def upright(self) -> NDArray[np.bool_]:
+        """Whether the triangles face upwards (N,)."""
+        upwards: NDArray[np.bool_] = self.surfaces.normal[2] > 0.9
+        return upwards
 
 
 def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
@@ -70,43 +85,29 @@ def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
         sx, sy, sz = light.towards.astype(np.float32)
         facing = np.maximum(sx * nx + sy * ny + sz * nz, np.float32(0.0))
         sunny = reflected * facing * _column(light.sun)
-    return Lit(surfaces, steady, sunny, steady if sunny is None else steady + sunny, nz > 0.9)
+    return Lit(surfaces, steady, sunny, steady if sunny is None else steady + sunny)
 
 
 def together(first: Lit, second: Lit) -> Lit:
     """Return the triangles of both, those of the second after those of the first."""
-    one, other = first.surfaces, second.surfaces
-    surfaces = Surfaces(
-        np.concatenate([one.normal, other.normal], axis=1),
-        np.concatenate([one.albedo, other.albedo], axis=1),
-        np.concatenate([one.finish, other.finish]),
-        np.concatenate([one.label, other.label]),
-        np.concatenate([one.glow, other.glow], axis=1),
-    )
     sunny = None
     if first.sunny is not None and second.sunny is not None:
         sunny = np.concatenate([first.sunny, second.sunny], axis=1)
-    steady, whole = (
-        np.concatenate(pair, axis=1) for pair in ((first.steady, second.steady), (first.whole, second.whole))
-    )
-    return Lit(surfaces, steady, sunny, whole, np.concatenate([first.upright, second.upright]))
+    steady, whole = np.hstack([first.steady, second.steady]), np.hstack([first.whole, second.whole])
+    return Lit(Surfaces.joined([first.surfaces, second.surfaces]), steady, sunny, whole)
 
 
 def shade(
     points: Points,
     among: Lit,
-    place: Array,
-    light: Daylight,
-    weather: Weather,
-    sky: Floats,
+    at: Circumstances,
     shadows: ShadowMap | None,
     lamplight: Lamplight | None,
     open_sky: Floats,
 ) -> Floats:
     """Return the luminance (3, n) of points at close distance [cd/m²]: sun and sky, lamps, and emission.
 
-    `place` is the position of the camera. lamplight and open_sky (n,) are those of the points; open_sky is the share of
-    sky light that nearby bodies leave.
+    lamplight and open_sky (n,) are those of the points; open_sky is the share of sky light that nearby bodies leave.
     """
     triangle = points.triangle
     finish = among.surfaces.finish[triangle]
@@ -127,12 +128,12 @@ def shade(
         lamp_lit = np.flatnonzero(shone)
         albedo = among.surfaces.albedo.take(triangle[lamp_lit], axis=1)
         luminance[:, lamp_lit] += albedo * shone[lamp_lit] * lamp_color()[:, None]
-    _add_grain(luminance, points, finish, place, weather)
-    _add_mirrors(luminance, points, among.surfaces, light, sky, lit, finish)
+    _add_grain(luminance, points, finish, at)
+    _add_mirrors(luminance, points, among.surfaces, at, lit)
     return luminance
 
 
-def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], place: Array, weather: Weather) -> None:
+def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], at: Circumstances) -> None:
     """Add spatial variation of road and soil, and darken wet parts."""
     grain = GRAIN[finish]
     grained = np.flatnonzero(grain)
@@ -140,11 +141,11 @@ def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], pla
         return
     all_of_them = len(grained) == len(grain)
     x, y, distance = (part if all_of_them else part[grained] for part in (points.x, points.y, points.distance))
-    x, y = x + np.float32(place[0] % 4096.0), y + np.float32(place[1] % 4096.0)
+    x, y = x + np.float32(at.view.place[0] % 4096.0), y + np.float32(at.view.place[1] % 4096.0)
     factor = np.float32(1.0) + (grain if all_of_them else grain[grained]) * variation(x, y, distance)
-    if weather.wetness > 0.0:
+    if at.weather.wetness > 0.0:
         soaked = SOAKS[finish[grained]]
-        wet = np.float32(1.0 - DARKENING * min(2.0 * weather.wetness, 1.0))
+        wet = np.float32(1.0 - DARKENING * min(2.0 * at.weather.wetness, 1.0))
         factor *= np.where(soaked, wet, np.float32(1.0))
     np.maximum(factor, np.float32(0.2), out=factor)
     every = factor
@@ -154,17 +155,10 @@ def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], pla
     luminance *= every
 
 
-def _add_mirrors(
-    luminance: Floats,
-    points: Points,
-    surfaces: Surfaces,
-    light: Daylight,
-    sky: Floats,
-    lit: Floats | None,
-    finish: NDArray[np.uint8],
-) -> None:
-    """Add reflections of sky and sun in paint, glass and metal."""
-    rows = np.flatnonzero(MIRROR[finish])
+def _add_mirrors(luminance: Floats, points: Points, surfaces: Surfaces, at: Circumstances, lit: Floats | None) -> None:
+    """Add reflections of sky and sun in paint, glass and metal; `lit` is the share of the sun (n,), None for all."""
+    mirror, light = MIRROR[surfaces.finish[points.triangle]], at.light
+    rows = np.flatnonzero(mirror)
     if not len(rows):
         return
     nx, ny, nz = surfaces.normal.take(points.triangle[rows], axis=1)
@@ -173,13 +167,14 @@ def _add_mirrors(
     inwards = np.minimum(dx * nx + dy * ny + dz * nz, np.float32(-1e-3))
     twice = np.float32(2.0) * inwards
     rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
-    base = MIRROR[finish[rows]]
+    base = mirror[rows]
+    # Schlick's approximation of Fresnel's law
     left = np.float32(1.0) + inwards
     square = left * left
     share = base + (np.float32(1.0) - base) * (square * square * left)
     below = _column(GROUND_ALBEDO / math.pi * light.ground)
     upwards = np.clip(rz * np.float32(8.0) + np.float32(0.5), np.float32(0.0), np.float32(1.0))
-    seen = sampled(sky, rx, ry, rz)
+    seen = sampled(at.sky, rx, ry, rz)
     seen -= below
     seen *= upwards
     seen += below

@@ -92,8 +92,8 @@ _HEIGHT = 0.15
 
 
 def add_reflections(
-    planes: Floats, on_road: NDArray[np.intp], cover: Cover, open_sky: Floats, dome: Floats, view: CameraView,
-    wetness: float, ground: float,
+    planes: Floats, on_road: NDArray[np.intp], cover: Cover, view: CameraView, *,
+    open_sky: Floats, dome: Floats, wetness: float, ground: float,
 ) -> None:  # fmt: skip
     """Add reflections of a wet road to the luminance (3, P) of pixels, from an image of half the resolution.
 
