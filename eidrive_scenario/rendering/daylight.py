@@ -187,18 +187,15 @@ def dome(weather: Weather) -> Floats:
     return image
 
 
+@lru_cache(maxsize=64)
 def horizon(weather: Weather) -> Array:
     """Return the mean luminance (3,) just above the horizon [cd/m²], the color of large distances."""
-    return _horizon(weather).copy()
-
-
-@lru_cache(maxsize=64)
-def _horizon(weather: Weather) -> Array:
     turns = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False, dtype=np.float32)[None]
     rise = np.full_like(turns, 0.03)
     ring = sample(dome(weather), np.cos(turns), np.sin(turns), rise)
-    found: Array = ring.reshape(-1, 3).mean(axis=0).astype(np.float64)
-    return found
+    mean: Array = ring.reshape(-1, 3).mean(axis=0).astype(np.float64)
+    mean.flags.writeable = False
+    return mean
 
 
 @lru_cache(maxsize=1)

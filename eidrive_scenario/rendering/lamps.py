@@ -140,13 +140,6 @@ class Canvas(NamedTuple):
     where: NDArray[np.int32]
 
 
-def numbered(shown: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return consecutive indices (H, W) of the pixels with a triangle, line by line from 0; -1 for the rest."""
-    found = np.full(shown.shape, -1, dtype=np.int32)
-    found[shown] = np.arange(int(shown.sum()), dtype=np.int32)
-    return found
-
-
 class Sample(NamedTuple):
     """Sample of the points of a canvas, with the lines and columns of these pixels."""
 
@@ -183,7 +176,7 @@ def shine(
     left, right = max(int(column.min()) - 1, 0) * _STRIDE, (int(column.max()) + 1) * _STRIDE
     window = canvas.where[top:bottom, left:right].ravel()
     window = window[window >= 0]
-    rows, dx, dy, dz, _, aside, above = _within(place, axes, canvas.x[window], canvas.y[window], canvas.z[window])
+    rows, dx, dy, dz, aside, above = _within(place, axes, canvas.x[window], canvas.y[window], canvas.z[window])
     rows = window[rows].astype(np.intp)
     column = (aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE)).astype(np.int32)
     line = (above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)).astype(np.int32)
@@ -197,9 +190,9 @@ def shine(
 
 def _within(
     place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
-) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Return the rows of the points in range of the lamps, their positions relative to the lamps in world axes, their
-    distances ahead, and the tangents of the lateral and vertical angles to the axis.
+) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats]:
+    """Return the rows of the points in range of the lamps, their positions relative to the lamps in world axes, and the
+    tangents of the lateral and vertical angles to the axis.
     """
     (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
     dx, dy, dz = x - place[0], y - place[1], z - place[2]
@@ -209,8 +202,7 @@ def _within(
     aside = (dx * lx + dy * ly + dz * lz) / ahead
     above = (dx * ux + dy * uy + dz * uz) / ahead
     inside = np.flatnonzero((np.abs(aside) < _WIDTH) & (np.abs(above) < _HEIGHT))
-    dx, dy, dz, ahead = dx[inside], dy[inside], dz[inside], ahead[inside]
-    return rows[inside], dx, dy, dz, ahead, aside[inside], above[inside]
+    return rows[inside], dx[inside], dy[inside], dz[inside], aside[inside], above[inside]
 
 
 @lru_cache(maxsize=2)
@@ -263,7 +255,9 @@ def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: Cam
     far = np.float32(1.0) / cover.nearness.ravel()[numbers]
     x, y, z = (ray * far for ray in view.rays(view.x[numbers], view.y[numbers]))
     normals = surfaces.normal[:, triangle[seen]]
-    canvas = Canvas(x, y, z, (normals[0], normals[1], normals[2]), numbered(seen))
+    where = np.full(seen.shape, -1, dtype=np.int32)
+    where[seen] = np.arange(len(numbers), dtype=np.int32)
+    canvas = Canvas(x, y, z, (normals[0], normals[1], normals[2]), where)
     sampled = Sample.of(canvas)
     received, across = (np.zeros(len(numbers), dtype=np.float32) for _ in range(2))
     for beam in beams:

@@ -38,23 +38,6 @@ class Cover(NamedTuple):
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
 
-class _Corners(NamedTuple):
-    """Corners of N triangles, from the uppermost to the lowest."""
-
-    x: Array
-    y: Array
-    nearness: Array
-
-
-class _Spans(NamedTuple):
-    """Rows of triangles in sequence: triangle, line, and columns from left up to right."""
-
-    whose: Integers
-    line: Integers
-    left: Integers
-    right: Integers
-
-
 def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
     """Rasterize triangles given by x, y [px] and nearness (3, N) of their corners.
 
@@ -84,7 +67,7 @@ def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height:
         window, value, inside = _block(one, top, left)
         inside &= value >= near[window]
         np.copyto(near[window], value, where=inside)
-        np.copyto(triangle[window], np.int32(one.number), where=inside)
+        np.copyto(triangle[window], np.int32(one.number[0]), where=inside)
     if len(rows.small.line):
         _scatter(triangle, near, rows.small, top, left)
     return Cover(triangle, near, top, left)
@@ -105,19 +88,12 @@ def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tu
     return near, top, left
 
 
-class _Large(NamedTuple):
-    """One triangle: index, rows, and the slope of nearness along them; level (M,) is the value at column 0."""
+class _Lines(NamedTuple):
+    """Lines of triangles that contain pixel centers, in sequence.
 
-    number: int
-    line: Integers
-    left: Integers
-    right: Integers
-    level: Array
-    slope: float
-
-
-class _Small(NamedTuple):
-    """Rows of many triangles."""
+    number, line, left, right  index of the triangle, line of the image, and columns from left up to right
+    level, slope               nearness at column 0, and per pixel to the right
+    """
 
     number: Integers
     line: Integers
@@ -128,10 +104,10 @@ class _Small(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """All rows that contain pixel centers, and their bounding window."""
+    """Lines of each large triangle and of all others jointly, and the bounding window of all."""
 
-    large: list[_Large]
-    small: _Small
+    large: list[_Lines]
+    small: _Lines
     corner: tuple[int, int]
     shape: tuple[int, int]
 
@@ -146,43 +122,41 @@ def _rows(x: Array, y: Array, nearness: Array, width: int, height: int) -> _Rows
     chosen = np.flatnonzero((last > first) & (right_end > 0.5) & (left_end < width))
     if not len(chosen):
         return None
-    corners = _from_top(np.stack([x[:, chosen], y[:, chosen], nearness[:, chosen]]))
-    spans = _spans(corners, first[chosen], last[chosen], width)
-    whose, line, left, right = spans
+    # From here on x, y and nearness (3, N) of the chosen triangles, from the uppermost corner to the lowest
+    x, y, nearness = _from_top(np.stack([x[:, chosen], y[:, chosen], nearness[:, chosen]]))
+    whose, line, left, right = _spans(x, y, first[chosen], last[chosen], width)
     if not len(whose):
         return None
-    rightwards, downwards = _slopes(corners)
-    start = corners.nearness[0] - corners.x[0] * rightwards
-    level = start[whose] + (line + 0.5 - corners.y[0][whose]) * downwards[whose]
+    rightwards, downwards = _slopes(x, y, nearness)
+    start = nearness[0] - x[0] * rightwards
+    level = start[whose] + (line + 0.5 - y[0][whose]) * downwards[whose]
+    lines = _Lines(chosen[whose], line, left, right, level, rightwards[whose])
     begins = np.flatnonzero(np.diff(whose, prepend=-1))
     ends = np.append(begins[1:], len(whose))
     area = np.add.reduceat(right - left, begins)
     widths = np.maximum.reduceat(right, begins) - np.minimum.reduceat(left, begins)
     large = (area >= _LARGE) & (area >= _FULL * widths * (ends - begins))
-    alone = []
-    for begin, end in zip(begins[large].tolist(), ends[large].tolist(), strict=True):
-        row, part = int(whose[begin]), slice(begin, end)
-        one = _Large(int(chosen[row]), line[part], left[part], right[part], level[part], float(rightwards[row]))
-        alone.append(one)
+    alone = [
+        _Lines._make(column[begin:end] for column in lines)
+        for begin, end in zip(begins[large].tolist(), ends[large].tolist(), strict=True)
+    ]
     small = np.flatnonzero(np.repeat(~large, ends - begins))
-    slope, number = rightwards[whose[small]], chosen[whose[small]]
-    few = _Small(number, line[small], left[small], right[small], level[small], slope)
     top, start_column = int(line.min()), int(left.min())
     shape = (int(line.max()) + 1 - top, int(right.max()) - start_column)
-    return _Rows(alone, few, (top, start_column), shape)
+    return _Rows(alone, _Lines._make(column[small] for column in lines), (top, start_column), shape)
 
 
-def _from_top(corners: Array) -> _Corners:
+def _from_top(corners: Array) -> Array:
     """Return x, y and nearness (3, 3, N) of corners in any order as uppermost, middle and lowest."""
     for one, two in ((0, 1), (1, 2), (0, 1)):
         wrong = np.flatnonzero(corners[1, two] < corners[1, one])
         corners[:, one, wrong], corners[:, two, wrong] = corners[:, two, wrong], corners[:, one, wrong]
-    return _Corners(*corners)
+    return corners
 
 
-def _slopes(corners: _Corners) -> tuple[Array, Array]:
+def _slopes(x: Array, y: Array, nearness: Array) -> tuple[Array, Array]:
     """Return the slopes of nearness per pixel to the right and downwards (N,)."""
-    (x0, x1, x2), (y0, y1, y2), (n0, n1, n2) = corners
+    (x0, x1, x2), (y0, y1, y2), (n0, n1, n2) = x, y, nearness
     with np.errstate(divide="ignore", invalid="ignore"):
         twice_area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         rightwards = ((n1 - n0) * (y2 - y0) - (n2 - n0) * (y1 - y0)) / twice_area
@@ -190,9 +164,11 @@ def _slopes(corners: _Corners) -> tuple[Array, Array]:
     return rightwards, downwards
 
 
-def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _Spans:
-    """Return the rows of all triangles that contain pixel centers."""
-    (x0, x1, x2), (y0, y1, y2), _ = corners
+def _spans(
+    x: Array, y: Array, first: Integers, last: Integers, width: int
+) -> tuple[Integers, Integers, Integers, Integers]:
+    """Return the lines of all triangles that contain pixel centers: triangle, line, columns from left up to right."""
+    (x0, x1, x2), (y0, y1, y2) = x, y
     counts = last - first
     whose = np.repeat(np.arange(len(counts)), counts)
     line = np.arange(len(whose)) + np.repeat(first - (np.cumsum(counts) - counts), counts)
@@ -205,10 +181,10 @@ def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _S
         left = np.clip(np.ceil(np.minimum(one, other) - 0.5), 0, width)
         right = np.clip(np.ceil(np.maximum(one, other) - 0.5), 0, width)
         some = np.flatnonzero(right > left)
-    return _Spans(whose[some], line[some], left[some].astype(np.int64), right[some].astype(np.int64))
+    return whose[some], line[some], left[some].astype(np.int64), right[some].astype(np.int64)
 
 
-def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Floats, NDArray[np.bool_]]:
+def _block(one: _Lines, top: int, left: int) -> tuple[tuple[slice, slice], Floats, NDArray[np.bool_]]:
     """Return lines and columns of the bounding block of a triangle, its nearness, and its mask."""
     first, last = int(one.line[0]), int(one.line[-1]) + 1
     begin, end = int(one.left.min()), int(one.right.max())
@@ -220,14 +196,14 @@ def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Float
     from_column[rows, 0], to_column[rows, 0] = one.left, one.right
     columns = np.arange(begin, end, dtype=np.int32)
     value = np.empty((last - first, end - begin), dtype=np.float32)
-    np.add(levels[:, None], (columns + 0.5) * one.slope, out=value, casting="same_kind")
+    np.add(levels[:, None], (columns + 0.5) * one.slope[0], out=value, casting="same_kind")
     np.maximum(value, np.float32(_LEAST), out=value)
     inside = columns >= from_column
     inside &= columns < to_column
     return (slice(first - top, last - top), slice(begin - left, end - left)), value, inside
 
 
-def _fragments(few: _Small, top: int, left: int, width: int) -> tuple[Integers, Floats]:
+def _fragments(few: _Lines, top: int, left: int, width: int) -> tuple[Integers, Floats]:
     """Return the pixels of rows in a window of this width in sequence, with their nearness."""
     lengths = few.right - few.left
     step = np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)
@@ -239,7 +215,7 @@ def _fragments(few: _Small, top: int, left: int, width: int) -> tuple[Integers, 
     return pixel, np.maximum(value.astype(np.float32), np.float32(_LEAST))
 
 
-def _scatter(triangle: NDArray[np.int32], near: Floats, few: _Small, top: int, left: int) -> None:
+def _scatter(triangle: NDArray[np.int32], near: Floats, few: _Lines, top: int, left: int) -> None:
     """Draw the rows of many triangles over existing ones, all fragments jointly."""
     first = int(few.line.min())
     rows = slice(first - top, int(few.line.max()) + 1 - top)

@@ -181,17 +181,15 @@ def _seen_ground(view: CameraView) -> Array:
                      for c in columns for r in rows])  # fmt: skip
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ pose[:3, :3].T
     lowest, highest = -pose[2, 3] - 0.5, max(-pose[2, 3] + 6.0, 1.0)
-    points = [np.zeros((1, 3))]
+    points = [np.zeros(3)]
     for ray in rays:
         reach = REACH
         if ray[2] < -1e-9:
             reach = min(reach, lowest / ray[2])
         elif ray[2] > 1e-9:
             reach = min(reach, highest / ray[2])
-        end = ray * reach
-        points.append(end[None])
-    found: Array = np.concatenate(points)
-    return found
+        points.append(ray * reach)
+    return np.array(points)
 
 
 def _away(caster: MeshInstance, grid: ShadowGrid) -> Array | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -28,16 +29,21 @@ def _blurred(draws: Floats, deviation: float) -> Floats:
     return blurred[margin:-margin, margin:-margin]
 
 
-@lru_cache(maxsize=1)
-def patches() -> Floats:
-    """Return smooth periodic noise (SIZE, SIZE) of mean 0 and deviation 1 without a seam."""
-    draws = generator(0, "surfaces").standard_normal((SIZE, SIZE), dtype=np.float32)
+def _layered(name: str, layers: Sequence[tuple[float, float]]) -> Floats:
+    """Return smooth noise (SIZE, SIZE) of mean 0 and deviation 1: layers of a deviation [px] and a weight."""
+    draws = generator(0, name).standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
-    for width, weight in ((3, 0.5), (9, 1.0), (27, 1.6)):
-        layer = _blurred(draws, width / 2.0)
+    for deviation, weight in layers:
+        layer = _blurred(draws, deviation)
         total += weight * layer / layer.std()
     found: Floats = (total / total.std()).astype(np.float32)
     return found
+
+
+@lru_cache(maxsize=1)
+def patches() -> Floats:
+    """Return smooth periodic noise (SIZE, SIZE) of mean 0 and deviation 1 without a seam."""
+    return _layered("surfaces", ((1.5, 0.5), (4.5, 1.0), (13.5, 1.6)))
 
 
 @lru_cache(maxsize=1)
@@ -51,14 +57,8 @@ def grit() -> Floats:
 
 @lru_cache(maxsize=1)
 def hollows() -> Floats:
-    """Return smooth noise (SIZE, SIZE) of mean 0 and deviation 1 with larger structures than `patches`."""
-    draws = generator(0, "hollows").standard_normal((SIZE, SIZE), dtype=np.float32)
-    total = np.zeros((SIZE, SIZE), dtype=np.float32)
-    for width, weight in ((8.0, 0.35), (22.0, 1.0)):
-        layer = _blurred(draws, width)
-        total += weight * layer / layer.std()
-    found: Floats = (total / total.std()).astype(np.float32)
-    return found
+    """Return noise as `patches` with larger structures."""
+    return _layered("hollows", ((8.0, 0.35), (22.0, 1.0)))
 
 
 def variation(x: Floats, y: Floats, distance: Floats) -> Floats:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
-from eidrive_scenario.openscenario.model import Axle, MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.openscenario.model import MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 
@@ -112,24 +112,22 @@ def _with_axles(spec: ActorSpec, vehicle: Vehicle) -> ActorSpec:
     axles, performance = vehicle.axles, vehicle.performance
     front = axles.front_axle
     wheelbase = front.position_x - axles.rear_axle.position_x if front is not None else 0.0
-    if front is not None:
-        extra = tuple(_extra_axle(axle, axles.rear_axle.position_x) for axle in axles.additional_axle)
-    else:
-        extra = tuple(_extra_axle(axle, 0.0) for axle in (axles.rear_axle, *axles.additional_axle))
+    # A trailer without a front axle has its rear axle among the additional ones, relative to its reference point.
+    origin = axles.rear_axle.position_x if front is not None else 0.0
+    others = axles.additional_axle if front is not None else (axles.rear_axle, *axles.additional_axle)
     return replace(
         spec,
         wheelbase=wheelbase,
         max_steering=abs(front.max_steering) if front is not None else 0.0,
         wheel_radius=axles.rear_axle.wheel_diameter / 2,
-        extra_axles=extra,
+        extra_axles=tuple(
+            ExtraAxle(axle.position_x - origin, axle.track_width, axle.wheel_diameter / 2, abs(axle.max_steering))
+            for axle in others
+        ),
         max_speed=performance.max_speed,
         max_acceleration=performance.max_acceleration,
         max_deceleration=performance.max_deceleration,
     )
-
-
-def _extra_axle(axle: Axle, origin: float) -> ExtraAxle:
-    return ExtraAxle(axle.position_x - origin, axle.track_width, axle.wheel_diameter / 2, abs(axle.max_steering))
 
 
 def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> str:

@@ -203,6 +203,7 @@ class ScriptedBody(Body):
 
     def end_step(
         self,
+        *,
         state: ActorState,
         center: Vector3,
         heading: tuple[float, float],

@@ -92,10 +92,6 @@ def near_rows(x: Array, y: Array, reach: Array, of: Iterable[Body], margin: floa
         yield rows
 
 
-FEW_PAIRS = 1500
-"""Maximum number of pairs of bodies of which all are compared faster than arrays select them."""
-
-
 class BodyGroup:
     """Bodies of a world while no actor is added or removed. They move one by one."""
 
@@ -143,14 +139,13 @@ class BodyGroup:
 
         The circles around the boxes are compared. A body is among its own neighbors. More bodies may be returned.
         """
-        if len(of) * len(self._bodies) <= FEW_PAIRS:
-            return [self._bodies] * len(of)
         x, y, reach = np.array([(b.center_x, b.center_y, b.radius + b.travel) for b in self._bodies]).T
         return [[self._bodies[row] for row in rows] for rows in near_rows(x, y, reach, of, margin)]
 
     def near_pairs(self, gap: float) -> Iterator[tuple[Body, Body]]:
         """Yield the pairs with a moved body that may be at most `gap` [m] apart, in the order of the bodies."""
         bodies = self._bodies
+        # Without the comparison one by one, runs with few actors take 1.2 to 1.3 times longer.
         if len(bodies) > FEW:
             for row, other in Footprints.of(bodies).near_pairs(gap):
                 yield bodies[row], bodies[other]
@@ -259,18 +254,18 @@ class BodyBatch(BodyGroup):
 
     def _write_back(self, members: Integers) -> None:
         """Set the attributes of some scripted bodies."""
-        columns = (
-            [tuple.__new__(ActorState, state) for state in self._state[members].tolist()],
-            self._center[members].tolist(),
-            zip(self._cos[members].tolist(), self._sin[members].tolist(), strict=True),
-            map(tuple, self._from[members].tolist()),
-            map(tuple, self._before[members].tolist()),
-            self._moved[members].tolist(),
-            self._stale[members].tolist(),
-            self._resting[members].tolist(),
-        )
-        for member, *values in zip(members.tolist(), *columns, strict=True):
-            self._scripted[member].end_step(*values)
+        columns = {
+            "state": [tuple.__new__(ActorState, state) for state in self._state[members].tolist()],
+            "center": self._center[members].tolist(),
+            "heading": list(zip(self._cos[members].tolist(), self._sin[members].tolist(), strict=True)),
+            "from_pose": list(map(tuple, self._from[members].tolist())),
+            "velocity_before": list(map(tuple, self._before[members].tolist())),
+            "moved": self._moved[members].tolist(),
+            "stale": self._stale[members].tolist(),
+            "is_resting": self._resting[members].tolist(),
+        }
+        for index, member in enumerate(members.tolist()):
+            self._scripted[member].end_step(**{name: column[index] for name, column in columns.items()})
 
     def sync_poses(self) -> None:
         members = np.flatnonzero(self._stale)

@@ -87,7 +87,8 @@ class Obstacles:
     def __init__(self, road_objects: Sequence[RoadObjectBody]) -> None:
         solid = [piece for piece in road_objects if piece.solid]
         self._solid = _merged_rails(solid)
-        self._soft = [piece for piece in road_objects if piece.kind in ("tree", "vegetation")]
+        self._solid_boxes = [box for piece in self._solid for box in _solid_boxes(piece)]
+        self._soft_boxes = [_foliage(piece) for piece in road_objects if piece.kind in ("tree", "vegetation")]
         self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
         self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
         for piece in self._solid:
@@ -96,16 +97,12 @@ class Obstacles:
     @property
     def boxes(self) -> list[Box]:
         """Boxes of all bodies."""
-        return [*self._solid_boxes(), *map(_foliage, self._soft)]
+        return [*self._solid_boxes, *self._soft_boxes]
 
     def raise_bodies(self, client: int) -> list[int]:
         """Create the bodies in pybullet and return their handles."""
-        solid, soft = list(self._solid_boxes()), list(map(_foliage, self._soft))
-        return [*_meshes(client, solid, STATIC, RAYS | DRIVEN), *_meshes(client, soft, TERRAIN, RAYS)]
-
-    def _solid_boxes(self) -> Iterator[Box]:
-        for piece in self._solid:
-            yield from _solid_boxes(piece)
+        solid = _meshes(client, self._solid_boxes, STATIC, RAYS | DRIVEN)
+        return [*solid, *_meshes(client, self._soft_boxes, TERRAIN, RAYS)]
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """Return the distance of a point from the nearest solid object, at most `most` [m]."""
