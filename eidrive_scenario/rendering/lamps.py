@@ -131,6 +131,8 @@ class Beam(NamedTuple):
 class Canvas(NamedTuple):
     """Points (n,) relative to the camera [m] with the normals of their surfaces, and the index (H, W) of each pixel or
     -1.
+
+    line, column, sample  every _STRIDE-th pixel in both directions that has a point, and the index of this point
     """
 
     x: Floats
@@ -138,29 +140,16 @@ class Canvas(NamedTuple):
     z: Floats
     normals: tuple[Floats, Floats, Floats]
     where: NDArray[np.int32]
-
-
-class Sample(NamedTuple):
-    """Sample of the points of a canvas, with the lines and columns of these pixels."""
-
-    x: Floats
-    y: Floats
-    z: Floats
     line: NDArray[np.intp]
     column: NDArray[np.intp]
+    sample: NDArray[np.int32]
 
-    @classmethod
-    def of(cls, canvas: Canvas) -> Sample:
-        """Return every _STRIDE-th pixel in both directions."""
-        some = canvas.where[::_STRIDE, ::_STRIDE]
-        line, column = np.nonzero(some >= 0)
-        rows = some[line, column]
-        return cls(canvas.x[rows], canvas.y[rows], canvas.z[rows], line, column)
+    def at(self, rows: NDArray[np.int32]) -> tuple[Floats, Floats, Floats]:
+        """Return the coordinates of some points."""
+        return self.x[rows], self.y[rows], self.z[rows]
 
 
-def shine(
-    beam: Beam, viewpoint: Array, canvas: Canvas, sample: Sample
-) -> tuple[NDArray[np.intp], Floats, Floats] | None:
+def shine(beam: Beam, viewpoint: Array, canvas: Canvas) -> tuple[NDArray[np.intp], Floats, Floats] | None:
     """Return the illuminance of points by a pair of lamps: rows of the lit points, illuminance, illuminance across the
     beam [lx].
 
@@ -168,15 +157,15 @@ def shine(
     """
     place = (beam.position - viewpoint).astype(np.float32)
     axes = beam.axes.astype(np.float32)
-    some = _within(place, axes, sample.x, sample.y, sample.z)[0]
+    some = _within(place, axes, *canvas.at(canvas.sample))[0]
     if not len(some):
         return None
-    line, column = sample.line[some], sample.column[some]
+    line, column = canvas.line[some], canvas.column[some]
     top, bottom = max(int(line.min()) - 1, 0) * _STRIDE, (int(line.max()) + 1) * _STRIDE
     left, right = max(int(column.min()) - 1, 0) * _STRIDE, (int(column.max()) + 1) * _STRIDE
     window = canvas.where[top:bottom, left:right].ravel()
     window = window[window >= 0]
-    rows, dx, dy, dz, aside, above = _within(place, axes, canvas.x[window], canvas.y[window], canvas.z[window])
+    rows, dx, dy, dz, aside, above = _within(place, axes, *canvas.at(window))
     rows = window[rows].astype(np.intp)
     column = (aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE)).astype(np.int32)
     line = (above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)).astype(np.int32)
@@ -257,11 +246,12 @@ def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: Cam
     normals = surfaces.normal[:, triangle[seen]]
     where = np.full(seen.shape, -1, dtype=np.int32)
     where[seen] = np.arange(len(numbers), dtype=np.int32)
-    canvas = Canvas(x, y, z, (normals[0], normals[1], normals[2]), where)
-    sampled = Sample.of(canvas)
+    coarse = where[::_STRIDE, ::_STRIDE]
+    line, column = np.nonzero(coarse >= 0)
+    canvas = Canvas(x, y, z, (normals[0], normals[1], normals[2]), where, line, column, coarse[line, column])
     received, across = (np.zeros(len(numbers), dtype=np.float32) for _ in range(2))
     for beam in beams:
-        shone = shine(beam, view.place, canvas, sampled)
+        shone = shine(beam, view.place, canvas)
         if shone is not None:
             rows, onto, straight = shone
             received[rows] += onto

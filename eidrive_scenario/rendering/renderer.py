@@ -80,10 +80,6 @@ class _Canvas(NamedTuple):
         empty = np.empty((3, pixels), dtype=np.float32)
         return cls(empty, np.full(pixels, np.inf, dtype=np.float32), np.full(pixels, -1, dtype=np.int32))
 
-    def copy(self) -> _Canvas:
-        """Return a copy."""
-        return _Canvas(self.planes.copy(), self.depth.copy(), self.label.copy())
-
 
 class _Kept(NamedTuple):
     """Cached scenery of a stationary camera.
@@ -277,7 +273,7 @@ def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circum
         canvas = _Canvas.blank(triangle.size)
         _draw(canvas, visible, beams, at, ground)
         return canvas
-    canvas = known.canvas.copy()
+    canvas = _Canvas._make(values.copy() for values in known.canvas)
     _paint(canvas, np.flatnonzero(changed), visible, None, at)
     return canvas
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,9 +228,8 @@ _NEAR_GROUND = 0.12
 _FEWEST_PIXELS = 10.0
 
 
-class _Window(NamedTuple):
-    lines: slice
-    columns: slice
+_Window = tuple[slice, slice]
+"""Lines and columns of the image."""
 
 
 def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.bool_], view: CameraView) -> Floats:
@@ -296,7 +294,7 @@ def _window(middle: Array, body: MeshInstance, half: Array, view: CameraView) ->
     top, bottom = max(math.floor(rows.min()), 0), min(math.ceil(rows.max()) + 1, pinhole.height)
     if left >= right or top >= bottom:
         return None
-    return _Window(slice(top, bottom), slice(left, right))
+    return slice(top, bottom), slice(left, right)
 
 
 def _ahead(corners: Array, near: float) -> Array:

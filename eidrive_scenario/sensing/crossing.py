@@ -43,17 +43,8 @@ def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array
     return enter, leave
 
 
-def set_upright(points: Array, view: WorldView, rows: Integers) -> Array:
-    """Return points (P, K, 3) turned like the bodies (P,) that are set upright at their reference points."""
-    return _turned(points, view, rows, upright=True)
-
-
-def tilted(points: Array, view: WorldView, rows: Integers) -> Array:
-    """Return points (P, K, 3) of upright bodies (P,) after the pitch and roll of the bodies."""
-    return _turned(points, view, rows, upright=False)
-
-
-def _turned(points: Array, view: WorldView, rows: Integers, *, upright: bool) -> Array:
+def turned(points: Array, view: WorldView, rows: Integers, *, upright: bool) -> Array:
+    """Return points (P, K, 3) turned about the reference points of bodies (P,): to an upright body, or back."""
     if view.is_upright:
         return points
     yaw, pitch, roll = view.yaw[rows], view.pitch[rows], view.roll[rows]
@@ -68,8 +59,8 @@ def starts_behind_bodies(origins: Array, targets: Array, view: WorldView, rows: 
     """Return starts (P, K, 3) of rays (P, K, 3) behind the bodies (P,) of their sensors, as `ray_starts`."""
     if view.is_upright:
         return ray_starts(origins, targets, view.boxes[rows])
-    ends = set_upright(origins, view, rows), set_upright(targets, view, rows)
-    return np.asarray(origins + _shares_behind(*ends, view.boxes[rows])[..., None] * (targets - origins))
+    begin, end = (turned(points, view, rows, upright=True) for points in (origins, targets))
+    return np.asarray(origins + _shares_behind(begin, end, view.boxes[rows])[..., None] * (targets - origins))
 
 
 def ray_starts(origins: Array, targets: Array, boxes: Array) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.crossing import crossing, set_upright, starts_behind_bodies
+from eidrive_scenario.sensing.crossing import crossing, starts_behind_bodies, turned
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.sensor import Scene, Sensor
@@ -204,7 +204,7 @@ class Lidar(Sensor):
             starts = starts_behind_bodies(origin[None], targets[None], view, np.array([row]))[0]
             return np.arange(len(origin)), starts, np.zeros(len(origin), dtype=bool)
         own, rows = view.boxes[row], np.array([row])
-        begin, end = set_upright(origin[None], view, rows)[0], set_upright(targets[None], view, rows)[0]
+        begin, end = (turned(points[None], view, rows, upright=True)[0] for points in (origin, targets))
         around = own + np.array([0.0, 0.0, 0.0, *(2.0 * _NEAR,) * 3, 0.0])
         near = np.flatnonzero(_meets(begin, end, around))
         hit = near[_meets(begin[near], end[near], own)]

@@ -25,7 +25,8 @@ class Rig:
         check_unique(sensors)
         self.station = spec.name
         self._sensors: dict[str, Sensor] = {
-            name: _sensor(settings, spec, name, seed) for name, settings in sensors.items()
+            name: construct(sensor_class(settings.kind), settings, spec, name, seed)
+            for name, settings in sensors.items()
         }
         self._periods: dict[str, int] = {}
 
@@ -93,7 +94,3 @@ def ego_state(view: WorldView, row: int) -> EgoState:
         yaw_rate=state.yaw_rate,
         acceleration=math.cos(yaw) * state.acceleration_x + math.sin(yaw) * state.acceleration_y,
     )
-
-
-def _sensor(settings: SensorSettings, spec: ActorSpec, name: str, seed: int) -> Sensor:
-    return construct(sensor_class(settings.kind), settings, spec, name, seed)  # type: ignore[no-any-return]

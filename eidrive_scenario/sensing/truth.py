@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import BOX_SAMPLES, points_of_boxes
-from eidrive_scenario.sensing.crossing import few_ray_starts, starts_behind_bodies, tilted
+from eidrive_scenario.sensing.crossing import few_ray_starts, starts_behind_bodies, turned
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.sensor import Point, Scene, Sensor
@@ -154,7 +154,7 @@ def visibilities(
     sensor_of = np.arange(len(sensors)).repeat([len(rows) for rows in targets])
     target_of = np.concatenate([np.asarray(rows, dtype=np.intp) for rows in targets])
     mounts = np.array([sensor.mounting.position(view, row) for sensor, row in zip(sensors, own, strict=True)])
-    points = tilted(points_of_boxes(boxes[target_of], SAMPLES), view, target_of)
+    points = turned(points_of_boxes(boxes[target_of], SAMPLES), view, target_of, upright=False)
     origins = mounts[sensor_of][:, None].repeat(len(SAMPLES), axis=1)
     starts = starts_behind_bodies(origins, points, view, np.asarray(own, dtype=np.intp)[sensor_of])
     begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)

@@ -11,9 +11,6 @@ from eidrive_scenario.openscenario.model import MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 
-SHAPES = (
-    "car", "firetruck", "ambulance", "bus", "van", "truck", "motorbike", "bicycle", "pedestrian", "rsu", "box",
-)  # fmt: skip
 SHAPE_PROPERTY = "eidrive.shape"
 COLOR_PROPERTY = "eidrive.color"
 
@@ -51,30 +48,21 @@ _VEHICLES = {
     "wheelchair": "bicycle",
     "workMachine": "truck",
 }
-_CATEGORIES = {"firetruck": "truck", "ambulance": "van", "rsu": "misc", "box": "misc"}
-_USUAL_MASS = {
-    "car": 1500.0,
-    "van": 2200.0,
-    "ambulance": 3000.0,
-    "truck": 9000.0,
-    "firetruck": 14000.0,
-    "bus": 12000.0,
-    "motorbike": 280.0,
-    "bicycle": 90.0,
+_SHAPES: dict[str, tuple[str, float, Vector3]] = {
+    "car": ("car", 1500.0, (4.5, 1.8, 1.5)),
+    "firetruck": ("truck", 14000.0, (8.5, 2.5, 3.3)),
+    "ambulance": ("van", 3000.0, (6.0, 2.1, 2.6)),
+    "bus": ("bus", 12000.0, (12.0, 2.55, 3.1)),
+    "van": ("van", 2200.0, (5.9, 2.0, 2.6)),
+    "truck": ("truck", 9000.0, (8.0, 2.5, 3.5)),
+    "motorbike": ("motorbike", 280.0, (2.2, 0.8, 1.6)),
+    "bicycle": ("bicycle", 90.0, (1.8, 0.6, 1.7)),
+    "pedestrian": ("pedestrian", 80.0, (0.5, 0.5, 1.75)),
+    "rsu": ("misc", 80.0, (0.5, 0.5, 5.0)),
+    "box": ("misc", 80.0, (0.5, 0.5, 0.5)),
 }
-_USUAL_SIZE: dict[str, Vector3] = {
-    "car": (4.5, 1.8, 1.5),
-    "firetruck": (8.5, 2.5, 3.3),
-    "ambulance": (6.0, 2.1, 2.6),
-    "bus": (12.0, 2.55, 3.1),
-    "van": (5.9, 2.0, 2.6),
-    "truck": (8.0, 2.5, 3.5),
-    "motorbike": (2.2, 0.8, 1.6),
-    "bicycle": (1.8, 0.6, 1.7),
-    "pedestrian": (0.5, 0.5, 1.75),
-    "rsu": (0.5, 0.5, 5.0),
-    "box": (0.5, 0.5, 0.5),
-}
+"""Category, and default mass [kg] and size [m], by shape."""
+SHAPES = tuple(_SHAPES)
 
 
 def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpec:
@@ -86,6 +74,7 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     """
     properties = {entry.name: entry.value for entry in property_entries(entity)}
     shape = _shape(entity, properties)
+    category, usual_mass, usual_size = _SHAPES[shape]
     dimensions, center = entity.bounding_box.dimensions, entity.bounding_box.center
     given = (dimensions.length, dimensions.width, dimensions.height)
     if min(given) < 0.0:
@@ -93,15 +82,15 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
         raise ScenarioError(
             Diagnostic(message, "give length, width and height above 0", dimensions.source, dimensions.line)
         )
-    length, width, height = (own or usual for own, usual in zip(given, _USUAL_SIZE[shape], strict=True))
+    length, width, height = (own or usual for own, usual in zip(given, usual_size, strict=True))
     lift = 0.0 if dimensions.height else height / 2
     common = ActorSpec(
         name=name,
         shape=shape,
-        category=_CATEGORIES.get(shape, shape),
+        category=category,
         size=(length, width, height),
         offset=(center.x, center.y, center.z + lift),
-        mass=entity.mass or _USUAL_MASS.get(shape, 80.0),
+        mass=entity.mass or usual_mass,
         properties=properties,
         color=_color(entity, properties),
     )

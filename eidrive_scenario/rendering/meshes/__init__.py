@@ -9,7 +9,7 @@ from functools import lru_cache
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.rendering.meshes.cars import ambulance, car, van
 from eidrive_scenario.rendering.meshes.heavy import bus, firetruck, trailer, truck
-from eidrive_scenario.rendering.meshes.people import bicycle, in_motion, motorbike, pedestrian
+from eidrive_scenario.rendering.meshes.people import bicycle, motorbike, pedestrian
 from eidrive_scenario.rendering.meshes.road_objects import crate, roadside_unit
 from eidrive_scenario.rendering.meshes.solids import BodyDimensions, Mesh
 from eidrive_scenario.world.actor import ActorSpec
@@ -48,6 +48,6 @@ def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
 
 @lru_cache(maxsize=256)
 def _mesh(shape: str, frame: BodyDimensions, motion: str) -> Mapping[str, Array]:
-    if shape == "pedestrian" and motion:
-        return in_motion(frame, motion)
-    return (trailer if shape == "trailer" else BUILDERS[shape])(frame).materials()
+    if shape == "pedestrian":
+        return pedestrian(frame, motion).materials()
+    return (trailer(frame) if shape == "trailer" else BUILDERS[shape](frame)).materials()

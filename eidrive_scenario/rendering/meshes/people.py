@@ -41,11 +41,10 @@ class Posture(NamedTuple):
     lies: bool = False
 
 
-WALKING = Posture(pace=1.0)
 POSTURES: Mapping[str, Posture] = {
-    "": WALKING,
+    "": Posture(pace=1.0),
     "standing": Posture(),
-    "walking": WALKING,
+    "walking": Posture(pace=1.0),
     "running": Posture(pace=1.6, bend=0.15),
     "reeling": Posture(pace=0.7, bend=0.12),
     "cycling": Posture(hip=0.40, knee=(0.16, 0.34), bend=0.5),
@@ -60,24 +59,17 @@ POSTURES: Mapping[str, Posture] = {
 """Postures by PedestrianMotionType of the standard; the default is walking."""
 
 
-def in_motion(frame: BodyDimensions, motion: str) -> dict[str, Array]:
-    """Return triangles by material of a pedestrian in a motion, standing if the motion is unknown."""
-    return _held(frame, POSTURES.get(motion, POSTURES["standing"])).materials()
-
-
-def pedestrian(frame: BodyDimensions) -> Mesh:
-    """Return a walking pedestrian with swinging arms inside the box."""
-    return _held(frame, WALKING)
-
-
-def _held(frame: BodyDimensions, posture: Posture) -> Mesh:
+def pedestrian(frame: BodyDimensions, motion: str = "") -> Mesh:
+    """Return a pedestrian in a motion of the standard: walking without one, standing if it is unknown."""
+    posture = POSTURES.get(motion, POSTURES["standing"])
     mesh = Mesh()
     _legs(mesh, frame, posture)
     _upper_body(mesh, frame, posture)
     if posture.lies:
         _lay_down(mesh)
     elif posture.lift:
-        _move(mesh, (0.0, 0.0, posture.lift * frame.height))
+        for solids in mesh.triangles.values():
+            solids[:] = [moved(solid, (0.0, 0.0, posture.lift * frame.height)) for solid in solids]
     return mesh
 
 
@@ -145,11 +137,6 @@ def _lay_down(mesh: Mesh) -> None:
         solids[:] = [
             np.stack([middle - solid[..., 2], solid[..., 1], solid[..., 0] - back], axis=-1) for solid in solids
         ]
-
-
-def _move(mesh: Mesh, by: tuple[float, float, float]) -> None:
-    for solids in mesh.triangles.values():
-        solids[:] = [moved(solid, by) for solid in solids]
 
 
 def motorbike(frame: BodyDimensions) -> Mesh:

@@ -166,25 +166,12 @@ def _letters(text: str, middle: Array, width: float, height: float) -> list[Arra
     for number, letter in enumerate(text):
         for line in range(5):
             bits = GLYPHS.get(letter, "0" * 15)[3 * line : 3 * line + 3]
-            for run in _runs(bits):
-                y0 = left + (4 * number + run[0]) * cell
-                y1, z1 = y0 + (run[1] - run[0]) * cell, top - line * cell
+            for run in re.finditer("1+", bits):
+                y0 = left + (4 * number + run.start()) * cell
+                y1, z1 = y0 + (run.end() - run.start()) * cell, top - line * cell
                 corners = np.array([(y0, z1 - cell), (y1, z1 - cell), (y1, z1), (y0, z1)])
                 parts.append(polygon(_at(corners, 2 * LAYER)))
     return parts
-
-
-def _runs(bits: str) -> list[tuple[int, int]]:
-    """Return the start and end of each sequence of ones."""
-    found: list[tuple[int, int]] = []
-    for index, bit in enumerate(bits):
-        if bit == "1":
-            found = (
-                [*found[:-1], (found[-1][0], index + 1)]
-                if found and found[-1][1] == index
-                else [*found, (index, index + 1)]
-            )
-    return found
 
 
 def _at(corners: Array, x: float) -> Array:
