@@ -61,7 +61,7 @@ def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
         brightness = light.brightness(time)
         for material, luminance in _SHINES.get(name, ()) if brightness > 0.0 else ():
             shown = _colored(luminance, light, brightness)
-            found[material] = _brighter(found.get(material), shown)
+            found[material] = max(shown, found.get(material, shown), key=max)
     return found
 
 
@@ -89,10 +89,6 @@ def _colored(luminance: Light, light: LightState, brightness: float) -> Light:
         scale = max(luminance) / most if most > 0.0 else 0.0
         luminance = (red * scale, green * scale, blue * scale)
     return luminance[0] * brightness, luminance[1] * brightness, luminance[2] * brightness
-
-
-def _brighter(one: Light | None, other: Light) -> Light:
-    return other if one is None or max(other) >= max(one) else one
 
 
 REACH = 70.0

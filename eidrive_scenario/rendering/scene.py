@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -50,9 +51,11 @@ class Roadside:
     def __init__(self, pieces: Sequence[RoadObjectBody], heads: Sequence[SignalHead]) -> None:
         self._still: Model | None = _standing(pieces)
         self._heads = tuple(heads)
-        self._models = [_head_model(head) for head in heads]
-        self._turns = [rotation_matrix(head.pose.h, 0.0, 0.0) for head in heads]
         self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
+        self._unlit = [
+            MeshInstance(_head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), place, FIRST_LABEL - row)
+            for row, (head, place) in enumerate(zip(heads, self._places, strict=True))
+        ]
 
     def instances(self, viewpoint: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
         """Return all objects within sight of a camera at `viewpoint` (3,), with the signal states at `time` [s]."""
@@ -60,8 +63,7 @@ class Roadside:
         near = np.flatnonzero(np.linalg.norm(self._places - viewpoint, axis=1) < IN_SIGHT)
         for row in near.tolist():
             glow = _glow(self._heads[row], states.get(self._heads[row].signal.id), time)
-            label = FIRST_LABEL - row
-            found.append(MeshInstance(self._models[row], self._turns[row], self._places[row], label, glow))
+            found.append(replace(self._unlit[row], glow=glow))
         return found
 
 

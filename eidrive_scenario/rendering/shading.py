@@ -139,20 +139,16 @@ def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], at:
     grained = np.flatnonzero(grain)
     if not len(grained):
         return
-    all_of_them = len(grained) == len(grain)
-    x, y, distance = (part if all_of_them else part[grained] for part in (points.x, points.y, points.distance))
-    x, y = x + np.float32(at.view.place[0] % 4096.0), y + np.float32(at.view.place[1] % 4096.0)
-    factor = np.float32(1.0) + (grain if all_of_them else grain[grained]) * variation(x, y, distance)
+    x = points.x[grained] + np.float32(at.view.place[0] % 4096.0)
+    y = points.y[grained] + np.float32(at.view.place[1] % 4096.0)
+    factor = np.float32(1.0) + grain[grained] * variation(x, y, points.distance[grained])
     if at.weather.wetness > 0.0:
         soaked = SOAKS[finish[grained]]
         wet = np.float32(1.0 - DARKENING * min(2.0 * at.weather.wetness, 1.0))
         factor *= np.where(soaked, wet, np.float32(1.0))
-    np.maximum(factor, np.float32(0.2), out=factor)
-    every = factor
-    if not all_of_them:
-        every = np.ones(len(grain), dtype=np.float32)
-        every[grained] = factor
-    luminance *= every
+    whole = np.ones(len(grain), dtype=np.float32)
+    whole[grained] = np.maximum(factor, np.float32(0.2))
+    luminance *= whole
 
 
 def _add_mirrors(luminance: Floats, points: Points, surfaces: Surfaces, at: Circumstances, lit: Floats | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.imaging import Optics, develop, lens_of, meter_exposure
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
-from eidrive_scenario.sensing.readings import CameraReading
+from eidrive_scenario.sensing.readings import CameraReading, Exposure
 from eidrive_scenario.sensing.sensor import Scene, Sensor
 from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
@@ -53,17 +53,19 @@ class Camera(Sensor):
         """Return an image from the actor in this row."""
         sensor, pose = self._image_sensor, self.mounting.camera_pose(view, row)
         ignored = (*view.unseen_by.get(self.name, ()), *self._ignored)
-        exposure = _Exposure(
-            sensor,
-            scene.image(pose, sensor.pinhole, ignore=ignored),
-            _Conditions(
-                self.settings,
-                scene.weather,
-                pose,
-                view.velocity[row],
-                (*self._key, view.tick),
-                (*self._key, "lens", int(view.time / DROPS_STAY)),
-            ),
+        undrawn = scene.image(pose, sensor.pinhole, ignore=ignored)
+        conditions = _Conditions(
+            self.settings,
+            scene.weather,
+            pose,
+            view.velocity[row],
+            (*self._key, view.tick),
+            (*self._key, "lens", int(view.time / DROPS_STAY)),
+        )
+        exposure = Exposure(
+            (self.settings.width, self.settings.height),
+            partial(_expose, sensor, undrawn, conditions),
+            lambda: content_digest(undrawn.digest, conditions),
         )
         return CameraReading.of(exposure, sensor.intrinsics, pose, np.array(self.settings.distortion))
 
@@ -83,25 +85,9 @@ class _Conditions(NamedTuple):
     lens: tuple[int, *tuple[str | int, ...]]
 
 
-class _Exposure:
-    """Image of a camera that is drawn when its pixels are read."""
-
-    def __init__(self, sensor: ImageSensor, undrawn: UndrawnImage, conditions: _Conditions) -> None:
-        self.size = conditions.settings.width, conditions.settings.height
-        self._sensor = sensor
-        self._undrawn: UndrawnImage | None = undrawn
-        self._conditions = conditions
-
-    @cached_property
-    def digest(self) -> bytes | None:
-        return None if self._undrawn is None else content_digest(self._undrawn.digest, self._conditions)
-
-    @cached_property
-    def image(self) -> CameraImage:
-        assert self._undrawn is not None
-        _, weather, pose, velocity, noise, lens = self._conditions
-        radiance, self._undrawn = self._undrawn.draw(), None  # the content is not needed any more
-        return self._sensor.develop(radiance, weather, pose, generator(*noise), velocity, generator(*lens))
+def _expose(sensor: ImageSensor, undrawn: UndrawnImage, conditions: _Conditions) -> CameraImage:
+    _, weather, pose, velocity, noise, lens = conditions
+    return sensor.develop(undrawn.draw(), weather, pose, generator(*noise), velocity, generator(*lens))
 
 
 class ImageSensor:

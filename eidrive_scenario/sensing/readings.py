@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -48,20 +49,33 @@ class TruthReading(msgspec.Struct, frozen=True, gc=False):
     visibility: Array
 
 
-class Exposure(Protocol):
-    """Image of a camera that is drawn when its pixels are read."""
+class Exposure:
+    """Image of a camera that is drawn when its pixels are read.
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height [px]."""
+    size    width and height [px]
+    draw    called for the first access to the image
+    digest  returns the digest of everything that determines the image; None if it is unknown
+    """
 
-    @property
+    def __init__(
+        self, size: tuple[int, int], draw: Callable[[], CameraImage], digest: Callable[[], bytes] | None = None
+    ) -> None:
+        self.size = size
+        self._draw = draw
+        self._digest = digest
+
+    @cached_property
     def digest(self) -> bytes | None:
         """Digest of everything that determines the image, None if it is unknown. Equal digests mean equal images."""
+        return None if self._digest is None else self._digest()
 
-    @property
+    @cached_property
     def image(self) -> CameraImage:
         """The image, drawn by the first access."""
+        image = self._draw()
+        del self._draw  # the content is not needed any more
+        self._digest = None
+        return image
 
 
 class CameraReading:
@@ -86,7 +100,8 @@ class CameraReading:
         pose: Array,
         distortion: Array | None = None,
     ) -> None:
-        self._exposure: Exposure = _Drawn(CameraImage(rgb, depth, segmentation))
+        image = CameraImage(rgb, depth, segmentation)
+        self._exposure = Exposure((rgb.shape[1], rgb.shape[0]), lambda: image)
         self.intrinsics, self.pose = intrinsics, pose
         self.distortion: Array = np.zeros(5) if distortion is None else distortion
 
@@ -126,21 +141,6 @@ class CameraReading:
     def image_digest(self) -> bytes | None:
         """Digest of everything that determines the image, None if it is unknown. Equal digests mean equal images."""
         return self._exposure.digest
-
-
-class _Drawn(NamedTuple):
-    """Image that was given as arrays."""
-
-    image: CameraImage
-
-    @property
-    def size(self) -> tuple[int, int]:
-        height, width = self.image.rgb.shape[:2]
-        return width, height
-
-    @property
-    def digest(self) -> None:
-        return None
 
 
 class LidarReading(msgspec.Struct, frozen=True):

@@ -118,17 +118,13 @@ class SignalHead(NamedTuple):
 def buildings(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Building]:
     """Yield the buildings of a road network as boxes, except objects with some ids."""
     for placed in placed_objects(roads):
-        if placed.object.type == "building" and placed.object.id not in without:
-            yield from _building(roads, placed)
-
-
-def _building(roads: RoadNetwork, placed: PlacedObject) -> Iterator[Building]:
-    """Yield the boxes of a building of the road network."""
-    entry = placed.object
-    height = max([placed.height or STOREY, *(corner.height for outline in entry.outlines for corner in outline)])
-    for pose, length, width in footprint(roads, placed):
-        center = (pose.x, pose.y, pose.z + height / 2)
-        yield Building(entry.name or f"building {entry.id}", center, (length or 1.0, width or 1.0, height), pose.h)
+        entry = placed.object
+        if entry.type != "building" or entry.id in without:
+            continue
+        height = max([placed.height or STOREY, *(corner.height for outline in entry.outlines for corner in outline)])
+        for pose, length, width in footprint(roads, placed):
+            center = (pose.x, pose.y, pose.z + height / 2)
+            yield Building(entry.name or f"building {entry.id}", center, (length or 1.0, width or 1.0, height), pose.h)
 
 
 def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.appearance import Appearance, hidden_actors
 from eidrive_scenario.world.camera import PictureMaker, Pinhole, Radiance, UndrawnImage, VisibleState
 from eidrive_scenario.world.physics.bodies import Body, DrivenBody, GroundUnder, ScriptedBody
-from eidrive_scenario.world.physics.body_group import BodyGroup, group_bodies
+from eidrive_scenario.world.physics.body_group import group_bodies
 from eidrive_scenario.world.physics.bullet import connect, disconnect
 from eidrive_scenario.world.physics.contacts import ContactTracker, Couplings
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
@@ -30,7 +29,6 @@ from eidrive_scenario.world.view import FEW, GROUND, NOTHING, Contact, RayHits, 
 from eidrive_scenario.world.weather import Weather
 
 
-@dataclass(frozen=True)
 class ActorTable:
     """Data of the actors that is constant while no actor is added or removed.
 
@@ -40,27 +38,27 @@ class ActorTable:
     row_in_list    the same as a list
     """
 
-    bodies: BodyGroup
-    rows: Mapping[str, int]
-    columns: Mapping[str, Any]
-    row_of_handle: Integers
-    row_in_list: list[int]
-
-    @classmethod
-    def of(cls, bodies: Mapping[str, Body], highest_handle: int, dt: float) -> ActorTable:
-        """Return the table of bodies by name. `highest_handle` is that of other bodies in pybullet."""
+    def __init__(self, bodies: Mapping[str, Body], highest_handle: int, dt: float) -> None:
         order = tuple(bodies.values())
         size = np.array([body.spec.size for body in order], dtype=float).reshape(-1, 3)
         offset = np.array([body.spec.offset for body in order], dtype=float).reshape(-1, 3)
         size.flags.writeable = offset.flags.writeable = False
         categories = tuple(body.spec.category for body in order)
-        columns = {"names": tuple(bodies), "categories": categories, "size": size, "offset": offset}
-        row_of_handle = np.full(max([highest_handle, *(body.handle for body in order)]) + 2, GROUND, dtype=np.int64)
-        row_of_handle[-1] = NOTHING
+        self.columns: dict[str, Any] = {
+            "names": tuple(bodies),
+            "categories": categories,
+            "size": size,
+            "offset": offset,
+        }
+        self.bodies = group_bodies(order, dt)
+        self.rows = {name: row for row, name in enumerate(bodies)}
+        self.row_of_handle: Integers = np.full(
+            max([highest_handle, *(body.handle for body in order)]) + 2, GROUND, dtype=np.int64
+        )
+        self.row_of_handle[-1] = NOTHING
         for row, body in enumerate(order):
-            row_of_handle[body.handle] = row
-        rows = {name: row for row, name in enumerate(bodies)}
-        return cls(group_bodies(order, dt), rows, columns, row_of_handle, row_of_handle.tolist())
+            self.row_of_handle[body.handle] = row
+        self.row_in_list: list[int] = self.row_of_handle.tolist()
 
 
 class World:
@@ -346,7 +344,7 @@ class World:
     @property
     def _actors(self) -> ActorTable:
         if self._table is None:
-            self._table = ActorTable.of(self._bodies, self._scenery.highest_handle, self.dt)
+            self._table = ActorTable(self._bodies, self._scenery.highest_handle, self.dt)
         return self._table
 
     def _refresh(self) -> None:

@@ -45,13 +45,9 @@ def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mappi
     for number, color in enumerate(colors):
         z = height - (number + 0.5) * cell
         mesh.add(f"lamp_{color} {number}", cylinder((0.0, 0, z), (0.012, 0, z), lens, sides=12))
-        mesh.add("plastic", _visor(z, lens))
+        visor = tapered_box((0.07, 0, z + 1.12 * lens), (0.14, 2.0 * lens, 0.02), (0.14, 1.6 * lens))
+        mesh.add("plastic", visor)
     return mesh.materials()
-
-
-def _visor(z: float, lens: float) -> Array:
-    """Return a visor above a lamp."""
-    return tapered_box((0.07, 0, z + 1.12 * lens), (0.14, 2.0 * lens, 0.02), (0.14, 1.6 * lens))
 
 
 def _tree(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:

@@ -12,6 +12,7 @@ from eidrive_scenario.world.actor import ExtraAxle
 
 Point = Sequence[float] | Array
 
+# Four corners of the bottom counter-clockwise from above, then four of the top
 _BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 
 
@@ -51,12 +52,6 @@ def polygon(points: Sequence[Point] | Array) -> Array:
     return np.stack([[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)])
 
 
-def hexahedron(corners: Sequence[Point] | Array) -> Array:
-    """Return a body with six faces: four corners of the bottom counter-clockwise from above, then four of the top."""
-    points = np.asarray(corners, dtype=float)
-    return np.concatenate([polygon(points[list(face)]) for face in _BOX_FACES])
-
-
 def box(center: Point, size: Point) -> Array:
     """Return an upright cuboid."""
     return tapered_box(center, size, size[:2])
@@ -72,7 +67,8 @@ def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> A
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     bottom = [(x + sx * length / 2, y + sy * width / 2, z - height / 2) for sx, sy in signs]
     upper = [(x + shift + sx * top[0] / 2, y + sy * top[1] / 2, z + height / 2) for sx, sy in signs]
-    return hexahedron(bottom + upper)
+    points = np.array(bottom + upper, dtype=float)
+    return np.concatenate([polygon(points[list(face)]) for face in _BOX_FACES])
 
 
 def bevelled_box(center: Point, size: Point, bevel: float) -> Array:

@@ -260,10 +260,9 @@ class GroundUnder:
 
         Outside the road the ground is level at the height at which the vehicle left the road.
         """
-        if self._roads is None:
-            return self._height, 0.0, 0.0
-        self._last = self._roads.locate_at(x, y, self._last)
-        if self._last is None:
+        if self._roads is not None:
+            self._last = self._roads.locate_at(x, y, self._last)
+        if self._roads is None or self._last is None:
             return self._height, 0.0, 0.0
         pose = self._roads.road_pose_at(self._last.road, self._last.s, self._last.t)
         pose = pose.turned(yaw - pose.h)
@@ -330,11 +329,6 @@ class DrivenBody(Body):
         rise = -math.tan(self.pitch) * forward if self.pitch else 0.0
         velocity = (forward * cos - left * sin, forward * sin + left * cos, rise)
         bullet.resetBaseVelocity(handle, velocity, (0.0, 0.0, turning), client)
-
-    def present_velocity(self) -> Vector3:
-        """Return the current velocity of the rigid body within a step [m/s]."""
-        velocity: Vector3 = bullet.getBaseVelocity(self.handle, self.client)[0]
-        return velocity
 
     def read_back(self) -> None:
         """Read pose and velocity from pybullet after a step, and set the body on the ground."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -80,18 +80,6 @@ class Footprints(NamedTuple):
         return apart
 
 
-def near_rows(x: Array, y: Array, reach: Array, of: Iterable[Body], margin: float) -> Iterator[list[int]]:
-    """Yield, for each of some bodies, the rows of circles around x, y (N,) at most `margin` [m] from its own circle.
-
-    reach  (N,) radii with the displacement of this step [m], as `Body.travel`
-    """
-    for body in of:
-        dx, dy = x - body.center_x, y - body.center_y
-        limit = reach + (body.radius + body.travel + margin + ROUNDING)
-        rows: list[int] = np.flatnonzero(dx * dx + dy * dy <= limit * limit).tolist()
-        yield rows
-
-
 class BodyGroup:
     """Bodies of a world while no actor is added or removed. They move one by one."""
 
@@ -139,25 +127,42 @@ class BodyGroup:
 
         The circles around the boxes are compared. A body is among its own neighbors. More bodies may be returned.
         """
-        x, y, reach = np.array([(b.center_x, b.center_y, b.radius + b.travel) for b in self._bodies]).T
-        return [[self._bodies[row] for row in rows] for rows in near_rows(x, y, reach, of, margin)]
+        x, y, reach = self._circles()
+        near = []
+        for body in of:
+            dx, dy = x - body.center_x, y - body.center_y
+            limit = reach + (body.radius + body.travel + margin + ROUNDING)
+            near.append(np.flatnonzero(dx * dx + dy * dy <= limit * limit).tolist())
+        self._update(set(chain.from_iterable(near)))
+        return [[self._bodies[row] for row in rows] for rows in near]
 
     def near_pairs(self, gap: float) -> Iterator[tuple[Body, Body]]:
         """Yield the pairs with a moved body that may be at most `gap` [m] apart, in the order of the bodies."""
-        bodies = self._bodies
-        # Without the comparison one by one, runs with few actors take 1.2 to 1.3 times longer.
-        if len(bodies) > FEW:
-            for row, other in Footprints.of(bodies).near_pairs(gap):
-                yield bodies[row], bodies[other]
+        if len(self._bodies) > FEW:
+            pairs = self._footprints().near_pairs(gap)
+            self._update(set(chain.from_iterable(pairs)))
+            for row, other in pairs:
+                yield self._bodies[row], self._bodies[other]
             return
+        # Without this comparison one by one, runs with few actors take 1.2 to 1.3 times longer.
+        bodies = self.current()
         for index, first in enumerate(bodies):
             x, y, radius, moved = first.center_x, first.center_y, first.radius + gap, first.moved
-            for row in range(index + 1, len(bodies)):
-                second = bodies[row]
+            for second in bodies[index + 1 :]:
                 if moved or second.moved:
                     dx, dy, reach = second.center_x - x, second.center_y - y, radius + second.radius
                     if dx * dx + dy * dy <= reach * reach:
                         yield first, second
+
+    def _update(self, rows: Collection[int]) -> None:
+        """Set the attributes of the bodies of some rows to the current values."""
+
+    def _circles(self) -> Array:
+        """Return x, y and radius (3, N) of circles around the bodies, with the displacement of this step [m]."""
+        return np.array([(body.center_x, body.center_y, body.radius + body.travel) for body in self._bodies]).T
+
+    def _footprints(self) -> Footprints:
+        return Footprints.of(self._bodies)
 
 
 MANY = 100
@@ -248,7 +253,6 @@ class BodyBatch(BodyGroup):
         return self._bodies
 
     def _update(self, rows: Collection[int]) -> None:
-        """Set the attributes of the bodies of some rows to the current values."""
         if self._is_outdated and rows:
             self._write_back(np.flatnonzero(np.isin(self._rows, list(rows))))
 
@@ -294,15 +298,12 @@ class BodyBatch(BodyGroup):
         names = {self._names[row] for row in np.flatnonzero(self._moved).tolist()}
         return names.union(body.name for body in self._others.values() if body.moved)
 
-    def neighbors(self, of: Sequence[Body], margin: float) -> list[Sequence[Body]]:
-        x, y = self._centers()
+    def _circles(self) -> Array:
         reach = self._radius.copy()
         reach[self._rows] += self._travel()
         for row, body in self._others.items():
             reach[row] += body.travel
-        found = list(near_rows(x, y, reach, of, margin))
-        self._update(set(chain.from_iterable(found)))
-        return [[self._bodies[row] for row in rows] for rows in found]
+        return np.stack([*self._centers(), reach])
 
     def _travel(self) -> Array:
         """Return `ScriptedBody.travel`, but for rounding."""
@@ -311,12 +312,6 @@ class BodyBatch(BodyGroup):
         way: Array = np.sqrt(np.sum(covered[:, :3] ** 2, axis=1))
         way += turn * 2.0 * self._radius[self._rows]
         return way
-
-    def near_pairs(self, gap: float) -> Iterator[tuple[Body, Body]]:
-        pairs = self._footprints().near_pairs(gap)
-        self._update(set(chain.from_iterable(pairs)))
-        for row, other in pairs:
-            yield self._bodies[row], self._bodies[other]
 
     def _footprints(self) -> Footprints:
         x, y = self._centers()

@@ -126,7 +126,7 @@ class Physics:
                 scripted.pass_through(number / self._substeps)
             for name, body in watched.items():
                 body.drive(demands[name])
-            before = {body.handle: body.present_velocity() for body in watched.values()}
+            before = {body.handle: bullet.getBaseVelocity(body.handle, self._client)[0] for body in watched.values()}
             bullet.stepSimulation(self._client)
             for body in watched.values():
                 self._note_touches(body, owners, before, touches)

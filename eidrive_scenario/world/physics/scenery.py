@@ -96,10 +96,7 @@ def standing_box(building: Building) -> Box:
     return x, y, z - building.size[2] / 2.0, *building.size, building.yaw
 
 
-@lru_cache(maxsize=_MAX_KEPT)
-def road_scenery(roads: RoadNetwork, entities: frozenset[str]) -> RoadScenery:
-    """Return the static objects of a road network without those that are actors."""
-    return RoadScenery(roads, entities)
+_shared_scenery = lru_cache(maxsize=_MAX_KEPT)(RoadScenery)
 
 
 MAX_BOXES = 16
@@ -119,7 +116,7 @@ class Scenery:
 
     def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
-        self._of_roads = road_scenery(roads, frozenset(entities)) if roads is not None else None
+        self._of_roads = _shared_scenery(roads, frozenset(entities)) if roads is not None else None
         self.buildings: list[Building] = []
         self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
         """Center and radius of each building in plan view [m]."""
