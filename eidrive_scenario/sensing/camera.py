@@ -1,26 +1,196 @@
-"""Camera sensor."""
+"""Camera sensor: lens (pinhole with the distortion of Brown and Conrady), exposure, noise, tone mapping."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from functools import partial
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass
+from functools import cache, lru_cache, partial
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.content_digest import content_digest
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.imaging import Optics, develop, lens_of, meter_exposure
+from eidrive_scenario.rendering.tone_mapping import tone_map, white_level
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
-from eidrive_scenario.sensing.readings import CameraReading, Exposure
+from eidrive_scenario.sensing.readings import CameraReading, DeferredImage
 from eidrive_scenario.sensing.sensor import Scene, Sensor
-from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
+from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.camera import CameraImage, Radiance, UndrawnImage
+from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance, UndrawnImage
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
+
+
+class _Distortion(NamedTuple):
+    """Pinhole camera of the undistorted image, and positions of the distorted pixels in it (centers at integers)."""
+
+    straight: Pinhole
+    x: Floats
+    y: Floats
+
+
+def lens_of(settings: CameraSettings) -> Pinhole:
+    """Return the camera without its distortion."""
+    fov = math.radians(settings.fov)
+    return Pinhole.of_fov(settings.width, settings.height, fov, settings.near, settings.far)
+
+
+class Optics:
+    """Distortion of an undistorted image with a sufficiently large field of view."""
+
+    def __init__(self, settings: CameraSettings) -> None:
+        self._distortion = _distortion(settings) if any(settings.distortion) else None
+        self._supersampling = settings.supersampling
+        straight = lens_of(settings) if self._distortion is None else self._distortion.straight
+        self.pinhole = straight.finer(self._supersampling)
+        """Camera of the image that `distort` expects."""
+
+    def distort(self, radiance: Radiance) -> Radiance:
+        """Return the image of the lens; depth and segmentation are those of the nearest ray, not interpolated."""
+
+        import cv2
+
+        luminance: Any
+        luminance, depth, segmentation = radiance
+        if self._supersampling > 1:
+            size = (self.pinhole.width // self._supersampling, self.pinhole.height // self._supersampling)
+            luminance = cv2.resize(luminance, size, interpolation=cv2.INTER_AREA)
+            middle = slice(self._supersampling // 2, None, self._supersampling)
+            depth, segmentation = depth[middle, middle], segmentation[middle, middle]
+        if self._distortion is not None:
+            x, y = self._distortion.x, self._distortion.y
+            luminance = cv2.remap(luminance, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            row, column = np.rint(y).astype(np.intp), np.rint(x).astype(np.intp)
+            depth, segmentation = depth[row, column], segmentation[row, column]
+        return Radiance(luminance, depth, segmentation)
+
+
+@lru_cache(maxsize=32)
+def _distortion(settings: CameraSettings) -> _Distortion:
+    """Return the direction of each pixel center, found by iteration to 1e-9.
+
+    Raise SettingError if the iteration does not converge, as with strong coefficients that compensate each other.
+    """
+
+    import cv2
+
+    lens = lens_of(settings)
+    columns, rows = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
+    until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
+    same = np.eye(3)
+    found = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
+    rays = np.asarray(found, dtype=float)[:, 0]
+    _check_convergence(rays, pixels[:, 0], lens, settings)
+    low, high = rays.min(axis=0) * lens.focal - 1.0, rays.max(axis=0) * lens.focal + 1.0
+    (left, top), (right, bottom) = np.floor(low), np.ceil(high)
+    straight = Pinhole(int(right - left), int(bottom - top), lens.focal, -left, -top, lens.near, lens.far)
+    places = (rays * lens.focal - (left, top) - 0.5).astype(np.float32).reshape(lens.height, lens.width, 2)
+    return _Distortion(straight, np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1]))
+
+
+def _check_convergence(rays: Array, pixels: Array, lens: Pinhole, settings: CameraSettings) -> None:
+    """Raise SettingError unless each direction (N, 2) projects within a tenth of a pixel of its position (N, 2)."""
+
+    import cv2
+
+    along = np.column_stack([rays, np.ones(len(rays))])
+    none = np.zeros(3)
+    projected = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]
+    if not np.abs(projected - pixels).max() < 0.1:
+        what = f"distortion: the coefficients cannot be inverted (got {list(settings.distortion)})"
+        raise SettingError(Diagnostic(what, "use smaller coefficients or a smaller fov"))
+
+
+LENS = 0.65
+"""H = 0.65 L t / N²: exposure [lx s] behind a lens of f-number N for a luminance L [cd/m²] (ISO 12232)."""
+SATURATION = 78.0
+"""H_sat = 78 / S: exposure that saturates a sensor of speed S [lx s] (ISO 12232)."""
+BASE_SPEED = 100.0
+"""Speed of the sensor at a gain of 0 dB."""
+_BLOCK_SIZE = 49_152
+"""Number of values per block, which fit into the processor cache; a multiple of four."""
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Exposure time [s], gain [dB], and the luminance at saturation [cd/m²]."""
+
+    time: float
+    gain: float
+    saturation: float
+
+
+def meter_exposure(luminance: Floats, settings: CameraSettings) -> Exposure:
+    """Return the exposure of an image (H, W, 3) [cd/m²]: fixed settings, and an ideal meter for the others.
+
+    The meter increases time first, then gain, up to their limits.
+    """
+    optics = SATURATION / BASE_SPEED * settings.f_number**2 / LENS
+    time, gain = settings.exposure_time, settings.gain
+    if time is None or gain is None:
+        required = optics / white_level(luminance)
+        if time is None:
+            time = min(required / (1.0 if gain is None else _linear(gain)), settings.max_exposure_time)
+        if gain is None:
+            gain = min(max(20.0 * math.log10(required / time), 0.0), settings.max_gain)
+    return Exposure(time, gain, optics / (time * _linear(gain)))
+
+
+def develop(
+    luminance: Floats, exposure: Exposure, noise: NoiseSettings | None, draws: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Return the image (H, W, 3) of luminance (H, W, 3) [cd/m²]; values above saturation are clipped.
+
+    Noise is the linear model of EMVA 1288 (release 4.0): for a mean of n electrons, the variance is n + read noise²;
+    gain reduces the electrons of full scale. Electrons are drawn from a normal distribution, one value per channel.
+    """
+    image = np.empty(luminance.shape, dtype=np.uint8)
+    light, values = luminance.reshape(-1), image.reshape(-1)
+    for start in range(0, len(light), _BLOCK_SIZE):
+        part = slice(start, start + _BLOCK_SIZE)
+        signal = light[part] * np.float32(1.0 / exposure.saturation)
+        if noise is not None:
+            signal += noise_of(signal, exposure, noise, draws)
+        values[part] = tone_map(signal)
+    return image
+
+
+def noise_of(signal: Floats, exposure: Exposure, noise: NoiseSettings, draws: np.random.Generator) -> Floats:
+    """Return the noise of a signal; both as shares of full scale."""
+    well = noise.full_well / _linear(exposure.gain)
+    deviation: Floats = np.maximum(signal, np.float32(0.0))
+    deviation *= np.float32(1.0 / well)
+    deviation += np.float32((noise.read_noise / well) ** 2)
+    np.sqrt(deviation, out=deviation)
+    # Each value of the generator contains four numbers of 16 bits.
+    raw: NDArray[np.uint64] = draws.bit_generator.random_raw(-(-signal.size // 4))
+    deviation *= _normal_values(1 << 16).take(raw.view(np.uint16)[: signal.size]).reshape(signal.shape)
+    return deviation
+
+
+@cache
+def _normal_values(count: int) -> Floats:
+    """Return equally likely values of the standard normal distribution.
+
+    Drawing from them is four times as fast as drawing normal values.
+    """
+    from scipy.special import ndtri
+
+    numbers = ndtri((np.arange(count) + 0.5) / count)
+    found: Floats = (numbers / numbers.std()).astype(np.float32)
+    return found
+
+
+def _linear(gain: float) -> float:
+    return float(10.0 ** (gain / 20.0))
+
 
 DROPS_STAY = 2.0
 """Time that drops stay on a lens before others replace them [s]."""
@@ -62,12 +232,12 @@ class Camera(Sensor):
             (*self._key, view.tick),
             (*self._key, "lens", int(view.time / DROPS_STAY)),
         )
-        exposure = Exposure(
+        image = DeferredImage(
             (self.settings.width, self.settings.height),
             partial(_expose, sensor, undrawn, conditions),
             lambda: content_digest(undrawn.digest, conditions),
         )
-        return CameraReading.of(exposure, sensor.intrinsics, pose, np.array(self.settings.distortion))
+        return CameraReading.of(image, sensor.intrinsics, pose, np.array(self.settings.distortion))
 
 
 class _Conditions(NamedTuple):

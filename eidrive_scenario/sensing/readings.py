@@ -49,7 +49,7 @@ class TruthReading(msgspec.Struct, frozen=True, gc=False):
     visibility: Array
 
 
-class Exposure:
+class DeferredImage:
     """Image of a camera that is drawn when its pixels are read.
 
     size    width and height [px]
@@ -101,12 +101,12 @@ class CameraReading:
         distortion: Array | None = None,
     ) -> None:
         image = CameraImage(rgb, depth, segmentation)
-        self._exposure = Exposure((rgb.shape[1], rgb.shape[0]), lambda: image)
+        self._exposure = DeferredImage((rgb.shape[1], rgb.shape[0]), lambda: image)
         self.intrinsics, self.pose = intrinsics, pose
         self.distortion: Array = np.zeros(5) if distortion is None else distortion
 
     @classmethod
-    def of(cls, exposure: Exposure, intrinsics: Array, pose: Array, distortion: Array) -> CameraReading:
+    def of(cls, exposure: DeferredImage, intrinsics: Array, pose: Array, distortion: Array) -> CameraReading:
         """Return a reading whose image is drawn when its pixels are read."""
         found = cls.__new__(cls)
         found._exposure = exposure

@@ -1,10 +1,15 @@
-"""Static bodies: ground, roads, buildings, road objects; what worlds on the same roads share of them."""
+"""Static bodies: ground, roads, buildings, road objects; what worlds on the same roads share of them.
+
+Road objects are merged into a few triangle meshes: each body slows down the steps of pybullet, and a road may have ten
+thousand posts.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -22,8 +27,197 @@ from eidrive_scenario.world.physics.bullet import (
     create_triangle_shape,
     quaternion,
 )
-from eidrive_scenario.world.physics.obstacles import MAX_FACES, Box, Obstacles, SpatialGrid, grid_cells
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
+
+Thing = TypeVar("Thing")
+Cell = tuple[int, int]
+
+SQUARE = 10.0
+"""Side of a cell [m]."""
+_FAR = 300.0
+"""Reach from which on the occupied cells are searched instead of all cells in reach [m]: steps of many seconds."""
+
+
+class SpatialGrid(Generic[Thing]):
+    """Static objects, each in the cells that it may overlap."""
+
+    def __init__(self) -> None:
+        self._in_cell: dict[Cell, list[Thing]] = {}
+
+    def add(self, thing: Thing, cells: Iterable[Cell]) -> None:
+        """Add an object to these cells."""
+        for cell in dict.fromkeys(cells):
+            self._in_cell.setdefault(cell, []).append(thing)
+
+    def query(self, x: float, y: float, reach: float) -> list[Thing]:
+        """Return the objects in the cells within reach of a point [m], possibly with duplicates."""
+        found: list[Thing] = []
+        if reach > _FAR:
+            side = reach + SQUARE
+            for (column, line), things in self._in_cell.items():
+                if abs((column + 0.5) * SQUARE - x) <= side and abs((line + 0.5) * SQUARE - y) <= side:
+                    found += things
+        elif self._in_cell:
+            for cell in grid_cells(x, y, reach):
+                if cell in self._in_cell:
+                    found += self._in_cell[cell]
+        return found
+
+
+def grid_cells(x: float, y: float, reach: float) -> list[Cell]:
+    """Return the cells that overlap the square around a point with half the side `reach` [m]."""
+    left, right = math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE)
+    low, high = math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE)
+    if left == right and low == high:
+        return [(left, low)]
+    return [(column, line) for column in range(left, right + 1) for line in range(low, high + 1)]
+
+
+MAX_FACES = 20_000
+"""Maximum number of faces of a collision shape; pybullet rejects much larger ones."""
+FOLIAGE = 0.8
+"""Share of the extents of a crown or bush that is opaque."""
+CROWN = 0.3
+"""Height of the lower end of a crown as a share of the height of the tree."""
+_SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
+_FACES = np.array(
+    [(0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6),
+     (3, 0, 4), (3, 4, 7)]
+)  # fmt: skip
+"""Faces of a box: four corners of the bottom, then four of the top."""
+
+
+class Obstacles:
+    """Road objects with a body."""
+
+    def __init__(self, road_objects: Sequence[RoadObjectBody]) -> None:
+        solid = [piece for piece in road_objects if piece.solid]
+        self._solid = _merged_rails(solid)
+        self._solid_boxes = [box for piece in self._solid for box in _solid_boxes(piece)]
+        self._soft_boxes = [_foliage(piece) for piece in road_objects if piece.kind in ("tree", "vegetation")]
+        self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
+        self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
+        for piece in self._solid:
+            self._nearby.add(piece, _cells(piece))
+
+    @property
+    def boxes(self) -> list[Box]:
+        """Boxes of all bodies."""
+        return [*self._solid_boxes, *self._soft_boxes]
+
+    def raise_bodies(self, client: int) -> list[int]:
+        """Create the bodies in pybullet and return their handles."""
+        solid = _meshes(client, self._solid_boxes, STATIC, RAYS | DRIVEN)
+        return [*solid, *_meshes(client, self._soft_boxes, TERRAIN, RAYS)]
+
+    def clearance(self, x: float, y: float, most: float) -> float:
+        """Return the distance of a point from the nearest solid object, at most `most` [m]."""
+        return min([_gap(piece, x, y) for piece in self._nearby.query(x, y, most)], default=most)
+
+    def name_at(self, x: float, y: float) -> str:
+        """Return the name of the object at a point of contact."""
+        gaps = [
+            (_gap(self._solid[row], x, y), row)
+            for row in np.flatnonzero(np.abs(self._where - (x, y)).max(axis=1) < 60.0).tolist()
+        ]
+        return self._solid[min(gaps)[1]].name if gaps else "obstacle"
+
+
+def _merged_rails(solid: Sequence[RoadObjectBody]) -> list[RoadObjectBody]:
+    """Return the bodies with collinear consecutive parts of a rail or barrier merged."""
+    whole: list[RoadObjectBody] = []
+    for piece in solid:
+        before = whole[-1] if whole else None
+        if (
+            before is not None
+            and not piece.radius
+            and piece[:2] == before[:2]
+            and (piece.width, piece.height, piece.pose.z) == (before.width, before.height, before.pose.z)
+            and abs(piece.pose.h - before.pose.h) < 1e-3
+            and _follows(before, piece)
+        ):
+            length = before.length + piece.length
+            share = before.length / length
+            x, y = (share * a + (1 - share) * b for a, b in zip(before.pose[:2], piece.pose[:2], strict=True))
+            whole[-1] = before._replace(pose=before.pose._replace(x=x, y=y), length=length)
+        else:
+            whole.append(piece)
+    return whole
+
+
+def _follows(before: RoadObjectBody, piece: RoadObjectBody) -> bool:
+    """Return whether a part starts at the end of its predecessor."""
+    step = (before.length + piece.length) / 2
+    cos, sin = math.cos(before.pose.h), math.sin(before.pose.h)
+    dx, dy = piece.pose.x - before.pose.x - step * cos, piece.pose.y - before.pose.y - step * sin
+    return math.hypot(dx, dy) < 0.05 and before.length < 200.0
+
+
+Box = tuple[float, float, float, float, float, float, float]
+"""Center of the bottom x, y, z, length, width, height [m], heading [rad]."""
+
+
+def _solid_boxes(piece: RoadObjectBody) -> Iterator[Box]:
+    x, y, z, h = piece.pose[:4]
+    if piece.kind == "gantry":
+        cos, sin = math.cos(h), math.sin(h)
+        for side in (-piece.width / 2, piece.width / 2):
+            yield x - sin * side, y + cos * side, z, 0.3, 0.3, piece.height, h
+        yield x, y, z + piece.height - 0.6, 0.3, piece.width, 0.6, h
+    elif piece.radius:
+        # A square as large as the circle.
+        side = math.sqrt(math.pi) * piece.radius
+        yield x, y, z, side, side, piece.height, h
+    else:
+        yield x, y, z, piece.length, piece.width, piece.height, h
+
+
+def _foliage(piece: RoadObjectBody) -> Box:
+    x, y, z, h = piece.pose[:4]
+    low = CROWN * piece.height if piece.kind == "tree" else 0.0
+    return x, y, z + low, FOLIAGE * piece.length, FOLIAGE * piece.width, piece.height - low, h
+
+
+def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterator[int]:
+    for start in range(0, len(boxes), MAX_FACES // len(_FACES)):
+        table = np.array(boxes[start : start + MAX_FACES // len(_FACES)])
+        vertices = _corners(table)
+        faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
+        shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
+        yield create_static_body(client, shape, group, meets)
+
+
+def _corners(boxes: Array) -> Array:
+    """Return the corners (N, 8, 3) of boxes (N, 7)."""
+    along, lateral = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
+    cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
+    x, y = boxes[:, 0:1] + cos * along - sin * lateral, boxes[:, 1:2] + sin * along + cos * lateral
+    low = np.stack([x, y, np.broadcast_to(boxes[:, 2:3], x.shape)], axis=2)
+    return np.concatenate([low, low + boxes[:, None, 5:6] * (0.0, 0.0, 1.0)], axis=1)
+
+
+def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
+    """Yield the grid cells that a body may overlap."""
+    steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
+    cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
+    dx, dy = (cos, sin) if piece.length >= piece.width else (-sin, cos)
+    extent, side = max(piece.length, piece.width), min(piece.length, piece.width) / 2
+    for step in range(steps + 1):
+        at = (step / steps - 0.5) * extent
+        x, y = piece.pose.x + at * dx, piece.pose.y + at * dy
+        for ox, oy in ((-side, -side), (side, -side), (side, side), (-side, side)):
+            yield math.floor((x + ox) / SQUARE), math.floor((y + oy) / SQUARE)
+
+
+def _gap(piece: RoadObjectBody, x: float, y: float) -> float:
+    """Return the distance of a point outside of a body [m]."""
+    dx, dy = x - piece.pose.x, y - piece.pose.y
+    if piece.radius:
+        return max(math.hypot(dx, dy) - piece.radius, 0.0)
+    cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
+    along, lateral = abs(cos * dx + sin * dy), abs(cos * dy - sin * dx)
+    return math.hypot(max(along - piece.length / 2, 0.0), max(lateral - piece.width / 2, 0.0))
+
 
 _SPACING = 4.0
 """Distance of the points of the ground along a road [m]."""

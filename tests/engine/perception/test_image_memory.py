@@ -18,7 +18,7 @@ from eidrive_scenario.perception.learned.image_memory import ImageMemory, Recent
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.rendering.renderer import ImageContent, Renderer
-from eidrive_scenario.sensing.readings import CameraReading, EgoState, Exposure, LidarReading, Readings
+from eidrive_scenario.sensing.readings import CameraReading, DeferredImage, EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.camera import CameraImage, Radiance
 
@@ -99,13 +99,13 @@ def test_runs_with_the_memory_have_the_same_trace() -> None:
     assert len(held.images) == stored
 
 
-def some_exposure(number: int) -> Exposure:
+def undrawn_image(number: int) -> DeferredImage:
     """Return an image that is never drawn, with the digest of its number."""
 
     def draw() -> CameraImage:
         raise AssertionError("no pixel is needed")
 
-    return Exposure((64, 48), draw, lambda: content_digest(number))
+    return DeferredImage((64, 48), draw, lambda: content_digest(number))
 
 
 def readings_of(
@@ -121,7 +121,7 @@ def readings_of(
     values = {"points": np.ones((3, 3)), "intensity": np.ones(3), "pose": np.eye(4), "ring": np.zeros(3, np.int32)}
     cloud = LidarReading(**{**values, "azimuth": np.zeros(3), **(lidar or {})})
     ego = EgoState(time, np.array([0.0, 0.0, height]), 0.0, 0.0, 0.0, 5.0, 0.0, 0.0)
-    return Readings(time, ego, None, {"front": CameraReading.of(some_exposure(number), **front)}, {"top": cloud})
+    return Readings(time, ego, None, {"front": CameraReading.of(undrawn_image(number), **front)}, {"top": cloud})
 
 
 OTHER_READINGS = [

@@ -13,12 +13,13 @@ from pydantic import ValidationError
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
-from eidrive_scenario.sensing.camera import Camera, ImageSensor
-from eidrive_scenario.sensing.imaging import (
+from eidrive_scenario.sensing.camera import (
     BASE_SPEED,
     LENS,
     SATURATION,
+    Camera,
     Exposure,
+    ImageSensor,
     Optics,
     develop,
     lens_of,

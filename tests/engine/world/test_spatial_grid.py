@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eidrive_scenario.world.physics.obstacles import SpatialGrid, grid_cells
+from eidrive_scenario.world.physics.scenery import SpatialGrid, grid_cells
 
 
 @pytest.fixture
