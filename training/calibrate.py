@@ -28,7 +28,7 @@ from eidrive_scenario.perception.learned.weights import DESCRIPTION
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
-from eidrive_scenario.sensing.mounting import mounting
+from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement

@@ -15,9 +15,9 @@ from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
+from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world import World

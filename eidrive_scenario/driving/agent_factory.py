@@ -24,8 +24,8 @@ from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerSettings
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.mounting import view_sectors
 from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.sensor import view_sectors
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder

@@ -14,7 +14,7 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.geometry import points_of_boxes
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.crossing import crossing
-from eidrive_scenario.sensing.mounting import ABOVE_ROOF
+from eidrive_scenario.sensing.sensor import ABOVE_ROOF
 from eidrive_scenario.sensing.truth import SAMPLES
 from eidrive_scenario.world.road_objects import buildings, road_object_bodies
 from eidrive_scenario.world.view import WorldView

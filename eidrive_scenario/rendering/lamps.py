@@ -110,7 +110,8 @@ CUT_OFF = -0.0100
 """Tangent of the angle of the cut-off: 1 % below the horizon."""
 ABOVE_CUT_OFF = 350.0
 """Luminous intensity above the cut-off [cd]. The regulation permits 625 cd to oncoming drivers (B50L: 350 cd)."""
-_WARM = (1.06, 1.0, 0.82)
+LAMP_COLOR: Floats = np.array([1.06, 1.0, 0.82], dtype=np.float32)
+"""Color of the light of headlamps, linear sRGB."""
 
 
 class Beam(NamedTuple):
@@ -211,11 +212,6 @@ def intensity(aside: Array, above: Array, high: bool) -> Array:
     if high:
         found = found + HIGH_BEAM * np.exp(-((aside / 0.12) ** 2) - (above / 0.06) ** 2)
     return found
-
-
-def lamp_color() -> Floats:
-    """Return the color of the light, linear sRGB."""
-    return np.array(_WARM, dtype=np.float32)
 
 
 _BESIDE_THE_CAMERA = 4.0

@@ -220,6 +220,7 @@ def _scatter(triangle: NDArray[np.int32], near: Floats, few: _Lines, top: int, l
     first = int(few.line.min())
     rows = slice(first - top, int(few.line.max()) + 1 - top)
     triangle, near = triangle[rows], near[rows]
+    # Bits of positive floats are ordered as their values: nearness above the triangle in one key, and the largest wins.
     held = near.view(np.uint32).astype(np.uint64)
     held <<= _SHIFT
     held |= (triangle + 1).astype(np.uint64)

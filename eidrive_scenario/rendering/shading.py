@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.rendering.daylight import GROUND_ALBEDO, Daylight, sample
-from eidrive_scenario.rendering.lamps import Lamplight, lamp_color
+from eidrive_scenario.rendering.lamps import LAMP_COLOR, Lamplight
 from eidrive_scenario.rendering.materials import GRAIN, MIRROR, RETURNS, SOAKS
 from eidrive_scenario.rendering.projection import CameraView, Pixels, Surfaces
 from eidrive_scenario.rendering.rasterization import Cover
@@ -127,7 +127,7 @@ def shade(
         shone = lamplight.received * np.float32(1.0 / math.pi) + lamplight.across * RETURNS[finish]
         lamp_lit = np.flatnonzero(shone)
         albedo = among.surfaces.albedo.take(triangle[lamp_lit], axis=1)
-        luminance[:, lamp_lit] += albedo * shone[lamp_lit] * lamp_color()[:, None]
+        luminance[:, lamp_lit] += albedo * shone[lamp_lit] * LAMP_COLOR[:, None]
     _add_grain(luminance, points, finish, at)
     _add_mirrors(luminance, points, among.surfaces, at, lit)
     return luminance

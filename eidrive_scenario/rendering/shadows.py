@@ -268,6 +268,7 @@ def _dim(
     rows, dx, dy = rows[level], x[level] - np.float32(middle[0]), y[level] - np.float32(middle[1])
     half = body.model.half
     cos, sin = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
+    # Distance from the rectangle below the body, negative inside
     ahead = np.abs(cos * dx + sin * dy) - np.float32(half[0])
     aside = np.abs(cos * dy - sin * dx) - np.float32(half[1])
     inwards = np.minimum(np.maximum(ahead, aside), np.float32(0.0))

@@ -145,6 +145,7 @@ def mirrored(
     v = (x * down[0] + y * down[1] + z * down[2]) * scale + np.float32(pinhole.center_y)
     inside = np.flatnonzero((u >= 0) & (u < pinhole.width) & (v >= 0) & (v < pinhole.height) & (depth > 0.3))
     target = v[inside].astype(np.int64) * pinhole.width + u[inside].astype(np.int64)
+    # The nearest point of each pixel wins: nearness above the index in one key, as in `rasterization`.
     key = (np.float32(1.0) / depth[inside]).view(np.uint32).astype(np.uint64) << np.uint64(32)
     key |= (inside + 1).astype(np.uint64)
     held = np.zeros(pinhole.width * pinhole.height, dtype=np.uint64)

@@ -16,10 +16,9 @@ from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering.tone_mapping import tone_map, white_level
-from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading, DeferredImage
-from eidrive_scenario.sensing.sensor import Scene, Sensor
+from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance, UndrawnImage

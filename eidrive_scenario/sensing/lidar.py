@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.crossing import crossing, starts_behind_bodies, turned
-from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
-from eidrive_scenario.sensing.sensor import Scene, Sensor
+from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import NOTHING, WorldView
@@ -114,6 +113,8 @@ def returns(
     if air > 0.0:
         ranges, soft = _air(round(fade, 9), round(BACKSCATTER * air / CONTRAST, 12))
         shape = UNEVEN[weather.precipitation]
+        # The distance in the air is drawn by the power from there. The air is measured if it is before the surface,
+        # and stronger than the surface and the minimum of the receiver.
         strength = draws.gamma(shape, 1.0 / shape, len(distance))
         place = ranges[np.searchsorted(np.cumsum(soft) / soft.sum(), draws.random(len(distance)))]
         peak = float(soft.max()) * strength

@@ -10,9 +10,8 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.sensing.crossing import starts_behind_bodies
-from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import SignalReading
-from eidrive_scenario.sensing.sensor import Scene
+from eidrive_scenario.sensing.sensor import Scene, mounting
 from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.road_objects import signal_heads

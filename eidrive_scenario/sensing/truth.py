@@ -11,9 +11,8 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import BOX_SAMPLES, points_of_boxes
 from eidrive_scenario.sensing.crossing import few_ray_starts, starts_behind_bodies, turned
-from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
-from eidrive_scenario.sensing.sensor import Point, Scene, Sensor
+from eidrive_scenario.sensing.sensor import Point, Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import SensorSettings, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import NOTHING, WorldView

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
+from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
 from eidrive_scenario.world.physics.bullet import (
     BODY_FRICTION,
     DRIVEN,
@@ -312,10 +312,6 @@ class DrivenBody(Body):
         self.velocity = self.velocity_before = self._along_heading(placement.speed)
         self._motion = (self.velocity[0], self.velocity[1], 0.0)
         self.moved = self.stale = True
-
-    def demand(self, control: Control, friction: float) -> Demand:
-        """Return the forces and the steering that a control requests for the steps of this tick."""
-        return self.track.demand(control, friction, self.pitch)
 
     def drive(self, demand: Demand) -> None:
         """Set the velocity of the rigid body for the next physics step."""

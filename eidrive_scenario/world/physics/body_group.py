@@ -57,6 +57,7 @@ class Footprints(NamedTuple):
         x, y, radius, moved = self.x, self.y, self.radius, self.moved
         order = np.argsort(x, kind="stable")
         sorted_x = x[order]
+        # A footprint is paired with its followers in x up to the last one that the largest circle can reach.
         last = sorted_x.searchsorted(sorted_x + radius[order] + radius.max() + gap, side="right")
         counts = last - np.arange(len(x)) - 1
         left = np.arange(len(x)).repeat(counts)
@@ -73,6 +74,7 @@ class Footprints(NamedTuple):
         rows = np.stack([first, second])
         x, y, cos, sin, half_length, half_width = (column[rows] for column in self[:6])
         dx, dy = x[1] - x[0], y[1] - y[0]
+        # Separating axes: the distance of the centers along each axis exceeds both half extents projected on it.
         turn_cos, turn_sin = abs(cos[0] * cos[1] + sin[0] * sin[1]), abs(cos[0] * sin[1] - sin[0] * cos[1])
         along = abs(dx * cos + dy * sin) - half_length - turn_cos * half_length[::-1] - turn_sin * half_width[::-1]
         across = abs(dy * cos - dx * sin) - half_width - turn_sin * half_length[::-1] - turn_cos * half_width[::-1]
@@ -221,11 +223,13 @@ class BodyBatch(BodyGroup):
         velocity = _along_heading(speed, cos, sin, pitch, pitched)
         sideways = np.flatnonzero(across & ~teleports)
         if len(sideways):
+            # Velocity by the covered distance, with its part along the heading replaced by the given speed
             covered = (after[sideways, :3] - pose[sideways, :3]) / dt
             ahead = _along_heading(np.ones(len(cos)), cos, sin, pitch, pitched)[sideways]
             vx, vy, vz = (covered * ahead).T
             excess = speed[sideways] - (vx + vy + vz)
             velocity[sideways] = covered + excess[:, None] * ahead
+        # Teleports start at rest from their new pose; bodies that stay keep all values of the step before.
         moved = (pose != after).any(axis=1)
         acceleration = (velocity - old_velocity) / dt
         yaw_rate = np.where(yaw != pose[:, 3], wrap_angle(yaw - pose[:, 3]) / dt, 0.0)

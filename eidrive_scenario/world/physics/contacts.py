@@ -144,7 +144,7 @@ class ContactTracker:
                 continue
             self._touching[pair] = None
             if frozenset(pair) not in self._couplings.pairs:
-                speed = relative_speed(first.velocity_before, second.velocity_before)
+                speed = math.dist(first.velocity_before, second.velocity_before)
                 begun.append(Contact(*pair, _shared_point(first, second), speed))
         for pair, touch in touches.items():
             if pair not in self._touching:
@@ -163,8 +163,3 @@ def _shared_point(first: Body, second: Body) -> Vector3:
     top = min(boxes[0, 2] + boxes[0, 5] / 2, boxes[1, 2] + boxes[1, 5] / 2)
     middle = points.mean(axis=0) if len(points) else boxes[:, :3].mean(axis=0)
     return float(middle[0]), float(middle[1]), float((bottom + top) / 2)
-
-
-def relative_speed(first: Vector3, second: Vector3) -> float:
-    """Return the magnitude of the difference of two velocities [m/s]."""
-    return math.dist(first, second)

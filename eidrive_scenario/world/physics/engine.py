@@ -12,7 +12,7 @@ from eidrive_scenario.world.actor import Control, Vector3
 from eidrive_scenario.world.physics.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.physics.body_group import BodyGroup
 from eidrive_scenario.world.physics.bullet import bullet
-from eidrive_scenario.world.physics.contacts import Touch, Touches, relative_speed
+from eidrive_scenario.world.physics.contacts import Touch, Touches
 from eidrive_scenario.world.physics.dynamics import Demand
 from eidrive_scenario.world.physics.scenery import Scenery
 
@@ -23,12 +23,8 @@ _MAX_ACCELERATION = 20.0
 """Maximum acceleration of any part of a vehicle without a collision [m/s²]."""
 _MARGIN = 0.1
 """Maximum distance of bodies that pybullet processes [m]: more than twice its collision margin of 4 cm."""
-
-
 _AHEAD = 5.0
 """Additional radius of the search for obstacles around a body, so that it is not repeated in each tick [m]."""
-
-
 MAX_TICK = 100.0
 """Maximum length of a tick [s], as all its physics steps are computed in one call."""
 
@@ -98,7 +94,9 @@ class Physics:
         self.changed()
         if not driven:
             return {}
-        demands = {name: body.demand(controls.get(name, _ROLL), friction) for name, body in driven.items()}
+        demands = {
+            name: body.track.demand(controls.get(name, _ROLL), friction, body.pitch) for name, body in driven.items()
+        }
         passing, watched = self._within_reach(bodies, driven)
         touches: Touches = {}
         if watched:
@@ -201,11 +199,11 @@ class Physics:
                 continue
             handle = second if first == body.handle else first
             if handle not in owners:
-                speed = relative_speed(before[body.handle], (0.0, 0.0, 0.0))
+                speed = math.dist(before[body.handle], (0.0, 0.0, 0.0))
                 touches.setdefault((body.name, self._scenery.name_of(handle, position)), Touch(position, speed))
                 continue
             row, other = owners[handle]
             pair = (body.name, other.name) if owners[body.handle][0] < row else (other.name, body.name)
             if pair not in touches:
-                speed = relative_speed(before[body.handle], before.get(handle, other.velocity))
+                speed = math.dist(before[body.handle], before.get(handle, other.velocity))
                 touches[pair] = Touch(position, speed)

@@ -46,6 +46,7 @@ def _nearest_and_highest(apex: Array, circles: Array) -> tuple[Array, Array]:
     away = np.hypot(x, y)
     half = np.where(away > radius, np.arcsin(np.minimum(radius / np.maximum(away, radius), 1.0)), math.pi)
     center, scale = np.arctan2(y, x) + math.pi, _BINS / (2.0 * math.pi)
+    # Each circle covers the bins of the angles between its tangents, and one more on both sides for rounding.
     first = np.floor((center - half) * scale).astype(np.int64) - 1
     count = np.minimum(np.floor((center + half) * scale).astype(np.int64) + 2 - first, _BINS)
     of = np.arange(len(count)).repeat(count)

@@ -43,6 +43,7 @@ def cast_rays(
         length = np.linalg.norm(targets - origins, axis=1)
         step = np.full(len(rows), _STEP_IN)
         for _ in range(_STEPS * len(passed)):
+            # Rays that hit a skipped body continue a step behind the hit; fractions stay those of the whole ray.
             again = np.flatnonzero(np.isin(rows, passed))
             if not len(again):
                 break
@@ -219,6 +220,7 @@ def _near(begins: Array, ends: Array, circles: Array) -> tuple[Integers, Integer
         some = high[start : start + step]
         center_x, center_y, radius, top = circles[:, some, None]
         px, py, reach = center_x - x, center_y - y, radius + _MARGIN
+        # The point of the line that is nearest to the center, then the part of the line inside the circle
         share = ((px * dx + py * dy) / square).clip(0.0, 1.0)
         circle, line = np.nonzero((px - share * dx) ** 2 + (py - share * dy) ** 2 <= reach * reach)
         half, share = reach[circle, 0] / np.sqrt(square[line]), share[circle, line]

@@ -275,6 +275,7 @@ def covering_circles(boxes: Sequence[Box]) -> Array:
     x, y, bottom, length, width, height, yaw = np.reshape(boxes, (-1, 7)).T
     long, wide = np.maximum(length, width), np.minimum(length, width)
     yaw = np.where(length >= width, yaw, yaw + np.pi / 2.0)
+    # A box is cut along its longer side into parts that are about as long as wide, each with its circle.
     count = np.ceil(long / np.maximum(wide, _SHORTEST)).clip(1.0).astype(int)
     of = np.arange(len(count)).repeat(count)
     number = np.arange(len(of)) - (np.cumsum(count) - count)[of]

@@ -13,21 +13,6 @@ from eidrive_scenario.world.actor import ActorSpec
 GRAVITY = 9.81
 """Acceleration of gravity [m/s²]."""
 
-PROPERTIES = (
-    "power",
-    "drag_area",
-    "rolling_resistance",
-    "tire_friction",
-    "cornering_stiffness_front",
-    "cornering_stiffness_rear",
-    "weight_front",
-    "drive_front",
-    "yaw_inertia",
-    "steering_rate",
-    "steering_ratio",
-)
-"""Properties of a Vehicle that `VehicleParameters.of` reads; all are optional numbers."""
-
 
 class TrackAxle(NamedTuple):
     """Axle of a vehicle with more than two axles."""

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 from pydantic import ValidationError
 
 from eidrive_scenario.sensing.lidar import Lidar
-from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 from eidrive_scenario.world.camera import Pinhole
 

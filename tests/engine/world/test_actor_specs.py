@@ -12,10 +12,23 @@ from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.world.physics.vehicle_parameters import PROPERTIES, VehicleParameters
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 from eidrive_scenario.world.specs import COLOR_PROPERTY, SHAPE_PROPERTY, SHAPES, actor_spec
 
 CATALOGS = Path(__file__).parents[3] / "xosc" / "catalogs"
+PROPERTIES = (
+    "power",
+    "drag_area",
+    "rolling_resistance",
+    "tire_friction",
+    "cornering_stiffness_front",
+    "cornering_stiffness_rear",
+    "weight_front",
+    "drive_front",
+    "yaw_inertia",
+    "steering_rate",
+    "steering_ratio",
+)
 BODIES_OF_CATEGORIES = "Without it the body follows from category"
 
 
