@@ -14,10 +14,10 @@ from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
 from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.rendering.meshes.signs import sign_face
-from eidrive_scenario.rendering.scene import FIRST_LABEL
 from eidrive_scenario.roads.model.signal_states import lamp_colors, lamps, lit
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.camera import FIRST_SIGNAL_LABEL
 from eidrive_scenario.world.road_objects import SignalHead
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
@@ -123,8 +123,8 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
     """Return the visible traffic lights and stop signs; those that do not face the camera are not readable."""
     found = []
     segmentation = reading.segmentation
-    for number in np.unique(segmentation[segmentation <= FIRST_LABEL]).tolist():
-        head = heads[FIRST_LABEL - number]
+    for number in np.unique(segmentation[segmentation <= FIRST_SIGNAL_LABEL]).tolist():
+        head = heads[FIRST_SIGNAL_LABEL - number]
         name = signal_class(head, states.get(head.signal.id, ""))
         if name is None:
             continue

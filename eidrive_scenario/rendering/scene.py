@@ -26,14 +26,12 @@ from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors, lamps, lit
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 from eidrive_scenario.world.appearance import Appearance
-from eidrive_scenario.world.camera import Pinhole, Radiance, VisibleState
+from eidrive_scenario.world.camera import FIRST_SIGNAL_LABEL, Pinhole, Radiance, VisibleState
 from eidrive_scenario.world.physics.bodies import GroundUnder
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, SignalHead, signal_heads
 from eidrive_scenario.world.view import ActorState
 
-FIRST_LABEL = -10
-"""Segmentation label of the head of the first signal; the next one has -11, and so on."""
 IN_SIGHT = 200.0
 """Maximum distance of drawn signal heads [m]."""
 LAMPS: Mapping[str, Light] = {
@@ -53,7 +51,7 @@ class Roadside:
         self._heads = tuple(heads)
         self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
         self._unlit = [
-            MeshInstance(_head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), place, FIRST_LABEL - row)
+            MeshInstance(_head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), place, FIRST_SIGNAL_LABEL - row)
             for row, (head, place) in enumerate(zip(heads, self._places, strict=True))
         ]
 

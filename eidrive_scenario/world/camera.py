@@ -16,12 +16,15 @@ from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.view import ActorState
 from eidrive_scenario.world.weather import Weather
 
+FIRST_SIGNAL_LABEL = -10
+"""Segmentation label of the head of the first signal; the next one has -11, and so on."""
+
 
 class CameraImage(NamedTuple):
     """Image: rgb (H, W, 3), depth (H, W) along the optical axis [m] with inf for no hit, segmentation (H, W) of rows or
     -1.
 
-    Heads of traffic signals have labels below -1 (see `eidrive_scenario.rendering.scene.FIRST_LABEL`).
+    Heads of traffic signals have labels below -1 (see `World.signal_labels`).
     """
 
     rgb: NDArray[np.uint8]

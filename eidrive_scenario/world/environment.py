@@ -92,10 +92,11 @@ def weather_from_environment(environment: Environment, time: float = 0.0) -> Wea
 
     Angles follow the standard: azimuth of the sun from north (y) over east (x), direction of the wind from x over y.
     """
+    wind = environment.wind_direction
     values: dict[str, Any] = {
         "name": environment.name,
         "friction": min(max(environment.friction, LEAST_FRICTION), 2.0),
-        "wind_direction": _degrees(environment.wind_direction),
+        "wind_direction": math.degrees(wind) if wind is not None else None,
         "wind_speed": min(environment.wind_speed, HURRICANE) if environment.wind_speed is not None else None,
         "visual_range": min(max(environment.fog_range, 1.0), CLEAR) if environment.fog_range is not None else None,
         "cloud_cover": _CLOUDS.get(environment.clouds or ""),
@@ -145,7 +146,3 @@ def _sun(environment: Environment, time: float) -> dict[str, float]:
     elif given is not None:
         found["sun_share"] = max(given, 0.0)
     return found
-
-
-def _degrees(angle: float | None) -> float | None:
-    return math.degrees(angle) if angle is not None else None

@@ -142,7 +142,10 @@ def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Ite
 
 def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
     """Return the heads of standing and hanging signals in the order of the map, without painted ones."""
-    standing = [signal for signal in roads.signals.values() if not _painted(signal)]
+    # Low static signals at the height of the road are painted on it.
+    standing = [
+        signal for signal in roads.signals.values() if signal.dynamic or signal.height >= 0.3 or signal.z_offset >= 1.0
+    ]
     if not standing:
         return []
     poses = [roads.signal_pose(signal) for signal in standing]
@@ -172,10 +175,6 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
     ahead = POST + 0.03 + (0.5 * width if lamps else 0.0)
     x, y = pose.x + ahead * math.cos(pose.h), pose.y + ahead * math.sin(pose.h)
     return SignalHead(signal, pose._replace(x=x, y=y, z=low), width, height, carried)
-
-
-def _painted(signal: Signal) -> bool:
-    return not signal.dynamic and signal.height < 0.3 and signal.z_offset < 1.0
 
 
 def _drivable(roads: RoadNetwork, here: LaneLocation) -> bool:

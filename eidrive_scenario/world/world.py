@@ -15,7 +15,14 @@ from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.appearance import Appearance, hidden_actors
-from eidrive_scenario.world.camera import PictureMaker, Pinhole, Radiance, UndrawnImage, VisibleState
+from eidrive_scenario.world.camera import (
+    FIRST_SIGNAL_LABEL,
+    PictureMaker,
+    Pinhole,
+    Radiance,
+    UndrawnImage,
+    VisibleState,
+)
 from eidrive_scenario.world.physics.bodies import Body, DrivenBody, GroundUnder, ScriptedBody
 from eidrive_scenario.world.physics.body_group import group_bodies
 from eidrive_scenario.world.physics.bullet import connect, disconnect
@@ -24,7 +31,7 @@ from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.free_space import FreeSpace
 from eidrive_scenario.world.physics.rays import Crossings, cast_rays, cast_some, find_crossings, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
-from eidrive_scenario.world.road_objects import Building
+from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.view import FEW, GROUND, NOTHING, Contact, RayHits, WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -193,6 +200,12 @@ class World:
             self._appearances = appearances
             self._unseen, self._unseen_by = hidden_actors(appearances)
             self._view = None
+
+    @property
+    def signal_labels(self) -> Mapping[int, str]:
+        """Labels of the heads of traffic signals in segmentation images, with the ids of the signals."""
+        heads = signal_heads(self._roads) if self._roads is not None else ()
+        return {FIRST_SIGNAL_LABEL - row: head.signal.id for row, head in enumerate(heads)}
 
     def add_building(
         self, name: str, center: Vector3, size: Vector3, yaw: float = 0.0, color: Vector3 | None = None

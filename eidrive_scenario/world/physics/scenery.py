@@ -93,22 +93,17 @@ class Obstacles:
     def __init__(self, road_objects: Sequence[RoadObjectBody]) -> None:
         solid = [piece for piece in road_objects if piece.solid]
         self._solid = _merged_rails(solid)
-        self._solid_boxes = [box for piece in self._solid for box in _solid_boxes(piece)]
-        self._soft_boxes = [_foliage(piece) for piece in road_objects if piece.kind in ("tree", "vegetation")]
+        self.solid_boxes = [box for piece in self._solid for box in _solid_boxes(piece)]
+        self.soft_boxes = [_foliage(piece) for piece in road_objects if piece.kind in ("tree", "vegetation")]
         self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
         self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
         for piece in self._solid:
             self._nearby.add(piece, _cells(piece))
 
-    @property
-    def boxes(self) -> list[Box]:
-        """Boxes of all bodies."""
-        return [*self._solid_boxes, *self._soft_boxes]
-
     def raise_bodies(self, client: int) -> list[int]:
         """Create the bodies in pybullet and return their handles."""
-        solid = _meshes(client, self._solid_boxes, STATIC, RAYS | DRIVEN)
-        return [*solid, *_meshes(client, self._soft_boxes, TERRAIN, RAYS)]
+        solid = _meshes(client, self.solid_boxes, STATIC, RAYS | DRIVEN)
+        return [*solid, *_meshes(client, self.soft_boxes, TERRAIN, RAYS)]
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """Return the distance of a point from the nearest solid object, at most `most` [m]."""
@@ -255,7 +250,9 @@ class RoadScenery:
     @cached_property
     def circles(self) -> Array:
         """Circles (4, K) in plan view that cover all bodies: center x, y, radius, and top of the body [m]."""
-        return covering_circles([*self.obstacles.boxes, *map(standing_box, self.buildings)])
+        return covering_circles(
+            [*self.obstacles.solid_boxes, *self.obstacles.soft_boxes, *map(standing_box, self.buildings)]
+        )
 
     @cached_property
     def ground(self) -> Sequence[tuple[Array, Integers]]:

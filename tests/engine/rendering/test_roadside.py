@@ -25,13 +25,11 @@ from eidrive_scenario.rendering.meshes.signs import (
     sign,
     sign_face,
 )
-from eidrive_scenario.rendering.scene import FIRST_LABEL
 from eidrive_scenario.roads import RoadNetwork, Signal, SignalPlace
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.weather import Weather
 
 SIGNALS = """<signals><signal id="L" name="" s="30" t="-5" zOffset="2" height="0.9" width="0.4" type="1000001"
@@ -49,12 +47,6 @@ def looking(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
     pose[:3, 2] = (math.cos(yaw), math.sin(yaw), 0.0)
     pose[:3, 3] = (x, y, z)
     return pose
-
-
-def signal_labels() -> dict[int, str]:
-    """Return the ids of the signals of STREET by the labels of their heads in segmentation images."""
-    heads = signal_heads(RoadNetwork.parse(STREET))
-    return {FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
 
 
 def picture(world: World, *pose: float) -> Any:
@@ -75,7 +67,7 @@ def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) ->
     while world.time < time - 1e-9:
         world.step({}, {})
     world.set_display_state({signal: state}, {})
-    label = next(label for label, name in signal_labels().items() if name == signal)
+    label = next(label for label, name in world.signal_labels.items() if name == signal)
     shot = picture(world, 22.0, -5.0 if signal == "L" else -7.0, 2.45)
     rows, columns = np.nonzero(shot.segmentation == label)
     count = 3 if signal == "L" else 2
@@ -118,14 +110,14 @@ def test_flashing_lamp_is_dark_half_of_each_second(street: World) -> None:
 
 
 def test_segmentation_separates_signals(street: World) -> None:
-    assert set(signal_labels().values()) == {"L", "P", "S"}
-    assert max(signal_labels()) == -10
+    assert set(street.signal_labels.values()) == {"L", "P", "S"}
+    assert max(street.signal_labels) == -10
     shot = picture(street, 15.0, -3.0, 2.4)
-    assert set(np.unique(shot.segmentation)) == {-1, *signal_labels()}
+    assert set(np.unique(shot.segmentation)) == {-1, *street.signal_labels}
 
 
 def test_back_of_a_sign_is_gray(street: World) -> None:
-    label = next(label for label, name in signal_labels().items() if name == "S")
+    label = next(label for label, name in street.signal_labels.items() if name == "S")
 
     def redness(shot: Any) -> float:
         colors = shot.rgb[shot.segmentation == label].astype(float)
