@@ -22,9 +22,8 @@ from eidrive_scenario.driving.stack import (
     StackInputs,
     StackSettings,
 )
-from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
+from eidrive_scenario.driving.step import AgentStep, Plan, StationAction, StationPerception
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control

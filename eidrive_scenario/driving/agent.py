@@ -11,15 +11,12 @@ from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.own_body import OwnBody
-from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
-from eidrive_scenario.driving.communication.report_store import ReportStore
-from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore, PointCloudSharing, ReportStore
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.result_checks import check_control, check_followed, check_plan, is_valid_control
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.station_action import OWN_DECISIONS, StationAction
-from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
+from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, Plan, StationAction, StationPerception
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked

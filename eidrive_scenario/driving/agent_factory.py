@@ -8,7 +8,7 @@ from typing import Any
 from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
-from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.communication.report_store import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.planner import Planner
@@ -17,11 +17,9 @@ from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.extension_settings import parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.localization import Localizer, motion_noise
+from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
-from eidrive_scenario.perception.tracking.method import TrackingMethod
-from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerSettings
+from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.coverage import view_sectors

@@ -1,4 +1,4 @@
-"""Settings, detectors and encoders that the controllers of a scenario declare, checked before the run."""
+"""Stations as a scenario declares them: settings, detectors, encoders, and the settings with all defaults."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ from typing import Any
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
+from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
+from eidrive_scenario.extension_settings import optional_settings_type
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.registry import is_built_in, registry
+from eidrive_scenario.registry import distributions, is_built_in, registry
 from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.specs import actor_spec
 
 
@@ -183,3 +186,41 @@ def _unknown_senders(
         for sender in settings.cooperates_with or ()
         if sender not in controllers
     ]
+
+
+_WITH_SETTINGS = (
+    ("detectors", "detector"),
+    ("fusion", "fusion"),
+    ("vehicle_controllers", "vehicle_controller"),
+)
+"""Registries and properties of the extensions whose settings are in a property `NAME_settings`."""
+
+
+def resolved_stations(
+    settings: Mapping[str, AgentSettings], channel: str, profile: ChannelProfile | None
+) -> StackSettings:
+    """Return the settings of stations and channel with the defaults of all extensions."""
+    used = {("channels", profile.model)} if profile is not None else set()
+    for station in settings.values():
+        used |= {
+            ("detectors", station.detector),
+            ("fusion", station.fusion),
+            ("planners", station.planner or ""),
+            ("vehicle_controllers", station.vehicle_controller),
+            ("trackers", station.tracker.kind if station.tracker is not None else ""),
+        }
+    return StackSettings(
+        channel=channel,
+        channel_profile=None if profile is None else profile.model_dump(mode="json"),
+        stations={name: _resolved(station) for name, station in sorted(settings.items())},
+        extensions=distributions(used),
+    )
+
+
+def _resolved(settings: AgentSettings) -> dict[str, Any]:
+    found = settings.model_dump(mode="json")
+    for kind, name in _WITH_SETTINGS:
+        model = optional_settings_type(kind, found[name], registry(kind).load(found[name]))
+        if model is not None:
+            found[f"{name}_settings"] = model.model_validate(found[f"{name}_settings"]).model_dump(mode="json")
+    return found

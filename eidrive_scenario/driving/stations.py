@@ -12,36 +12,88 @@ from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.communication.run_channel import RunChannel
-from eidrive_scenario.driving.control.overrides import ControlOverrides
-from eidrive_scenario.driving.detector_batches import prepare_detectors
-from eidrive_scenario.driving.planning.area_checks import areas_off_road
-from eidrive_scenario.driving.report_fusion import fuse_reports
-from eidrive_scenario.driving.resolved_stations import resolved_stations
+from eidrive_scenario.driving.control.vehicle_controller import ControlOverrides
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackInputs, StackSettings
-from eidrive_scenario.driving.station_action import OWN_DECISIONS
 from eidrive_scenario.driving.station_declarations import (
     declared_detectors,
     declared_encoders,
     declared_settings,
     possible_drivers,
+    resolved_stations,
     without_speed,
 )
-from eidrive_scenario.driving.station_readings import read_stations
-from eidrive_scenario.driving.step import AgentStep, StationPerception
-from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
+from eidrive_scenario.driving.station_warnings import areas_off_road, short_channel_delay, short_detector_latencies
+from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, StationPerception
 from eidrive_scenario.errors import Diagnostic, ErrorSubject
+from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.detector import Detector, ImageDetections
+from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Overrides
 from eidrive_scenario.sensing.readings import Readings
-from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
+
+
+def read_stations(
+    rigs: Mapping[str, Rig],
+    signal_sensors: Mapping[str, SignalSensor],
+    world: World,
+    view: WorldView,
+    signals: Mapping[str, str],
+) -> dict[str, Readings]:
+    """Return the readings of each station: its sensors, its trailers, and the signals in its sight.
+
+    signals  states of the traffic signals, by id
+    """
+    readings = read_all(list(rigs.values()), world, view)
+    for name, reading in readings.items():
+        attached = [view.row(other) for other in world.attached(name)]
+        if attached:
+            readings[name] = replace(reading, attached=view.boxes[attached])
+    for name, sensor in signal_sensors.items():
+        visible = sensor.read(world, view, view.row(name), signals)
+        readings[name] = replace(readings[name], signals=visible)
+    return readings
+
+
+def prepare_detectors(agents: Mapping[str, Agent], readings: Mapping[str, Readings]) -> None:
+    """Let built-in detectors that process batches prepare the readings of all their stations at once."""
+    batches: dict[type[Detector], list[str]] = {}
+    for name, agent in agents.items():
+        detector = agent.perception.detector
+        if detector.processes_batches and is_built_in(type(detector)):
+            batches.setdefault(type(detector), []).append(name)
+    for kind, names in batches.items():
+        kind.prepare_batch([agents[name].perception.detector for name in names], [readings[name] for name in names])
+
+
+def fuse_reports(
+    agents: Mapping[str, Agent], sensed: Mapping[str, StationPerception], now: float
+) -> dict[str, StationPerception]:
+    """Return what each station perceives with the objects after fusion.
+
+    Built-in methods of one class process the reports of all their stations as one batch.
+    """
+    batches: dict[type[FusionMethod], list[str]] = {}
+    perceived = dict(sensed)
+    for name, agent in agents.items():
+        kind = type(agent.fusion)
+        if is_built_in(kind):
+            batches.setdefault(kind, []).append(name)
+        else:
+            perceived[name] = agent.fuse(sensed[name])
+    for kind, names in batches.items():
+        fused = kind.fuse_batch([agents[name].fusion for name in names], [agents[name].reports for name in names], now)
+        for name, objects in zip(names, fused, strict=True):
+            perceived[name] = agents[name].with_fused(sensed[name], objects)
+    return perceived
 
 
 class Stations(DrivingStack):

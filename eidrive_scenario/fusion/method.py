@@ -13,8 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.messages.message import StationState
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud
+from eidrive_scenario.v2x.messages.message import PointCloud, StationState
 
 
 class Report(msgspec.Struct, frozen=True, gc=False):

@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
-from eidrive_scenario.fusion.headings import initiate_heading, predict_heading, significant_turn_rate, update_heading
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs, ranges
-from eidrive_scenario.fusion.prediction import predict
-from eidrive_scenario.perception.tracking.association import make_plausible
-from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, survived
-from eidrive_scenario.perception.tracking.existence import missed as after_miss
+from eidrive_scenario.fusion.prediction import (
+    initiate_heading,
+    predict,
+    predict_heading,
+    significant_turn_rate,
+    update_heading,
+)
+from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, make_plausible, survived
+from eidrive_scenario.perception.tracking.association import missed as after_miss
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
 
@@ -246,7 +250,7 @@ def _update(old: Table, new: Table) -> Table:
 
 
 def _existence_after(old: Table, new: Table) -> Array:
-    """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.existence`."""
+    """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.association`."""
     spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
     offset = new["mean"][:, :2] - old["mean"][:, :2]
     x, y, a, b, d = offset[:, 0], offset[:, 1], spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]

@@ -9,8 +9,7 @@ from typing import Any
 from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.station_action import StationAction
-from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.gym.action_settings import DRIVING, ActionSettings, MetaSpeed, TargetSpeed, parse_actions
 from eidrive_scenario.gym.actions import ActionDecoder

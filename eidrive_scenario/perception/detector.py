@@ -12,12 +12,38 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec
+
+
+@dataclass(frozen=True)
+class ImageDetections:
+    """Detections of a network in an image: boxes (N, 4) x1 y1 x2 y2 [px], best first, and scores (N,)."""
+
+    boxes: Array
+    scores: Array
+    classes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+
+SAME_OBJECT = 0.1
+"""Overlap in plan view above which two boxes show one object (intersection over union): bodies do not overlap."""
+
+
+def without_duplicates(detections: Detections) -> Detections:
+    """Return the detections except those that overlap one with a higher score, in their order."""
+    overlap = iou_bev(detections.boxes, detections.boxes)
+    kept: list[int] = []
+    for row in np.argsort(-detections.scores, kind="stable").tolist():
+        if not kept or overlap[row, kept].max() <= SAME_OBJECT:
+            kept.append(row)
+    return detections.subset(sorted(kept))
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,19 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
-from eidrive_scenario.v2x.messages.generation.cam import CHECK, EQUAL, LONGEST, SHORTEST, CamGenerationRules
-from eidrive_scenario.v2x.messages.generation.cpm import CpmGenerationRules
-from eidrive_scenario.v2x.messages.generation.object_ids import ObjectIdAssigner
-from eidrive_scenario.v2x.messages.message import Message, StationState
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud
-from eidrive_scenario.v2x.messages.size import cam_size, cpm_size, objects_that_fit
+from eidrive_scenario.v2x.messages.generation import (
+    CHECK,
+    EQUAL,
+    LONGEST,
+    SHORTEST,
+    CamGenerationRules,
+    CpmGenerationRules,
+    ObjectIdAssigner,
+    cam_size,
+    cpm_size,
+    objects_that_fit,
+)
+from eidrive_scenario.v2x.messages.message import Message, PointCloud, StationState
 from eidrive_scenario.world.actor import ActorSpec
 
 

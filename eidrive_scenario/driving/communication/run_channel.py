@@ -11,8 +11,14 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.registry import is_built_in
-from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
-from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
+from eidrive_scenario.v2x.channel import (
+    Channel,
+    OutgoingMessage,
+    check_delivered,
+    check_events,
+    check_interval,
+    check_statistics,
+)
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment

@@ -10,9 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.lane_below import lane_below
-from eidrive_scenario.driving.planning.levels import path_heights
-from eidrive_scenario.driving.planning.path import SPACING, PathPart, PlannedPath
+from eidrive_scenario.driving.planning.path import SPACING, PathPart, PlannedPath, lane_below, path_heights
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
 from eidrive_scenario.driving.settings import AgentSettings

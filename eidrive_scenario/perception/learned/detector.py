@@ -12,24 +12,21 @@ from msgspec.structs import astuple, replace
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.geometry.duplicates import without_duplicates
+from eidrive_scenario.perception.detector import Detector, DetectorContext, ImageDetections, without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
-from eidrive_scenario.perception.geometry.visibility import in_camera
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.geometry.projection import in_camera
 from eidrive_scenario.perception.learned import image_memory
-from eidrive_scenario.perception.learned.classes import object_category
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import ImageNetwork, object_category
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.network_loading import build_network, check_network, weights_path
-from eidrive_scenario.perception.learned.runtime_selection import (
+from eidrive_scenario.perception.learned.runtimes import (
     runtime_versions,
     select_runtime,
 )
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.perception.learned.weight_files import (
+from eidrive_scenario.perception.learned.weights import (
     check_weights_exist,
 )
 from eidrive_scenario.perception.lifting.lifting import lift

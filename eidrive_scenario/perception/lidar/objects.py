@@ -14,8 +14,8 @@ from eidrive_scenario.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
 from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
-from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
+from eidrive_scenario.perception.lidar.segmentation import clusters
 
 UNLIKELY = 16.0
 """Sum of squared size deviations above which a cluster is not a road user: with three sizes, one in a thousand exceeds

@@ -12,15 +12,64 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.geometry import iou_bev, wrap_angle
-from eidrive_scenario.perception.tracking.association import associate, position_noise
-from eidrive_scenario.perception.tracking.existence import MOST, detected, likelihood_ratio, missed, survived
-from eidrive_scenario.perception.tracking.history import TrackHistory
+from eidrive_scenario.perception.tracking.association import (
+    MOST,
+    associate,
+    detected,
+    likelihood_ratio,
+    missed,
+    position_noise,
+    survived,
+)
 from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT, InteractingModels, Tracks
-from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerKind, TrackerSettings, TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
-from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+
+
+class TrackHistory:
+    """Detection history of one track."""
+
+    __slots__ = ("_last_detection", "_names", "_recent", "hits", "is_often_detected", "number", "score")
+
+    def __init__(self) -> None:
+        self.is_often_detected = False
+        """Whether the object was detected in n of m successive scans."""
+        self.number: int | None = None
+        """Track number once the track is confirmed."""
+        self.hits = 0
+        self.score = 0.0
+        """Score of the last detection."""
+        self._recent: list[bool] = []
+        self._names: dict[str, float] = {}
+        self._last_detection = -math.inf
+
+    @property
+    def name(self) -> str:
+        """Class with the largest sum of detection scores."""
+        return max(self._names, key=lambda name: self._names[name])
+
+    def record_scan(self, hit: bool, settings: TrackerSettings) -> None:
+        """Record whether the scan contained a detection of the object."""
+        self.hits += hit
+        if not self.is_often_detected:
+            self._recent = [*self._recent, hit][-settings.confirm[1] :]
+            self.is_often_detected = sum(self._recent) >= settings.confirm[0]
+
+    def record_detection(self, detections: Detections, column: int) -> None:
+        """Record the detection that is assigned to the object."""
+        self._last_detection = detections.time
+        self.score = float(detections.scores[column])
+        name = detections.classes[column]
+        self._names[name] = self._names.get(name, 0.0) + self.score
+
+    def is_alive(self, now: float, settings: TrackerSettings) -> bool:
+        """Return whether the track is kept."""
+        if self.is_often_detected:
+            return now - self._last_detection <= settings.coast + TIME_TOLERANCE
+        return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
+
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
@@ -42,8 +91,8 @@ class Tracker(TrackingMethod):
     The assignment of tracks and boxes maximizes the total likelihood (Hungarian method). Each pair has a squared
     Mahalanobis distance within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor
     tracking, 1995, section 2.3.2). An unassigned box initiates a track, which is reported after confirmation. Each
-    track has a probability of existence, see `eidrive_scenario.perception.tracking.existence`. The reported score of an
-    object is that of its last detection times this probability.
+    track has a probability of existence (`perception.tracking.association`). The reported score of an object is that of
+    its last detection times this probability.
     """
 
     settings_type: ClassVar[type[TrackerKind]] = TrackerSettings

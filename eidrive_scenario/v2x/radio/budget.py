@@ -10,8 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
-from eidrive_scenario.v2x.propagation.gains import probability_of_los
-from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, PathLoss
+from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, PathLoss, probability_of_los
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT
 

@@ -10,32 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
-from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
+from eidrive_scenario.v2x.channel import Channel, OutgoingMessage, QueuedChannel
+from eidrive_scenario.v2x.counter_random import Keys, LinkRandom, combine_keys, key, uniform
 from eidrive_scenario.v2x.link_models.composed import delay_of
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
-from eidrive_scenario.v2x.link_models.loss import NoLoss
-from eidrive_scenario.v2x.link_models.loss_process import LossProcess
-from eidrive_scenario.v2x.link_random import LinkRandom
+from eidrive_scenario.v2x.link_models.loss import LossProcess, NoLoss
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.v2x.propagation.fading import FadingDraws, Nakagami
 from eidrive_scenario.v2x.propagation.path_loss import Tr37885
-from eidrive_scenario.v2x.queued_channel import QueuedChannel
 from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
-from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
+from eidrive_scenario.v2x.radio.events import DroppedBlock, LinkCounterTable, ReceptionBlock
 from eidrive_scenario.v2x.radio.jamming import Jamming
-from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
-from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
-from eidrive_scenario.v2x.statistics.links import ABSENT
+from eidrive_scenario.v2x.statistics.link_statistics import ABSENT, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import queue_entry
 
 

@@ -16,13 +16,21 @@ from eidrive_scenario.v2x.link_models.composed import ComposedProfile
 from eidrive_scenario.v2x.propagation.fading import Fading, NoFading
 from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.access import QueueSettings
-from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SENSITIVITIES, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.jamming import Jammer
 from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import LOS
-from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
+from eidrive_scenario.v2x.standards import (
+    ANTENNA_HEIGHT,
+    BITS_PER_SYMBOL,
+    NOISE_DBM,
+    RESOURCE_BLOCKS,
+    SENSING_DBM,
+    SENSITIVITIES,
+    SUBFRAME,
+    ieee80211p_airtime,
+)
 
 Technology = Literal["80211p", "cv2x_mode4"]
 Level = Annotated[float, Field(ge=-200.0, le=100.0)]

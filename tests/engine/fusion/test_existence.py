@@ -13,7 +13,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion, CovarianceIntersectionSettings
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.perception.tracking.existence import LIFETIME, missed
+from eidrive_scenario.perception.tracking.association import LIFETIME, missed
 
 Make = Callable[..., Report]
 Fuse = Callable[..., Detections]

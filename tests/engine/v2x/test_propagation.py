@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.v2x.counter_random import uniform, uniforms
-from eidrive_scenario.v2x.propagation.gains import (
+from eidrive_scenario.v2x.propagation.path_loss import (
+    Link,
+    LinkGeometry,
+    LogDistance,
+    Tr37885,
+    WinnerB1,
     blockage_moments,
     building_nlos,
     free_space,
@@ -17,11 +22,10 @@ from eidrive_scenario.v2x.propagation.gains import (
     urban_los,
     winner_b1,
 )
-from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, LogDistance, Tr37885, WinnerB1
-from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.packet_error import CURVES
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV
+from eidrive_scenario.v2x.standards import fragments, ieee80211p_airtime
 
 D = np.array([10.0, 100.0, 1000.0])
 

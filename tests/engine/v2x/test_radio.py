@@ -16,8 +16,8 @@ from radio_traffic import DT, QUIET, Place, exchange, message, radio
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.radio import budget, csma, reception
-from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
 from eidrive_scenario.v2x.radio_environment import NLOSV, LineOfSightStates, RadioEnvironment
+from eidrive_scenario.v2x.standards import ieee80211p_airtime
 
 ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}
 PROFILES: list[dict[str, object]] = [

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
-from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
+from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import RoadNetwork, outlines
 from eidrive_scenario.roads.model.location import LaneKey

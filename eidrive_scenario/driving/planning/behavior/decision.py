@@ -8,12 +8,11 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.bounds import FREE, Course
-from eidrive_scenario.driving.planning.behavior.lateral import ROUTE, Body, LateralProfile, towards
-from eidrive_scenario.driving.planning.behavior.maneuvers import passing_profiles
-from eidrive_scenario.driving.planning.behavior.oncoming import OncomingTraffic
-from eidrive_scenario.driving.planning.behavior.options import URGENT, Options
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, passing_profiles
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    ROUTE,
+    Body,
+    LateralProfile,
     Precedence,
     Proposal,
     Wall,
@@ -22,16 +21,66 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     inside_way,
     leading,
     proposals_for,
+    towards,
 )
-from eidrive_scenario.driving.planning.behavior.reasons import reason_of
-from eidrive_scenario.driving.planning.behavior.rollout import Roller
-from eidrive_scenario.driving.planning.behavior.scoring import evaluate
+from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
+from eidrive_scenario.driving.planning.behavior.scoring import URGENT, OncomingTraffic, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
+
+
+def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, tuple[int, ...]]:
+    """Return the reason of a proposal, and the rows of its objects."""
+    proposal = options.proposals[best]
+    profile = options.profiles[proposal.profile]
+    owners = situation.prediction.objects
+    if proposal.is_emergency:
+        threat = _threat(options, best)
+        if threat is None:
+            return "emergency braking", ()
+        owner = owners[threat]
+        return f"emergency braking: collision course with {situation.kind_of(owner)}", situation.rows_of(owner)
+    maneuver = "" if profile.name == ROUTE else f"{profile.name}; "
+    causes = options.rolled.cause[best].tolist()
+    for cause in causes:
+        if cause >= 0:
+            verb = "stop for" if situation.approaches(owners[cause]) else "follow"
+            return f"{maneuver}{verb} {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
+        if cause <= WALL:
+            wall = options.walls[best][WALL - cause]
+            held = None if wall.owner is None else owners[wall.owner]
+            return f"{maneuver}{wall.reason}", situation.rows_of(held)
+    if proposal.share < 1.0 and owners:
+        return f"{maneuver}slow down for traffic ahead", ()
+    if proposal.share < 1.0:
+        walls = options.walls[best]
+        return f"{maneuver}{walls[0].reason if walls else 'curve or end of route ahead'}", ()
+    if LIMIT in causes and causes[0] != FREE:
+        hidden = situation.hidden_at(float(options.rolled.s[best, causes.index(LIMIT) + 1]))
+        if hidden:
+            return f"{maneuver}caution before a hidden {hidden}", ()
+        return f"{maneuver}curve or end of route ahead", ()
+    return f"{maneuver}keep speed", ()
+
+
+def _threat(options: Options, emergency: int) -> int | None:
+    """Return the hypothesis for which the vehicle brakes in an emergency: that with which the first other proposal
+    collides, else the one for which it brakes."""
+    other = next((row for row, proposal in enumerate(options.proposals) if not proposal.is_emergency), emergency)
+    threat = int(options.evaluation.cause[other])
+    if threat >= 0:
+        return threat
+    for cause in options.rolled.cause[other].tolist():
+        if cause >= 0:
+            return int(cause)
+        if cause <= WALL:
+            wall = options.walls[other][WALL - int(cause)]
+            return wall.owner
+    return None
+
 
 OFF_PROFILE = 0.8
 """Distance from the current profile above which the vehicle starts a new one from its position [m]."""

@@ -15,6 +15,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
 from eidrive_scenario.driving.planning.behavior.occlusion import HiddenTraffic, Occluders
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
@@ -22,7 +23,6 @@ from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_lim
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings

@@ -16,14 +16,12 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
-from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
-from eidrive_scenario.v2x.radio.sidelink.pscch import ControlChannel, Pdu
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
-from eidrive_scenario.v2x.radio.sidelink.sensing import SensingHistory
+from eidrive_scenario.v2x.radio.sidelink.sensing import ControlChannel, Pdu, SensingHistory
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
-from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS
+from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 
 SUBCARRIERS = 12
 """Number of subcarriers of one resource block."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.lateral import change_length, passing, towards
+from eidrive_scenario.driving.planning.behavior.proposals import change_length, passing, towards
 
 
 @pytest.mark.parametrize(("change", "speed", "limit"), [(3.5, 15.0, 2.0), (-3.5, 25.0, 1.0), (1.0, 30.0, 0.5)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 
-from eidrive_scenario.driving.planning.behavior.lateral import change_length, passing
+from eidrive_scenario.driving.planning.behavior.proposals import change_length, passing
 
 
 @pytest.mark.parametrize("y", [LANE, LANE - 1.0])

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.bounds import Course, Limits
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall, speed_limits
-from eidrive_scenario.driving.planning.behavior.rollout import Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import Course, Limits, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal, inside_way
+from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Proposal, inside_way
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
