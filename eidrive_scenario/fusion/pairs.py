@@ -23,10 +23,8 @@ One true pair in a hundred is outside a gate of 99 %, which would split objects 
 """
 LEVEL_TOLERANCE = 2.0
 """Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
-_FEW_PAIRS = 1024
-"""Maximum number of pairs that are all listed, which is faster."""
-_MAX_EXTENT = 1e7
-"""Maximum extent of the tracks and their gates [m] for a search by position, which rounding would affect."""
+_MAX_COORDINATE = 1e7
+"""Maximum coordinate in the search by position [m], which rounding would affect beyond."""
 CERTAIN = -1e3
 """Cost of a pair with the same object id of a station: less than any other."""
 
@@ -128,8 +126,6 @@ def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
 
 def _pairs_of_one_station(first: Integers, second: Integers) -> tuple[Integers, Integers]:
     """Return rows and columns, in order, of the pairs of one station."""
-    if len(first) * len(second) <= _FEW_PAIRS:
-        return _where(first[:, None] == second)
     order = np.argsort(second, kind="stable")
     return ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
 
@@ -141,13 +137,13 @@ def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side
     """
     station, other_station = first["station"], second["station"]
     receiver, other_receiver = first["receiver"], second["receiver"]
-    distance = (own.reach + other.reach.max()) * (1.0 + 1e-9) + 1e-6  # a margin for rounding
-    extent = max(float(own.x.max()), float(other.x.max())) - min(float(own.x.min()), float(other.x.min()))
-    if len(first) * len(second) <= _FEW_PAIRS or not extent + distance.max() < _MAX_EXTENT:
-        return _all_pairs_of_two_stations(first, second)
+    # Clipping brings no pair farther apart. A reach of unknown or large size covers all clipped positions.
+    x, other_x = (np.clip(side.x, -_MAX_COORDINATE, _MAX_COORDINATE) for side in (own, other))
+    distance = np.fmin(own.reach + other.reach.max(), 2.0 * _MAX_COORDINATE) * (1.0 + 1e-9) + 1e-6  # for rounding
+    extent = max(float(x.max()), float(other_x.max())) - min(float(x.min()), float(other_x.min()))
     # Receiving stations are shifted so far that no pair of two of them is near.
     width = extent + 3.0 * float(distance.max())
-    x, other_x = own.x + width * receiver, other.x + width * other_receiver
+    x, other_x = x + width * receiver, other_x + width * other_receiver
     distance += 1e-12 * max(float(np.abs(x).max()), float(np.abs(other_x).max()))
     order = np.argsort(other_x, kind="stable")
     sorted_x = other_x[order]
@@ -158,26 +154,6 @@ def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side
     rows, columns = rows[ahead], columns[ahead]
     in_order = np.lexsort((columns, rows))
     return rows[in_order], columns[in_order]
-
-
-def _all_pairs_of_two_stations(first: Table, second: Table) -> tuple[Integers, Integers]:
-    """Return rows and columns of all pairs of two stations of one receiving station; tracks are sorted by it."""
-    rows: list[Integers] = []
-    columns: list[Integers] = []
-    for receiver in np.unique(first["receiver"]).tolist():
-        (begin, end), (other_begin, other_end) = (
-            np.searchsorted(side["receiver"], [receiver, receiver + 1]) for side in (first, second)
-        )
-        before = first["station"][begin:end, None] < second["station"][other_begin:other_end]
-        own, other = _where(before)
-        rows.append(own + begin)
-        columns.append(other + other_begin)
-    return np.concatenate(rows), np.concatenate(columns)
-
-
-def _where(pairs: NDArray[np.bool_]) -> tuple[Integers, Integers]:
-    rows, columns = np.nonzero(pairs)
-    return rows, columns
 
 
 def ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers, Integers]:

@@ -14,6 +14,7 @@ Keys = NDArray[np.uint64]
 
 GOLDEN, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 _GOLDEN, _FIRST, _SECOND = np.uint64(GOLDEN), np.uint64(FIRST), np.uint64(SECOND)
+_ONE, _11, _27, _30, _31 = (np.uint64(number) for number in (1, 11, 27, 30, 31))
 _64_BITS = (1 << 64) - 1
 
 
@@ -27,8 +28,8 @@ def uniforms(keys: Keys, counts: Integers | int) -> Array:
 
     G. L. Steele, D. Lea, C. H. Flood: Fast Splittable Pseudorandom Number Generators, OOPSLA 2014.
     """
-    mixed = _mix(keys + (np.atleast_1d(counts).astype(np.uint64) + np.uint64(1)) * _GOLDEN)
-    numbers: Array = ((mixed >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+    mixed = _mix(keys + (np.atleast_1d(counts).astype(np.uint64) + _ONE) * _GOLDEN)
+    numbers: Array = ((mixed >> _11).astype(np.float64) + 0.5) * 2.0**-53
     return numbers
 
 
@@ -46,9 +47,12 @@ def combine_keys(first: Keys, second: Keys) -> Keys:
 
 
 def _mix(numbers: Keys) -> Keys:
-    numbers = (numbers ^ (numbers >> np.uint64(30))) * _FIRST
-    numbers = (numbers ^ (numbers >> np.uint64(27))) * _SECOND
-    return numbers ^ (numbers >> np.uint64(31))
+    mixed = numbers ^ (numbers >> _30)
+    mixed *= _FIRST
+    mixed ^= mixed >> _27
+    mixed *= _SECOND
+    mixed ^= mixed >> _31
+    return mixed
 
 
 BLOCK = 128

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -116,16 +116,12 @@ class LinkGeometry:
         self.tops = tops
         self.vehicles = vehicles
 
-
-class Link(NamedTuple):
-    """One link of `LinkGeometry`, in Python numbers."""
-
-    distance: float
-    state: int
-    lower: float
-    upper: float
-    top: float
-    vehicles: int
+    @classmethod
+    def in_sight(cls, distance: Array, lower: Array, upper: Array) -> LinkGeometry:
+        """Return the geometry of links without bodies in between."""
+        count = len(distance)
+        states, tops, vehicles = np.full(count, LOS), np.full(count, -np.inf), np.zeros(count, dtype=np.int64)
+        return cls(distance, states, lower, upper, tops, vehicles)
 
 
 class Tr37885(Settings):
@@ -159,17 +155,6 @@ class Tr37885(Settings):
             [clear, clear + self._blockage_loss(mean, spread, draws)],
             building_nlos(between.distance, frequency_ghz),
         )
-
-    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
-        """Return the path loss without shadowing of one link [dB]."""
-        distance = max(link.distance, 1.0)
-        los = urban_los if self.environment == "urban" else highway_los
-        if link.state == LOS:
-            return float(los(distance, frequency_ghz))
-        if link.state != NLOSV:
-            return float(building_nlos(distance, frequency_ghz))
-        mean, spread = blockage_moments(distance, link.lower, link.upper, link.top)
-        return float(los(distance, frequency_ghz) + self._blockage_loss(mean, spread, draw))
 
     def _blockage_loss(self, mean: Array, spread: Array, draws: Array | float) -> Array:
         if self.blockage == "mean":
@@ -211,16 +196,6 @@ class _LossPerVehicle(Settings):
             [clear, clear + self.per_vehicle_db * between.vehicles],
             np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
         )
-
-    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
-        """Return the path loss without shadowing of one link [dB]."""
-        distance = max(link.distance, 1.0)
-        clear = float(self.line_of_sight_loss(distance, frequency_ghz))
-        if link.state == LOS:
-            return clear
-        if link.state == NLOSV:
-            return clear + self.per_vehicle_db * link.vehicles
-        return max(clear, float(building_nlos(distance, frequency_ghz)))
 
 
 class WinnerB1(_LossPerVehicle):

@@ -65,8 +65,6 @@ def _start(entry: Transmission) -> float:
 
 AIFS = 32e-6 + 6 * SLOT
 """SIFS and 6 slots: access category AC_BE in the OCB mode (IEEE 802.11-2012, table 8-106) [s]."""
-MAX_SCALAR = 6
-"""Maximum number of stations for scalar evaluation, which is then faster than arrays."""
 CONTENTION_WINDOW = 15
 """aCWmin: the backoff of broadcast messages is 0 to 15 slots, and they are never retransmitted."""
 
@@ -129,30 +127,13 @@ class Csma(MediumAccess):
 
     def starts(self) -> Array:
         """Return the predicted start of the first message of each station (N,) [s]; infinity for empty queues."""
-        return self._starts_scalar() if len(self.names) <= MAX_SCALAR else self._starts_array()
-
-    def _starts_scalar(self) -> Array:
-        """Return `starts`, evaluated station by station."""
-        free, slots, fixed = self.free_from.tolist(), self._slots.tolist(), self._fixed.tolist()
-        starts = []
-        for row, ready in enumerate(self.ready.tolist()):
-            if ready == math.inf:
-                starts.append(math.inf)
-                continue
-            if math.isnan(slots[row]) and ready < free[row] + AIFS:
-                self._draw(np.array([row]))
-                slots[row] = float(self._slots[row])
-            waited = ready if math.isnan(slots[row]) else max(ready, free[row]) + AIFS + slots[row] * SLOT
-            starts.append(waited if math.isnan(fixed[row]) else fixed[row])
-        return np.array(starts)
-
-    def _starts_array(self) -> Array:
-        met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS) & np.isfinite(self.ready)
+        # NaN and infinity select the cases: no backoff yet, an empty queue, no fixed start.
+        met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS)
         if met_busy.any():
             self._draw(np.flatnonzero(met_busy))
         waited = np.maximum(self.ready, self.free_from) + AIFS + self._slots * SLOT
-        contending = np.where(np.isnan(self._slots), self.ready, waited)
-        return np.where(np.isnan(self._fixed), contending, self._fixed)
+        starts = np.where(np.isnan(self._slots), self.ready, waited)
+        return np.where(np.isnan(self._fixed), starts, self._fixed)
 
     def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
         self._slots[row] = self._fixed[row] = math.nan

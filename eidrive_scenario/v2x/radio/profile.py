@@ -20,7 +20,6 @@ from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.jamming import Jammer
 from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
-from eidrive_scenario.v2x.radio_environment import LOS
 from eidrive_scenario.v2x.standards import (
     ANTENNA_HEIGHT,
     BITS_PER_SYMBOL,
@@ -180,10 +179,7 @@ class RadioProfile(ComposedProfile):
         if self.background is None:
             return None
         table = self.background.table()
-        count = len(table.distance)
-        heights, no_vehicles = np.full(count, ANTENNA_HEIGHT), np.zeros(count, dtype=np.int64)
-        between = LinkGeometry(
-            table.distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), no_vehicles
-        )
-        los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
+        heights = np.full(len(table.distance), ANTENNA_HEIGHT)
+        between = LinkGeometry.in_sight(table.distance, heights, heights)
+        los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(len(heights), 0.5))
         return table, np.maximum.accumulate(los_loss)
