@@ -20,7 +20,6 @@ from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, Plan, Statio
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
@@ -61,7 +60,6 @@ class Agent:
         self.fusion = fusion
         self._fusion_checked = is_checked(fusion)
         self.planner = planner
-        self._planner_checked = planner is not None and not is_built_in(type(planner))
         self.controller = controller
         self.receives_messages = receives_messages
         """Whether the station receives messages; a station that does not drive may only transmit."""
@@ -192,8 +190,7 @@ class Agent:
             if self._regions is not None:
                 self.planner.observe_regions(self._regions.newest(now))
             plan = self.planner.plan(ego, perceived.fused, action.requested_goal(perceived.goal), now)
-            if self._planner_checked:
-                check_plan(self.planner, plan)
+            check_plan(self.planner, plan)
         return AgentStep(
             detections=detections,
             inbox=perceived.inbox,

@@ -8,6 +8,7 @@ from typing import Any
 
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
@@ -17,7 +18,7 @@ from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.registry import distributions, is_built_in, registry
+from eidrive_scenario.registry import distributions, registry
 from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.profile import ChannelProfile
@@ -77,11 +78,11 @@ def without_speed(settings: AgentSettings, *, limited: bool) -> bool:
 
     limited  whether there are roads, which have speed limits
 
-    Planners of third parties may choose a speed by themselves.
+    Planners that do not derive from RoutePlanner may choose a speed by themselves.
     """
     planner = registry("planners").load(settings.planner or DEFAULT_PLANNER)
     from_settings = settings.target_speed is not None or (settings.follow_speed_limit and limited)
-    return is_built_in(planner) and not from_settings
+    return issubclass(planner, RoutePlanner) and not from_settings
 
 
 def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:

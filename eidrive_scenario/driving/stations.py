@@ -29,7 +29,6 @@ from eidrive_scenario.errors import Diagnostic, ErrorSubject
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.detector import Detector, ImageDetections
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Overrides
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
@@ -64,14 +63,26 @@ def read_stations(
 
 
 def prepare_detectors(agents: Mapping[str, Agent], readings: Mapping[str, Readings]) -> None:
-    """Let built-in detectors that process batches prepare the readings of all their stations at once."""
+    """Let detectors that process batches prepare the readings of all their stations at once."""
     batches: dict[type[Detector], list[str]] = {}
     for name, agent in agents.items():
         detector = agent.perception.detector
-        if detector.processes_batches and is_built_in(type(detector)):
+        if detector.processes_batches:
             batches.setdefault(type(detector), []).append(name)
     for kind, names in batches.items():
-        kind.prepare_batch([agents[name].perception.detector for name in names], [readings[name] for name in names])
+        detectors = [agents[name].perception.detector for name in names]
+        _all_of(names).call(kind.prepare_batch, detectors, [readings[name] for name in names])
+
+
+def _fuses_batches(kind: type[FusionMethod]) -> bool:
+    """Return whether the last class that overrides `fuse` has a batch for it, too."""
+    return "fuse_batch" in next(vars(base) for base in kind.__mro__ if {"fuse", "fuse_batch"} & vars(base).keys())
+
+
+def _all_of(stations: Sequence[str]) -> ErrorSubject:
+    """Return the stations of a batch, which errors of its extension name."""
+    names = ", ".join(map(repr, stations))
+    return ErrorSubject(f"station {names}" if len(stations) == 1 else f"stations {names}")
 
 
 def fuse_reports(
@@ -79,18 +90,19 @@ def fuse_reports(
 ) -> dict[str, StationPerception]:
     """Return what each station perceives with the objects after fusion.
 
-    Built-in methods of one class process the reports of all their stations as one batch.
+    Methods of one class process the reports of all their stations as one batch, unless the class changes `fuse` only.
     """
     batches: dict[type[FusionMethod], list[str]] = {}
     perceived = dict(sensed)
     for name, agent in agents.items():
         kind = type(agent.fusion)
-        if is_built_in(kind):
+        if _fuses_batches(kind):
             batches.setdefault(kind, []).append(name)
         else:
             perceived[name] = agent.fuse(sensed[name])
     for kind, names in batches.items():
-        fused = kind.fuse_batch([agents[name].fusion for name in names], [agents[name].reports for name in names], now)
+        methods, reports = [agents[name].fusion for name in names], [agents[name].reports for name in names]
+        fused = _all_of(names).call(kind.fuse_batch, methods, reports, now)
         for name, objects in zip(names, fused, strict=True):
             perceived[name] = agents[name].with_fused(sensed[name], objects)
     return perceived

@@ -80,9 +80,9 @@ class Detector(ABC):
     settings_type: ClassVar[type[Settings] | None] = None
     """Type of the property `detector_settings`; None if the detector has no settings."""
     is_finite_by_construction: ClassVar[bool] = False
-    """Whether a built-in detector only copies finite numbers, so that its results are not checked."""
+    """Whether this class, without those derived from it, only copies finite numbers: its results are not checked."""
     processes_batches: bool = False
-    """Whether `prepare_batch` of a built-in detector has an effect."""
+    """Whether `prepare_batch` has an effect."""
     library_versions: Mapping[str, str] = MappingProxyType({})
     """Versions of the libraries that compute the detections, by name; part of the resolved settings."""
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
@@ -105,7 +105,7 @@ class Detector(ABC):
     def prepare_batch(cls, detectors: Sequence[Self], readings: Sequence[Readings]) -> None:
         """Compute at once what `detect` of several stations needs for these readings of one tick.
 
-        Only built-in detectors are prepared. The next `detect` returns the same as without.
+        The next `detect` returns the same as without.
         """
 
     @abstractmethod

@@ -18,7 +18,6 @@ from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
@@ -92,7 +91,6 @@ class Perception:
         self.detector = detector
         self._checked = is_checked(detector)
         self._tracker = tracker
-        self._tracker_checked = tracker is not None and not is_built_in(type(tracker))
         self._localizer = localizer
         self._latency = latency
         self._pose_error = pose_error
@@ -186,7 +184,7 @@ class Perception:
             newest = self._track(found, past)
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
-            if self._tracker_checked and newest is not None:
+            if newest is not None:
                 check_detections(self._tracker, "predict", newest)
         return newest
 
@@ -200,8 +198,7 @@ class Perception:
             return shares
 
         tracked = self._tracker.update(found, in_view)
-        if self._tracker_checked:
-            check_detections(self._tracker, "update", tracked)
+        check_detections(self._tracker, "update", tracked)
         return tracked
 
 
