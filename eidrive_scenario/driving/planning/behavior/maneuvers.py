@@ -18,6 +18,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     ONCOMING_SPEED,
     Body,
     LateralProfile,
+    Start,
     Wall,
     change_length,
     passing,
@@ -173,8 +174,8 @@ def passing_profiles(
     faster, overtaking = beside.faster, beside.overtaking
     if not math.isnan(faster) and _rear_is_free(situation, scene, faster, body.center):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
-        start = (*situation.steered, situation.speed)
-        found.append(towards(name, faster, *start, settings.lateral_acceleration, side=overtaking))
+        start = Start(*situation.steered, situation.speed)
+        found.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
     obstacle = _obstacle(situation, scene, blocker, body)
     if obstacle is not None:
         sides = (_around(situation, settings, obstacle, body, side) for side in (overtaking, -overtaking))
@@ -211,8 +212,8 @@ def _evasions(
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
         if not (math.isnan(offset) or math.isnan(beyond)) and _rear_is_free(situation, scene, offset, body.center):
             name = f"change lane to the {'left' if side > 0 else 'right'}"
-            start = (*situation.steered, situation.speed)
-            found.append(towards(name, offset, *start, settings.lateral_acceleration, side=side))
+            start = Start(*situation.steered, situation.speed)
+            found.append(towards(name, offset, start, settings.lateral_acceleration, side=side))
     return found
 
 
@@ -352,8 +353,7 @@ def _around(
         f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
         side * value,
         (obstacle.begin, obstacle.end),
-        *situation.steered,
-        max(situation.speed, 2.0),
+        Start(*situation.steered, max(situation.speed, 2.0)),
         settings.lateral_acceleration,
         side,
         stands=stands,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import msgspec
@@ -114,31 +115,29 @@ def change_length(change: float, speed: float, lateral_acceleration: float) -> f
     return max(duration * speed, SHORTEST * math.sqrt(min(abs(change) / USUAL_WIDTH, 1.0)), 1.0)
 
 
-def towards(
-    name: str,
-    value: float,
-    s: float,
-    start: float,
-    slope: float,
-    speed: float,
-    lateral_acceleration: float,
-    side: int = 0,
-) -> LateralProfile:
-    """Return the motion from offset `start` at `s` to a constant offset."""
-    length = change_length(value - start, speed, lateral_acceleration)
-    if abs(slope) * length > abs(value - start) + 0.5:
+class Start(NamedTuple):
+    """Start of a lateral motion: distance along the line and offset [m], slope of the offset, and speed [m/s]."""
+
+    s: float
+    offset: float
+    slope: float
+    speed: float
+
+
+def towards(name: str, value: float, start: Start, lateral_acceleration: float, side: int = 0) -> LateralProfile:
+    """Return the motion to a constant offset."""
+    s, offset, slope, speed = start
+    length = change_length(value - offset, speed, lateral_acceleration)
+    if abs(slope) * length > abs(value - offset) + 0.5:
         length = max(length, 1.5 * speed)
-    return LateralProfile(name, (s, s + length), (start, value), slope, side)
+    return LateralProfile(name, (s, s + length), (offset, value), slope, side)
 
 
 def passing(
     name: str,
     value: float,
     obstacle: tuple[float, float],
-    s: float,
-    start: float,
-    slope: float,
-    speed: float,
+    start: Start,
     lateral_acceleration: float,
     side: int,
     *,
@@ -150,16 +149,17 @@ def passing(
     obstacle that `stands`: it needs no motion before it.
     """
     begin, end = obstacle
-    length = change_length(value - start, speed, lateral_acceleration)
-    if stands and side * (value - start) <= AT_OFFSET:
+    s, offset, slope, speed = start
+    length = change_length(value - offset, speed, lateral_acceleration)
+    if stands and side * (value - offset) <= AT_OFFSET:
         begin = max(begin, s + length)
     first = max(begin - length, s)
-    if begin - first < TIGHTEST * change_length(value - start, speed, TIGHTER * lateral_acceleration):
+    if begin - first < TIGHTEST * change_length(value - offset, speed, TIGHTER * lateral_acceleration):
         return None
-    places, values = [s], [start]
-    if first > s + 0.5 and abs(start) < 0.3:
+    places, values = [s], [offset]
+    if first > s + 0.5 and abs(offset) < 0.3:
         places.append(first)
-        values.append(start)
+        values.append(offset)
     back = change_length(value, speed, lateral_acceleration)
     places += [max(begin, places[-1] + 1.0)]
     places += [max(end, places[-1] + 0.5)]
@@ -203,6 +203,21 @@ class Wall(msgspec.Struct, frozen=True):
     reason: str
     owner: int | None = None
     """Index of the hypothesis for which the vehicle waits."""
+
+
+class Option(msgspec.Struct, frozen=True):
+    """Proposal with the profile that it follows and what it reacts to.
+
+    way    where the hypotheses are in the way (N, K) of a vehicle that follows the profile
+    walls  places before which it waits
+    leads  where the hypotheses lead it (N, K); options may share an array
+    """
+
+    proposal: Proposal
+    profile: LateralProfile
+    way: Bools
+    walls: Sequence[Wall]
+    leads: Bools
 
 
 class Conflict(msgspec.Struct, frozen=True):

@@ -12,7 +12,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall
+from eidrive_scenario.driving.planning.behavior.proposals import Option, Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -58,7 +58,7 @@ class Limits:
         return self._slopes[index] * (s - self._along[index]) + self._limits[index]
 
 
-def walls_over_time(walls: list[Wall], times: list[float]) -> WallsOverTime:
+def walls_over_time(walls: Sequence[Wall], times: list[float]) -> WallsOverTime:
     """Return the walls that exist at each time; without walls an empty list."""
     if not walls:
         return []
@@ -145,33 +145,31 @@ class Roller:
 
     def roll(
         self,
-        proposals: list[Proposal],
+        options: Sequence[Option],
         course: Course,
         start: tuple[float, float],
         body: tuple[float, float],
         scene: Surroundings,
-        leads: Sequence[Bools],
-        walls: list[list[Wall]],
     ) -> Rollout:
-        """Return the motion of the proposals.
+        """Return the motion of the options.
 
         start  distance along the line [m] and speed [m/s]
         body   distances of the front and the center of the vehicle from the reference point [m]
-        leads  for each proposal whether a hypothesis leads it at a time (N, K); proposals may share an array
         """
         reach = (max(course.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
         limits = Limits.ahead(course, start[0], reach)
-        leaders = _Leaders(scene, leads, body)
+        leaders = _Leaders(scene, body)
         known: dict[object, _Motion] = {}
         stops: dict[object, WallsOverTime] = {}
         motions = []
-        for row, (proposal, places) in enumerate(zip(proposals, walls, strict=True)):
-            number, ahead = leaders.of(row)
-            ends = tuple([(wall.s, wall.until) for wall in places])
+        for option in options:
+            proposal = option.proposal
+            number, ahead = leaders.of(option.leads)
+            ends = tuple([(wall.s, wall.until) for wall in option.walls])
             key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends)
             if key not in known:
                 if ends not in stops:
-                    stops[ends] = walls_over_time(places, self._times)
+                    stops[ends] = walls_over_time(option.walls, self._times)
                 bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
                 known[key] = self._motion(proposal, bounds, start, ahead)
             motions.append(known[key])
@@ -229,19 +227,17 @@ class Roller:
 
 
 class _Leaders:
-    """Leaders of proposals over time; proposals with the same ones share them."""
+    """Leaders of options over time; options with the same ones share them."""
 
-    def __init__(self, scene: Surroundings, leads: Sequence[Bools], body: tuple[float, float]) -> None:
+    def __init__(self, scene: Surroundings, body: tuple[float, float]) -> None:
         front, center = body
-        self._leads = list(leads)
         self._known: dict[int, list[list[Leader]]] = {}
         self._rears: list[list[float]] = (scene.rear - scene.passing_gap[:, None] - front).tolist()
         self._centers: list[list[float]] = (scene.s - center).tolist()
         self._speeds: list[list[float]] = scene.speed.tolist()
 
-    def of(self, proposal: int) -> tuple[int, list[list[Leader]]]:
-        """Return a number of the leaders of a proposal, the same for shared ones, and the leaders at each time."""
-        leads = self._leads[proposal]
+    def of(self, leads: Bools) -> tuple[int, list[list[Leader]]]:
+        """Return a number of these leaders (N, K), the same for shared ones, and the leaders at each time."""
         number = id(leads)
         found = self._known.get(number)
         if found is None:

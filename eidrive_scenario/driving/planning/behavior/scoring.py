@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from itertools import groupby
 
 import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Body, LateralProfile, Proposal, Wall
+from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Body, LateralProfile, Option
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.rollout import WALL, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -130,15 +131,6 @@ CLEAR_AHEAD = 1.0
 """Clearance along the line below which a proposal is risky on a collision course [m]."""
 ROUNDING = 1e-6
 """More than the error of sums of distances [m]."""
-PROGRESS, RISK, COMFORT, ASIDE, ONCOMING, SWITCH = 5.0, 6.0, 1.5, 0.15, 0.4, 0.3
-"""Weights of the score: progress as in PDM-Closed; the others are relative to it. ASIDE and ONCOMING per use of another
-lane, SWITCH for another maneuver than the current one."""
-SLOWER = 0.05
-"""Weight of a lower target speed than wanted, which decides between proposals that are otherwise alike."""
-GENTLE = 50.0
-"""Weight of a stop for an uncertain object, which is only chosen for such an object."""
-CRASH = 100.0
-"""Weight of a collision, above all other terms."""
 FARTHER = 0.8
 """Share by which the weight of a risk decreases toward the horizon."""
 LEAST_LACK = 0.3
@@ -147,6 +139,30 @@ AT_REST = 0.1
 """Speed below which the vehicle stands [m/s]."""
 COMFORTABLE = 2.0
 """Deceleration up to which a proposal is comfortable [m/s²]."""
+
+
+class Weights(msgspec.Struct, frozen=True):
+    """Weights of the terms of a score: progress as in PDM-Closed, the others relative to it by design.
+
+    aside, oncoming  per use of another lane, and of one of the opposite direction
+    switch           for another maneuver than the current one
+    slower           of a lower target speed than wanted, which decides between options that are otherwise alike
+    gentle           of a stop for an uncertain object, which is only chosen for such an object
+    crash            of a collision, above all other terms
+    """
+
+    progress: float = 5.0
+    risk: float = 6.0
+    comfort: float = 1.5
+    aside: float = 0.15
+    oncoming: float = 0.4
+    switch: float = 0.3
+    slower: float = 0.05
+    gentle: float = 50.0
+    crash: float = 100.0
+
+
+WEIGHTS = Weights()
 
 
 class Evaluation(msgspec.Struct, frozen=True):
@@ -161,31 +177,30 @@ class Evaluation(msgspec.Struct, frozen=True):
 
 
 def evaluate(
-    proposals: list[Proposal],
-    profiles: list[LateralProfile],
-    ways: list[Bools],
+    options: Sequence[Option],
     rolled: Rollout,
     scene: Surroundings,
     times: Array,
     ego: Body,
     settings: BehaviorSettings,
+    *,
     wanted: float,
     kept: frozenset[str],
     hidden: float,
 ) -> Evaluation:
-    """Return the evaluation of all proposals.
+    """Return the evaluation of all options, which are in the order of their profiles.
 
-    ways     where the hypotheses are in the way (N, K) of a vehicle that follows each profile
+    wanted   wanted speed [m/s]
     kept     names of the maneuvers that are no change: the current one, and the route after a complete one
     hidden   place from which oncoming traffic may come unseen [m], inf without one
     """
-    count, horizon = len(proposals), float(times[-1])
-    offsets = _offsets(proposals, profiles, rolled, ego)
+    count, horizon = len(options), float(times[-1])
+    offsets = _offsets(options, rolled, ego)
     collision, risk = np.full(count, np.inf), np.zeros(count)
     impact, cause = np.zeros(count), np.full(count, -1)
     near = _near(rolled, offsets, scene, ego)
     if near.size:
-        stops = np.array([proposal.share == 0.0 for proposal in proposals])
+        stops = np.array([option.proposal.share == 0.0 for option in options])
         touching, lack = _overlaps(rolled, offsets, stops, scene.rows(near), times, ego, settings)
         risk = (lack.max(axis=1) * (1.0 - FARTHER * times / horizon)).max(axis=1)
         if touching.any():
@@ -196,40 +211,39 @@ def evaluate(
     progress = np.minimum(np.maximum((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0), 1.0)
     slowing = (rolled.speed[:, 1:] - rolled.speed[:, :-1]) / (times[1:] - times[:-1])
     hardest = np.maximum(-slowing.min(axis=1) - COMFORTABLE, 0.0)
-    score = PROGRESS * progress - COMFORT * np.minimum(hardest / settings.hard_deceleration, 2.0)
-    score -= RISK * risk
-    score -= CRASH * np.where(np.isfinite(collision), 1.0 + (1.0 - collision / horizon) + 0.05 * impact, 0.0)
-    oncoming = [
-        first_oncoming(way, float(rolled.s[0, 0]), scene)
-        if profile.uses_oncoming and profile.name not in kept
-        else len(times)
-        for profile, way in zip(profiles, ways, strict=True)
-    ]
+    score = WEIGHTS.progress * progress - WEIGHTS.comfort * np.minimum(hardest / settings.hard_deceleration, 2.0)
+    score -= WEIGHTS.risk * risk
+    crash = 1.0 + (1.0 - collision / horizon) + 0.05 * impact
+    score -= WEIGHTS.crash * np.where(np.isfinite(collision), crash, 0.0)
+    meeting: dict[int, int] = {}
+    """Index of the time from which on oncoming traffic is in the way, by profile."""
     values: list[float] = score.tolist()
-    for row, proposal in enumerate(proposals):
-        profile = profiles[proposal.profile]
+    for row, option in enumerate(options):
+        proposal, profile = option.proposal, option.profile
         switches = profile.name not in kept
-        values[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
+        values[row] -= WEIGHTS.slower * (1.0 - proposal.share) + WEIGHTS.gentle * proposal.is_gentle
         if profile.uses_oncoming and switches:
-            first = oncoming[proposal.profile]
+            if proposal.profile not in meeting:
+                meeting[proposal.profile] = first_oncoming(option.way, float(rolled.s[0, 0]), scene)
             motion = rolled.s[row], float(rolled.speed[row, -1])
-            values[row] -= RISK * meets_oncoming(profile, motion, times, first, (hidden, wanted), scene)
-        values[row] -= ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * switches
+            first = meeting[proposal.profile]
+            values[row] -= WEIGHTS.risk * meets_oncoming(profile, motion, times, first, (hidden, wanted), scene)
+        lanes = WEIGHTS.aside * (profile.side != 0) + WEIGHTS.oncoming * profile.uses_oncoming
+        values[row] -= lanes + WEIGHTS.switch * switches
     return Evaluation(np.array(values), collision, risk, impact, cause)
 
 
-def _offsets(proposals: list[Proposal], profiles: list[LateralProfile], rolled: Rollout, ego: Body) -> Array:
-    """Return the offsets of the front and the rear axle (2, P, K) [m].
-
-    proposals  in the order of their profiles
-    """
-    found = np.empty((2, *rolled.s.shape))
+def _offsets(options: Sequence[Option], rolled: Rollout, ego: Body) -> Array:
+    """Return the offsets of the front and the rear axle (2, P, K) [m] of options in the order of their profiles."""
+    offsets = np.empty((2, *rolled.s.shape))
     places = np.array([rolled.s + ego.wheelbase, rolled.s])
-    owners = [proposal.profile for proposal in proposals]
-    for number, profile in enumerate(profiles):
-        rows = slice(bisect_left(owners, number), bisect_right(owners, number))
-        found[:, rows] = profile.offset(places[:, rows])
-    return found
+    begin = 0
+    for _, group in groupby(options, key=lambda option: option.proposal.profile):
+        same = list(group)
+        rows = slice(begin, begin + len(same))
+        offsets[:, rows] = same[0].profile.offset(places[:, rows])
+        begin += len(same)
+    return offsets
 
 
 def _first(found: Bools, times: Array) -> tuple[Array, Array, Array]:
@@ -340,33 +354,31 @@ URGENT = 4.0
 
 
 class Options(msgspec.Struct, frozen=True):
-    """Proposals with their rollout and evaluation."""
+    """Options of a decision with their rollout and evaluation."""
 
-    profiles: list[LateralProfile]
-    proposals: list[Proposal]
-    walls: list[list[Wall]]
+    options: Sequence[Option]
     rolled: Rollout
     evaluation: Evaluation
 
     @property
     def gentle(self) -> int:
         """Index of the gentle stop."""
-        return next(row for row, proposal in enumerate(self.proposals) if proposal.is_gentle)
+        return next(row for row, option in enumerate(self.options) if option.proposal.is_gentle)
 
     @property
     def emergency(self) -> int:
         """Index of emergency braking on the current course."""
-        return next(row for row, proposal in enumerate(self.proposals) if proposal.is_emergency)
+        return next(row for row, option in enumerate(self.options) if option.proposal.is_emergency)
 
     def name_of(self, row: int) -> str:
-        """Return the maneuver of a proposal."""
-        return self.profiles[self.proposals[row].profile].name
+        """Return the maneuver of an option."""
+        return self.options[row].profile.name
 
     def best(self, profiles: int | None = None) -> int:
-        """Return the index of the proposal with the highest score, among those along the first `profiles`."""
-        count = len(self.proposals)
+        """Return the index of the option with the highest score, among those along the first `profiles`."""
+        count = len(self.options)
         if profiles is not None:
-            count = sum(proposal.profile < profiles for proposal in self.proposals)
+            count = sum(option.proposal.profile < profiles for option in self.options)
         return int(np.argmax(self.evaluation.score[:count]))
 
     def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int:
@@ -381,7 +393,7 @@ class Options(msgspec.Struct, frozen=True):
         for cause in causes:
             row = int(cause)
             if row <= WALL:
-                owner = self.walls[best][WALL - row].owner
+                owner = self.options[best].walls[WALL - row].owner
                 row = -1 if owner is None else owner
             if row >= 0 and not certain[row]:
                 return row
