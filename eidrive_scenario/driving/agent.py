@@ -141,13 +141,15 @@ class Agent:
         detections = self._detections
         covariance = self.perception.pose_covariance
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
-        state = self._state(ego)
+        x, y, z = ego.position.tolist()
+        state = StationState(ego.time, x, y, z, ego.yaw, ego.speed, covariance)
         found = fresh if self.points is None else self.points.perceive(readings, fresh, self.perception.pose)
         if found is not None and not own_perception:
             own_state = replace(state, pose_covariance=None)
             change = self.perception.pose_change(found.time)
             self._reports.add(Report(self.name, found, now, own_state, pose_change=change))
-            self._add_own_region(found.time)
+            if self._regions is not None:
+                self._regions.add(self.name, found.time, self._own_body.reference_pose(found.time), self._view)
         obeys = self.planner is not None and self.settings.obey_signals
         return StationPerception(
             now,
@@ -210,11 +212,6 @@ class Agent:
             estimate=None if self.perception.has_exact_pose else ego,
         )
 
-    def _add_own_region(self, time: float) -> None:
-        """Store the region that the own sensors perceived at `time` [s]."""
-        if self._regions is not None:
-            self._regions.add(self.name, time, self._own_body.reference_pose(time), self._view)
-
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:
             return None
@@ -231,7 +228,3 @@ class Agent:
             check_followed(self.planner, plan)
             check_control(self.controller, "control", control)
         return control
-
-    def _state(self, ego: EgoState) -> StationState:
-        x, y, z = ego.position.tolist()
-        return StationState(ego.time, x, y, z, ego.yaw, ego.speed, self.perception.pose_covariance)

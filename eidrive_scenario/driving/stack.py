@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
@@ -153,6 +154,11 @@ class DrivingStack(ABC):
     def resolved_settings(self) -> StackSettings:
         """Return the settings of all stations and of the channel at the start of the run."""
         return StackSettings()
+
+    @property
+    def settings(self) -> Mapping[str, AgentSettings]:
+        """Settings of the stations of the scenario, present or not; empty for a stack with settings of its own."""
+        return MappingProxyType({})
 
     @property
     def possible_drivers(self) -> Collection[str]:

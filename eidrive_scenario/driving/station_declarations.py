@@ -61,7 +61,9 @@ def declared_settings(
         raise SettingError(diagnostics)
     updated = {}
     for name, settings in found.items():
-        update = _by_detector(settings, detector)
+        update: dict[str, Any] = {} if detector is None else {"detector": detector}
+        if detector not in (None, settings.detector):
+            update["detector_settings"] = {}  # those of the file apply to the detector of the file
         if cooperate is not None and (settings.restricts_senders or _drives(scenario, name, settings)):
             update["cooperates_with"] = cooperate
         updated[name] = settings.model_copy(update=update)
@@ -83,13 +85,6 @@ def without_speed(settings: AgentSettings, *, limited: bool) -> bool:
     planner = registry("planners").load(settings.planner or DEFAULT_PLANNER)
     from_settings = settings.target_speed is not None or (settings.follow_speed_limit and limited)
     return issubclass(planner, RoutePlanner) and not from_settings
-
-
-def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
-    """Return the changes by a detector option; `detector_settings` of the file apply to the detector of the file."""
-    if detector is None:
-        return {}
-    return {"detector": detector} | ({} if detector == settings.detector else {"detector_settings": {}})
 
 
 def _drives(scenario: Scenario, name: str, settings: AgentSettings) -> bool:

@@ -68,12 +68,16 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
     if same_station:
-        rows, columns = _pairs_of_one_station(first["station"], second["station"])
+        order = np.argsort(second["station"], kind="stable")
+        begin, end = (np.searchsorted(second["station"][order], first["station"], side) for side in ("left", "right"))
+        rows, columns = ranges(begin, end, order)
     else:
         rows, columns = _pairs_of_two_stations(first, second, own, other)
     x, y = own.x[rows] - other.x[columns], own.y[rows] - other.y[columns]
     limit = own.reach[rows] + other.reach[columns]
-    near = (x * x + y * y <= limit * limit) & _on_one_level(first["body"][rows], second["body"][columns])
+    body, other_body = first["body"][rows], second["body"][columns]  # z, length, width, height
+    apart = np.abs(body[:, 0] - other_body[:, 0]) > 0.5 * (body[:, 3] + other_body[:, 3]) + LEVEL_TOLERANCE
+    near = (x * x + y * y <= limit * limit) & ~apart
     certain = None
     if same_station and second["number"].max(initial=-1) >= 0:
         number = second["number"][columns]
@@ -100,12 +104,6 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
 
 
-def _on_one_level(first: Array, second: Array) -> NDArray[np.bool_]:
-    """Return whether bodies (N, 4) of z, length, width and height may be at the same height."""
-    apart = np.abs(first[:, 0] - second[:, 0]) > 0.5 * (first[:, 3] + second[:, 3]) + LEVEL_TOLERANCE
-    return np.asarray(~apart)
-
-
 def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
     """Return the assigned pairs: first within the gate, then among the unassigned rows."""
     if all(pairs.inside):
@@ -122,12 +120,6 @@ def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
         if row not in rows and column not in columns
     ]
     return assigned + assign(*zip(*rest, strict=True)) if rest else assigned
-
-
-def _pairs_of_one_station(first: Integers, second: Integers) -> tuple[Integers, Integers]:
-    """Return rows and columns, in order, of the pairs of one station."""
-    order = np.argsort(second, kind="stable")
-    return ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
 
 
 def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side) -> tuple[Integers, Integers]:

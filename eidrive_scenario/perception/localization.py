@@ -13,7 +13,7 @@ from pydantic import Field
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.readings import CameraReading, EgoState, GnssReading, ImuReading, LidarReading, Readings
+from eidrive_scenario.sensing.readings import EgoState, GnssReading, ImuReading, Readings
 from eidrive_scenario.sensing.settings import ImuSettings
 from eidrive_scenario.settings import Settings
 
@@ -247,8 +247,8 @@ def at_pose(readings: Readings, ego: EgoState) -> Readings:
         ego=ego,
         truth=truth_reading,
         attached=_moved(readings.attached, rigid, turn) if len(readings.attached) else readings.attached,
-        cameras={name: _camera(reading, rigid) for name, reading in readings.cameras.items()},
-        lidars={name: _lidar(reading, rigid) for name, reading in readings.lidars.items()},
+        cameras={name: reading.at(rigid @ reading.pose) for name, reading in readings.cameras.items()},
+        lidars={name: replace(reading, pose=rigid @ reading.pose) for name, reading in readings.lidars.items()},
     )
 
 
@@ -258,14 +258,6 @@ def _moved(boxes: Array, rigid: Array, turn: float) -> Array:
     moved[:, :2] = moved[:, :2] @ rigid[:2, :2].T + rigid[:2, 3]
     moved[:, 6] = wrap_angle(moved[:, 6] + turn)
     return moved
-
-
-def _camera(reading: CameraReading, rigid: Array) -> CameraReading:
-    return reading.at(rigid @ reading.pose)
-
-
-def _lidar(reading: LidarReading, rigid: Array) -> LidarReading:
-    return replace(reading, pose=rigid @ reading.pose)
 
 
 class PoseNoise(Settings):

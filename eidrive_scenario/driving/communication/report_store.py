@@ -248,7 +248,9 @@ class ReportStore:
             if self._is_expired(message.detections.time, self._lifetime, now):
                 expired.append(row)
                 continue
-            detections = _numbered(message)
+            detections = message.detections
+            if message.objects is not None and not detections.tracks:
+                detections = replace(detections, tracks=message.objects)
             state: StationState | None = message.state
             pose_change: Array | None = None
             if not own:
@@ -319,10 +321,3 @@ class ReportStore:
         return self._own_body.without_perceived(
             detections, message.sender, message.state, None if own is None else own.detections, pose_covariance
         )
-
-
-def _numbered(message: Message) -> Detections:
-    """Return the detections of a message, with the object ids of the sender as track numbers if it has none."""
-    if message.objects is None or message.detections.tracks:
-        return message.detections
-    return replace(message.detections, tracks=message.objects)

@@ -104,7 +104,10 @@ class PidController(VehicleController):
             self._speed.reset()
             braking = max(plan.braking + _downhill(ego), 0.0)
             return Control(0.0, _pedal(braking, self.spec.max_deceleration), steering)
-        return self._pedals(self._accelerate(ego, plan) - _downhill(ego), steering)
+        acceleration = self._accelerate(ego, plan) - _downhill(ego)
+        if acceleration >= 0.0:
+            return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
+        return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
 
     def hold_standstill(self) -> Control:
         """Return full brake with the last steering angle."""
@@ -117,11 +120,6 @@ class PidController(VehicleController):
             self._speed.reset()
             return -HOLDING
         return self._speed.update(target - ego.speed, falling or plan.acceleration)
-
-    def _pedals(self, acceleration: float, steering: float) -> Control:
-        if acceleration >= 0.0:
-            return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
-        return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
 
     def _steer(self, ego: EgoState, plan: Plan) -> float:
         x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)

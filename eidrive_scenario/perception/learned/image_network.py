@@ -127,11 +127,11 @@ class ImageNetwork(ABC):
 
     def find_in(self, reading: CameraReading) -> ImageDetections:
         """Return the objects in the image of a camera."""
-        return self.find(reading.rgb)
+        return self.find_in_all([reading])[0]
 
     def find_in_all(self, readings: Sequence[CameraReading]) -> list[ImageDetections]:
-        """Return the objects in the image of each camera, as `find_in` does."""
-        return [self.find_in(reading) for reading in readings]
+        """Return the objects in the image of each camera."""
+        return self._find_all([reading.rgb for reading in readings])
 
     def find(self, image: NDArray[np.uint8]) -> ImageDetections:
         """Return the objects in an image (H, W, 3), red green blue. Boxes without an area in the image are removed."""

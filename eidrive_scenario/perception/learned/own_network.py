@@ -142,20 +142,11 @@ class OwnNetwork(ImageNetwork):
         self._outward: Floats = np.array(description.outward, dtype=float).reshape(-1, 5)
         self._anchors = weights.arrays["anchors"] if self.name == "yolov5" else None
 
-    def find_in(self, reading: CameraReading) -> ImageDetections:
-        """Return the objects in the image of a camera; an image whose detections are stored is not drawn."""
-        memory = image_memory.active()
-        if memory is None or reading.image_digest is None:
-            return self.find(reading.rgb)
-        key = self._key_of(reading)
-        found = memory.images.get(key)
-        if found is None:
-            found = self.find(reading.rgb)
-            memory.images.add(key, found)
-        return found
-
     def find_in_all(self, readings: Sequence[CameraReading]) -> list[ImageDetections]:
-        """Return the objects in the image of each camera; images whose detections are not stored form one batch."""
+        """Return the objects in the image of each camera; images whose detections are not stored form one batch.
+
+        An image whose detections are stored is not drawn.
+        """
         memory = image_memory.active()
         if memory is None:
             return self._find_all([reading.rgb for reading in readings])

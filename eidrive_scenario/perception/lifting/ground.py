@@ -269,7 +269,8 @@ class _View:
         damping = np.full((count, tried), 1e-3)
         error, gradient, information = self._linearize(place, headings, ground)
         for _ in range(ROUNDS):
-            scaled = information + damping[..., None, None] * _diagonal(information)
+            # Levenberg-Marquardt: the damping scales with the diagonal, which has a positive lower bound.
+            scaled = information + damping[..., None, None] * np.maximum(information, 1e-9) * np.eye(2)
             step = np.linalg.solve(scaled, gradient[..., None])[..., 0]
             longest = 0.3 * np.linalg.norm(place, axis=-1) + 0.5
             length = np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
@@ -338,8 +339,3 @@ class _View:
         axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
         sizes = (self._deviations[:, :2] / 2.0) ** 2
         return np.asarray(scale[:, None, None] * fit + np.einsum("nij,nj,nkj->nik", axes, sizes, axes))
-
-
-def _diagonal(matrices: Array) -> Array:
-    """Return the diagonals of matrices (..., 2, 2) as matrices, with a positive lower bound."""
-    return np.maximum(matrices, 1e-9) * np.eye(2)

@@ -237,7 +237,9 @@ class ObjectIdAssigner:
         assigned: list[int | None] = [None] * len(detections)
         known = list(self._known)
         if known:
-            expected = np.array([self._predict(number, now) for number in known])
+            expected = np.array(
+                [(x + vx * (now - time), y + vy * (now - time)) for time, x, y, vx, vy in self._known.values()]
+            )
             for row, column in associate(places, expected, GATE):
                 assigned[row] = known[column]
         numbers = []
@@ -249,10 +251,6 @@ class ObjectIdAssigner:
             self._known[number] = (now, x, y, vx, vy)
             numbers.append(number)
         return tuple(numbers)
-
-    def _predict(self, number: int, now: float) -> tuple[float, float]:
-        time, x, y, vx, vy = self._known[number]
-        return x + vx * (now - time), y + vy * (now - time)
 
 
 MANAGEMENT_BYTES = 121

@@ -76,7 +76,10 @@ class ReceptionLog:
         links = sorted(code_of)
         codes = np.array([code_of[link] for link in links], dtype=np.int64)
         columns = (self._received, self._delay_sum, self._delay_max, self._newest)
-        ages = [_none_for_nan(age) for age in self._ages.statistics(now, self._newest_present, codes)]
+        ages = [
+            [None if math.isnan(age) else age for age in column.tolist()]
+            for column in self._ages.statistics(now, self._newest_present, codes)
+        ]
         rows = zip(*(column[codes].tolist() for column in columns), *ages, strict=True)
         return {link: ReceptionStatistics(*row) for link, row in zip(links, rows, strict=True)}
 
@@ -122,10 +125,6 @@ class ReceptionLog:
         self._ages.record_updates(codes[fresh], (arrived - generated)[fresh], (arrived - before)[fresh])
         np.maximum.at(self._newest, codes, generated)
         np.maximum.at(self._newest_present, codes, generated)
-
-
-def _none_for_nan(ages: Array) -> list[float | None]:
-    return [None if math.isnan(age) else age for age in ages.tolist()]
 
 
 def _largest_before(groups: Integers, values: Array) -> Array:

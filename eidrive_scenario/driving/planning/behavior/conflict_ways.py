@@ -92,7 +92,7 @@ class ConflictWays:
         lit = [(passage.start - AROUND, passage.end + AROUND) for passage in passages if passage.has_light]
         for number, outline in enumerate(self._crosswalks):
             ways = _beside_crosswalk(line, number, outline, self._half_width)
-            found += [way._replace(has_light=_is_within(way, lit)) for way in ways]
+            found += [way._replace(has_light=any(low <= way.start <= high for low, high in lit)) for way in ways]
         return _grouped(sorted(found, key=lambda way: way.start), self._length + ROOM)
 
     def _of_junction(self, line: ReferenceLine, own: Passage) -> Iterator[ConflictWay]:
@@ -226,7 +226,3 @@ def _grouped(ways: list[ConflictWay], room: float) -> list[ConflictWay]:
         lane = min(lane, way.start) if way.kind == "lane" else lane
         found.append(way._replace(hold=hold, look=lane if way.kind == "lane" else hold))
     return found
-
-
-def _is_within(way: ConflictWay, ranges: list[tuple[float, float]]) -> bool:
-    return any(first <= way.start <= last for first, last in ranges)

@@ -60,7 +60,13 @@ class YoloV5(nn.Module):
         self.down_middle = ConvUnit(w4, w4, 3, 2)
         self.out_coarse = CrossStage(2 * w4, w5, 1, shortcut=False)
         self.heads = nn.ModuleList(nn.Conv2d(width, ANCHORS_PER_SCALE * (5 + classes), 1) for width in (w3, w4, w5))
-        self._initialize_biases()
+        # The first outputs state that objects are rare (Lin et al., Focal loss 2017, section 4.1).
+        for head, stride in zip(self.heads, STRIDES, strict=True):
+            assert isinstance(head, nn.Conv2d)
+            assert head.bias is not None
+            bias = head.bias.detach().view(ANCHORS_PER_SCALE, -1)
+            bias[:, 4] = math.log(8.0 / (512.0 * 384.0 / stride**2))
+            bias[:, 5:] = math.log(0.6 / (classes - 0.99))
 
     def raw_outputs(self, images: Tensor) -> list[Tensor]:
         """Return the outputs (B, A (5 + C), H/s, W/s) of the heads of each scale, as the ONNX model does."""
@@ -89,16 +95,6 @@ class YoloV5(nn.Module):
             size = (2.0 * share[..., 2:4]).square() * self.anchors[scale][None, :, None, None, :]
             found.append(torch.cat([center, size, share[..., 4:]], dim=-1).flatten(1, 3))
         return torch.cat(found, dim=1)
-
-    def _initialize_biases(self) -> None:
-        """Initialize biases so that the first outputs state that objects are rare (Lin et al., Focal loss 2017, section
-        4.1)."""
-        for head, stride in zip(self.heads, STRIDES, strict=True):
-            assert isinstance(head, nn.Conv2d)
-            assert head.bias is not None
-            bias = head.bias.detach().view(ANCHORS_PER_SCALE, -1)
-            bias[:, 4] = math.log(8.0 / (512.0 * 384.0 / stride**2))
-            bias[:, 5:] = math.log(0.6 / (self.classes - 0.99))
 
 
 def cell_corners(height: int, width: int, device: torch.device) -> Tensor:

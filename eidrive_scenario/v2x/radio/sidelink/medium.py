@@ -17,7 +17,7 @@ from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate
-from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
+from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
 from eidrive_scenario.v2x.radio.sidelink.sensing import ControlChannel, Pdu, SensingHistory
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
@@ -270,12 +270,10 @@ class Sidelink(MediumAccess):
             before = pdu.transmission.control
             pdu.transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
         codes[power < self.sensing_dbm] = PROPAGATION
-        self._note_reservations(due, codes, power - 10.0 * np.log10(SUBCARRIERS * blocks))
-
-    def _note_reservations(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
-        reserving = [place for place, pdu in enumerate(pdus) if pdu.transmission.reserves]
+        rsrp = power - 10.0 * np.log10(SUBCARRIERS * blocks)
+        reserving = [place for place, pdu in enumerate(due) if pdu.transmission.reserves]
         if reserving:
-            self._history.reserve([pdus[place] for place in reserving], codes[reserving], rsrp[reserving])
+            self._history.reserve([due[place] for place in reserving], codes[reserving], rsrp[reserving])
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period
