@@ -88,6 +88,8 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     if not near.all():
         rows, columns, x, y = rows[near], columns[near], x[near], y[near]
         certain = None if certain is None else certain[near]
+    # Squared Mahalanobis distances by the closed inverse of 2 x 2 matrices. The cost adds the logarithm of the
+    # determinant, which prevents that an uncertain track wins by its wide gate.
     xx, xy, yy = own.xx[rows] + other.xx[columns], own.xy[rows] + other.xy[columns], own.yy[rows] + other.yy[columns]
     determinant = xx * yy - xy * xy
     mahalanobis = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
@@ -142,6 +144,7 @@ def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side
     rows, columns = ranges(
         np.searchsorted(sorted_x, x - distance), np.searchsorted(sorted_x, x + distance, "right"), order
     )
+    # Each pair of two stations once, in the order of rows and columns as of a full matrix: ties go by this order.
     ahead = (station[rows] < other_station[columns]) & (receiver[rows] == other_receiver[columns])
     rows, columns = rows[ahead], columns[ahead]
     in_order = np.lexsort((columns, rows))

@@ -169,6 +169,7 @@ def fuse_headings(yaw: Array, weights: Array, errors: Array, starts: NDArray[np.
     counts = np.diff(starts, append=len(yaw))
     if len(counts) == len(yaw):
         return yaw
+    # Doubled angles make a heading and its reverse equal; the length of their mean shows how far the axes agree.
     x = np.add.reduceat(weights * np.cos(2.0 * yaw), starts)
     y = np.add.reduceat(weights * np.sin(2.0 * yaw), starts)
     total = np.add.reduceat(weights, starts)

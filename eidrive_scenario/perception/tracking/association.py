@@ -43,6 +43,7 @@ def associate(
         return [], []
     offset = boxes[None, :, :2] - tracks.state[:, None, :2]
     spread = tracks.covariance[:, None, :2, :2] + noise[None]
+    # Squared Mahalanobis distances by the closed inverse of 2 x 2 matrices: a solver would iterate over the pairs.
     a, b, d = spread[..., 0, 0], spread[..., 0, 1], spread[..., 1, 1]
     x, y = offset[..., 0], offset[..., 1]
     size = a * d - b * b

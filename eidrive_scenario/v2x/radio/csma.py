@@ -156,6 +156,7 @@ class Csma(MediumAccess):
         unaware = others & (starts < start + SLOT - TIME_TOLERANCE)
         self._fixed[unaware] = starts[unaware]
         waiting = others & ~unaware & ~np.isnan(self._slots)
+        # Slots that were idle between the end of AIFS and this start; the backoff freezes while the medium is busy.
         counted = np.floor((start - np.maximum(self.ready, self.free_from) - AIFS + TIME_TOLERANCE) / SLOT)
         self._slots[waiting] -= np.clip(counted[waiting], 0.0, self._slots[waiting])
 

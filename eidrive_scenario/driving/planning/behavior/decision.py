@@ -86,7 +86,7 @@ def _threat(options: Options, emergency: int) -> int | None:
 OFF_PROFILE = 0.8
 """Distance from the current profile above which the vehicle starts a new one from its position [m]."""
 SATISFIED = 0.85
-"""Share of the wanted progress from which on no other maneuver is considered."""
+"""Share of the wanted progress from which on no other maneuver is considered; a choice, as the next two times."""
 DWELL = 2.0
 """Time for which a maneuver is kept unless it becomes risky [s]."""
 PERSISTENT = 0.5

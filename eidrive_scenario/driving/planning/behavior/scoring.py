@@ -68,6 +68,8 @@ class OncomingTraffic:
         places = s + self._ahead
         center, half = scene.d[:, 0, None], scene.half_width[:, 0, None]
         edges = np.concatenate([scene.rear[:, 0], scene.front[:, 0]])
+        # A line to a place on the oncoming lane passes an edge of an object at this share of its length; it is hidden
+        # where it crosses the body between both edges.
         share = ((edges - s)[:, None] / (places - s)).reshape(2, len(scene), len(places))
         at_edge = d + share * (beside.oncoming - d)
         crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
@@ -126,19 +128,20 @@ def _is_oncoming(scene: Surroundings, step: int, place: float) -> Bools:
 
 
 CONTACT = 0.1
-"""Distance below which bodies are taken to touch [m]."""
+"""Distance below which bodies are taken to touch [m]; a choice of the order of the errors of tracked positions."""
 CLEAR_AHEAD = 1.0
-"""Clearance along the line below which a proposal is risky on a collision course [m]."""
+"""Clearance along the line below which a proposal is risky on a collision course [m]; half of `standstill_gap`."""
 ROUNDING = 1e-6
 """More than the error of sums of distances [m]."""
 FARTHER = 0.8
-"""Share by which the weight of a risk decreases toward the horizon."""
+"""Share by which the weight of a risk decreases toward the horizon, as predictions become uncertain; a choice."""
 LEAST_LACK = 0.3
-"""Risk of a clearance that is just too small; it increases to 1 at a contact."""
+"""Risk of a clearance that is just too small; it increases to 1 at a contact. A choice: a step, so that no option gains
+by a clearance that lacks a millimeter."""
 AT_REST = 0.1
 """Speed below which the vehicle stands [m/s]."""
 COMFORTABLE = 2.0
-"""Deceleration up to which a proposal is comfortable [m/s²]."""
+"""Deceleration up to which a proposal is comfortable [m/s²], of the order of the IDM (Treiber et al. 2000: 1.67)."""
 
 
 class Weights(msgspec.Struct, frozen=True):
@@ -289,6 +292,8 @@ def _overlaps(
     shift = round(settings.crossing_time / float(times[1] - times[0]))
     middle = ego.wheelbase / 2.0
     low, high = np.array([middle, -ego.rear]), np.array([ego.front, middle])
+    # (2, P, N, K): front and rear half of the vehicle, options, hypotheses, times; each half follows its own axle, so
+    # that the vehicle is bent along a curved profile.
     half_length = ((high - low) / 2.0)[:, None, None, None]
     center = (rolled.s + ((low + high) / 2.0)[:, None, None])[:, :, None, :]
     beside = offsets[:, :, None, :]
