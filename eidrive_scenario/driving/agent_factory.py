@@ -120,7 +120,12 @@ def build_agent(
     points = None
     listens = planner != NO_PLANNER or settings.restricts_senders
     if fusion.shares_points:
-        points = PointCloudSharing(fusion, _joint(settings, installation) if listens else None)
+        joint = None
+        if listens:  # perception of merged points: that of the station, without localization
+            another = build_detector(settings)
+            another.setup(installation)
+            joint = Perception(another, tracker=_tracker(settings, another), latency=settings.detector_latency)
+        points = PointCloudSharing(fusion, joint)
     driver: Planner | None = None
     if planner != NO_PLANNER:
         driver = construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed)
@@ -156,13 +161,6 @@ def build_agent(
 def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> VehicleController:
     kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
     return _construct(kind, spec, dt, own=vehicle_controller_settings(settings))  # type: ignore[no-any-return]
-
-
-def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception:
-    """Build the perception of merged points: that of the station, without localization."""
-    detector = build_detector(settings)
-    detector.setup(installation)
-    return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
 
 
 def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | None:

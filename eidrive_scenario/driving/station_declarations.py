@@ -205,18 +205,17 @@ def resolved_stations(
             ("vehicle_controllers", station.vehicle_controller),
             ("trackers", station.tracker.kind if station.tracker is not None else ""),
         }
+    stations = {}
+    for name, station in sorted(settings.items()):
+        written = stations[name] = station.model_dump(mode="json")
+        for kind, part in _WITH_SETTINGS:
+            model = optional_settings_type(kind, written[part], registry(kind).load(written[part]))
+            if model is not None:
+                own = model.model_validate(written[f"{part}_settings"])
+                written[f"{part}_settings"] = own.model_dump(mode="json")
     return StackSettings(
         channel=channel,
         channel_profile=None if profile is None else profile.model_dump(mode="json"),
-        stations={name: _resolved(station) for name, station in sorted(settings.items())},
+        stations=stations,
         extensions=distributions(used),
     )
-
-
-def _resolved(settings: AgentSettings) -> dict[str, Any]:
-    found = settings.model_dump(mode="json")
-    for kind, name in _WITH_SETTINGS:
-        model = optional_settings_type(kind, found[name], registry(kind).load(found[name]))
-        if model is not None:
-            found[f"{name}_settings"] = model.model_validate(found[f"{name}_settings"]).model_dump(mode="json")
-    return found

@@ -219,7 +219,10 @@ def group_tracks(tracks: Table, gate: AssociationGate) -> Objects:
     if unclear.any() or len(twice):
         for ambiguous in np.unique(receiver[np.concatenate([first[unclear], twice])]).tolist():
             begin, end = np.searchsorted(receiver, [ambiguous, ambiguous + 1]).tolist()
-            own = _pairs_between(pairs, begin, end)
+            # Pairs are in order of their rows: those of one receiver are consecutive.
+            part = slice(bisect_left(pairs.first, begin), bisect_left(pairs.first, end))
+            of_first, of_second = ([row - begin for row in side[part]] for side in (pairs.first, pairs.second))
+            own = Pairs(of_first, of_second, pairs.cost[part], pairs.inside[part])
             for members in _group_sequentially(station[begin:end].tolist(), own):
                 label[[begin + row for row in members]] = begin + members[0]
     rows = np.argsort(label, kind="stable")
@@ -234,13 +237,6 @@ def _tracks_of_one_station(label: Integers, station: Integers) -> Integers:
     ordered = keys[order]
     twice: Integers = order[1:][ordered[1:] == ordered[:-1]]
     return twice
-
-
-def _pairs_between(pairs: Pairs, begin: int, end: int) -> Pairs:
-    """Return the pairs of these rows, relative to the first one; pairs are in order of their rows."""
-    own = slice(bisect_left(pairs.first, begin), bisect_left(pairs.first, end))
-    first, second = ([row - begin for row in side[own]] for side in (pairs.first, pairs.second))
-    return Pairs(first, second, pairs.cost[own], pairs.inside[own])
 
 
 def _group_sequentially(stations: Sequence[int], pairs: Pairs) -> list[list[int]]:

@@ -196,7 +196,11 @@ def update_tracks(
     if not recent.all():
         tracks, times = tracks.take(np.flatnonzero(recent)), times[recent]
     predict_tracks(tracks, times)
-    _add_pose_changes(tracks, reports)
+    for station, report in enumerate(reports):
+        if report.pose_change is not None and report.state is not None:
+            changed = np.flatnonzero(tracks["station"] == station)
+            part = pose_part(tracks["mean"][changed, :2], report.state.x, report.state.y, report.pose_change)
+            tracks["covariance"][changed, :2, :2] += part
     pairs = assigned_pairs(gated_pairs(tracks, born, gate, same_station=True))
     rows = np.array([row for row, _ in pairs], dtype=np.intp)
     columns = np.array([column for _, column in pairs], dtype=np.intp)
@@ -215,15 +219,6 @@ def update_tracks(
     fresh[columns] = False
     both = join_rows([rows_of(tracks), rows_of(born.take(np.flatnonzero(fresh)))])
     return both.take(np.argsort(both["station"], kind="stable"))
-
-
-def _add_pose_changes(tracks: Table, reports: Sequence[Report]) -> None:
-    """Add the uncertainty of predicted tracks that is caused by changes of the pose errors of their stations."""
-    for station, report in enumerate(reports):
-        if report.pose_change is not None and report.state is not None:
-            rows = np.flatnonzero(tracks["station"] == station)
-            part = pose_part(tracks["mean"][rows, :2], report.state.x, report.state.y, report.pose_change)
-            tracks["covariance"][rows, :2, :2] += part
 
 
 def _update(old: Table, new: Table) -> Table:

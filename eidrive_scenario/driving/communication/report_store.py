@@ -261,10 +261,12 @@ class ReportStore:
                 pose_change = 2.0 * state.pose_covariance
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
-            self.add(
-                Report(station, detections, received.arrived, state, complete, pose_change),
-                None if complete else self._assembled_detections(message, pose_covariance),
-            )
+            completed: Detections | None = None
+            if not complete:  # the message lists a part of the objects of its sender
+                if sender not in self._partial:
+                    self._partial[sender] = PartialReportAssembler(self._lifetime)
+                completed = self._without_own_body(message, self._partial[sender].update(message), pose_covariance)
+            self.add(Report(station, detections, received.arrived, state, complete, pose_change), completed)
         if now > self._next_deletion:
             self._delete_old(now)
         return tuple(expired)
@@ -305,13 +307,6 @@ class ReportStore:
         for station in expired:
             del self._reports[station]
         self._next_deletion = oldest
-
-    def _assembled_detections(self, message: Message, pose_covariance: Array | None) -> Detections:
-        """Return all known objects of the sender of a message that lists a part of them."""
-        memory = self._partial.get(message.sender)
-        if memory is None:
-            memory = self._partial[message.sender] = PartialReportAssembler(self._lifetime)
-        return self._without_own_body(message, memory.update(message), pose_covariance)
 
     def _without_own_body(self, message: Message, detections: Detections, pose_covariance: Array | None) -> Detections:
         """Return detections of a message without the ego body."""

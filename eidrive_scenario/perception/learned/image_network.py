@@ -151,10 +151,10 @@ class ImageNetwork(ABC):
 
     def _detections(self, image: NDArray[np.uint8], scaled: _Scaled, candidates: Candidates) -> ImageDetections:
         height, width = image.shape[:2]
-        candidates = _finite(candidates)
-        if len(candidates.scores) > MOST_CANDIDATES:
-            best = np.argsort(-candidates.scores, kind="stable")[:MOST_CANDIDATES]
-            candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
+        rows = np.flatnonzero(np.isfinite(candidates.boxes).all(axis=1))
+        if len(rows) > MOST_CANDIDATES:
+            rows = rows[np.argsort(-candidates.scores[rows], kind="stable")[:MOST_CANDIDATES]]
+        candidates = Candidates(candidates.boxes[rows], candidates.scores[rows], candidates.classes[rows])
         groups = self._groups[candidates.classes]
         kept = suppress(candidates.boxes, candidates.scores, groups, LARGEST_OVERLAP)
         boxes = self.calibrated(candidates.boxes[kept], [self.classes[number] for number in candidates.classes[kept]])
@@ -177,14 +177,6 @@ class ImageNetwork(ABC):
     def candidates_of(self, images: Sequence[NDArray[np.uint8]]) -> list[Candidates]:
         """Return the boxes in each image of the input size, as `candidates` does."""
         return [self.candidates(image) for image in images]
-
-
-def _finite(candidates: Candidates) -> Candidates:
-    """Return the candidates whose boxes have finite edges."""
-    finite = np.isfinite(candidates.boxes).all(axis=1)
-    if finite.all():
-        return candidates
-    return Candidates(candidates.boxes[finite], candidates.scores[finite], candidates.classes[finite])
 
 
 def resized(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:

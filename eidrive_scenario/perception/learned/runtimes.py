@@ -116,7 +116,9 @@ def load_onnx(runtime: Runtime, path: Path, threads: int, content: bytes | None 
         content = read_weights(path)
     if runtime == "openvino":
         return openvino_network(path, threads, content)
-    return (onnxruntime_network if runtime == "onnxruntime" else opencv_network)(path, threads, content)
+    if runtime == "onnxruntime":
+        return onnxruntime_network(path, threads, content)
+    return opencv_network(path, threads, content)
 
 
 def openvino_network(path: Path, threads: int, content: bytes) -> Compute:

@@ -168,7 +168,12 @@ class Tracker(TrackingMethod):
         # Road users on foot and on two wheels set off at any time: that they stand must not be concluded.
         vulnerable = [row for row, history in enumerate(self._histories) if history.name in VULNERABLE]
         self._tracks.probability[:, vulnerable] = np.array([[0.0], [1.0]])
-        return self._confirm_and_report(detections.time)
+        for history, existence in zip(self._histories, self._existence.tolist(), strict=True):
+            if history.number is None and history.is_often_detected and existence >= self.settings.confirm_existence:
+                self._confirmed += 1
+                history.number = self._confirmed
+        shown = [row for row, history in enumerate(self._histories) if history.number is not None]
+        return self._report(detections.time, shown, self._tracks.take(shown), self._existence[shown])
 
     def _boxes_on_bodies(
         self,
@@ -305,15 +310,6 @@ class Tracker(TrackingMethod):
         if shown and step > 0.0:
             tracks = self._filter.predict(tracks, step)
         return self._report(time, shown, tracks, survived(self._existence[shown], step, self.settings.lifetime))
-
-    def _confirm_and_report(self, now: float) -> Detections:
-        for history, existence in zip(self._histories, self._existence.tolist(), strict=True):
-            if history.number is None and history.is_often_detected and existence >= self.settings.confirm_existence:
-                self._confirmed += 1
-                history.number = self._confirmed
-        shown = [row for row, history in enumerate(self._histories) if history.number is not None]
-        tracks = self._tracks.take(shown)
-        return self._report(now, shown, tracks, self._existence[shown])
 
     def _report(self, time: float, rows: list[int], tracks: Tracks, existence: Array) -> Detections:
         histories = [self._histories[row] for row in rows]

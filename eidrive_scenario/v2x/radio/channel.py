@@ -107,15 +107,18 @@ class RadioChannel(QueuedChannel):
         self._advance(now)
         offered: list[Transmission] = []
         for message, receivers in outbox:
-            row = self._row(message.sender)
+            rows = self._rows_of(message.sender, receivers)
+            if message.sender not in self._rows or len(rows) < len(receivers):
+                missing = next(name for name in (message.sender, *receivers) if name not in self._rows)
+                raise ValueError(f"station {missing!r} has no antenna position in the radio environment")
+            row = self._rows[message.sender]
             ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
             entry = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
-            rows = self._rows_of(message.sender, receivers)
-            if len(rows) < len(receivers):
-                missing = next(name for name in receivers if name not in self._rows)
-                raise ValueError(_no_position(missing))
             self._counters.send(row, rows, message.size)
-            (self._drop if self._jamming.blocks(message.sender) else offered.append)(entry)
+            if self._jamming.blocks(message.sender):
+                self._drop(entry)
+            else:
+                offered.append(entry)
         self._access.enqueue(offered)
         return self.drain_events()
 
@@ -170,12 +173,6 @@ class RadioChannel(QueuedChannel):
             rows = np.array([self._rows[name] for name in receivers if name in self._rows], dtype=np.int64)
             cached = self._receivers[sender] = (tuple(receivers), rows)
         return cached[1]
-
-    def _row(self, name: str) -> int:
-        row = self._rows.get(name)
-        if row is None:
-            raise ValueError(_no_position(name))
-        return row
 
     def _set_stations(self, names: tuple[str, ...], now: float) -> None:
         """Replace the stations. Pending messages of removed stations are lost."""
@@ -308,7 +305,3 @@ class RadioChannel(QueuedChannel):
         self._dropped.append(
             LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
         )
-
-
-def _no_position(name: str) -> str:
-    return f"station {name!r} has no antenna position in the radio environment"

@@ -130,7 +130,10 @@ class Csma(MediumAccess):
         # NaN and infinity select the cases: no backoff yet, an empty queue, no fixed start.
         met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS)
         if met_busy.any():
-            self._draw(np.flatnonzero(met_busy))
+            rows = np.flatnonzero(met_busy)
+            heads = [self._head[row] for row in rows.tolist()]
+            numbers = np.array([head.message.number for head in heads if head is not None])
+            self._slots[rows] = np.floor(uniforms(self._keys[rows], numbers) * (CONTENTION_WINDOW + 1))
         waited = np.maximum(self.ready, self.free_from) + AIFS + self._slots * SLOT
         starts = np.where(np.isnan(self._slots), self.ready, waited)
         return np.where(np.isnan(self._fixed), starts, self._fixed)
@@ -165,9 +168,3 @@ class Csma(MediumAccess):
         self.free_from = reorder_rows(self.free_from, rows, -math.inf)
         self._keys = self._backoff_keys()
         self._preambles.reorder(rows)
-
-    def _draw(self, rows: NDArray[np.int64]) -> None:
-        """Draw the backoff of the first message of these stations [slots]."""
-        heads = [self._head[row] for row in rows.tolist()]
-        numbers = np.array([head.message.number for head in heads if head is not None])
-        self._slots[rows] = np.floor(uniforms(self._keys[rows], numbers) * (CONTENTION_WINDOW + 1))

@@ -196,6 +196,8 @@ class BehaviorPlanner(RoutePlanner):
         near = [known[row] for row in rows]
         stop = self._stop(line.path, ego, x, y, now)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
+        low = line.index_at(s - MARGIN_AHEAD)
+        high = line.index_at(s + max(ego.speed, wanted) * self.planner_settings.horizon + MARGIN_AHEAD) + 1
         situation = Situation(
             line=line,
             limits=limits,
@@ -206,7 +208,7 @@ class BehaviorPlanner(RoutePlanner):
             wanted=wanted,
             objects=near,
             prediction=self._predictor.predict(near, [lanes[row] for row in rows]),
-            window=self._window(line, s, max(ego.speed, wanted)),
+            window=(low, max(high, low + 2)),
             stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
             now=now,
             gives_way=self._gives_way(s),
@@ -238,12 +240,6 @@ class BehaviorPlanner(RoutePlanner):
             return np.asarray(np.logical_or.reduce(shown))
 
         return in_view
-
-    def _window(self, line: ReferenceLine, s: float, speed: float) -> tuple[int, int]:
-        """Return the range of the points of the line that matter."""
-        low = line.index_at(s - MARGIN_AHEAD)
-        high = line.index_at(s + speed * self.planner_settings.horizon + MARGIN_AHEAD) + 1
-        return low, max(high, low + 2)
 
 
 def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[int, ...]) -> Plan:

@@ -159,7 +159,8 @@ class Predictor:
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            (found if fits else too_fast).append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
+            fitting = found if fits else too_fast
+            fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if len(found) == MOST_HYPOTHESES:
                 break
         found = found or too_fast

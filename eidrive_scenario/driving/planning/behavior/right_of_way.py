@@ -16,7 +16,6 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.traffic_lights import StopLine, places_along, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
-from eidrive_scenario.roads.routing.movement import Branch
 
 BEFORE_ENTRY = 25.0
 """Maximum distance of a sign before the junction to which it belongs [m]."""
@@ -306,7 +305,9 @@ class LaneCourses:
             key = chain[-1]
             direction = self._roads.driving_direction(key.road, key.lane)
             branches = [branch for branch in self._roads.movement.branches(key, direction) if branch.lane not in chain]
-            branches = _likely(branches)
+            # Those whose turn is about as small as the smallest are likely.
+            least = min((abs(branch.turn) for branch in branches), default=0.0)
+            branches = [branch for branch in branches if abs(branch.turn) <= least + SIMILAR_TURN]
             if not branches:
                 break
             if len(branches) > 1:
@@ -347,11 +348,3 @@ class LaneCourses:
         half_width = max(width.value(0.0), width.value(section.length)) / 2.0
         stops, passages = self._rules.stops_along(points, heights), self._rules.passages(points, heights)
         return Course(points, along, half_width, stops, passages, heights)
-
-
-def _likely(branches: list[Branch]) -> list[Branch]:
-    """Return the branches whose turn is about as small as the smallest."""
-    if len(branches) < 2:
-        return branches
-    least = min(abs(branch.turn) for branch in branches)
-    return [branch for branch in branches if abs(branch.turn) <= least + SIMILAR_TURN]

@@ -187,7 +187,10 @@ class YoloLoss:
                 one_hot = torch.zeros((count, self._classes), device=device)
                 one_hot[torch.arange(count, device=device), found.classes] = 1.0
                 class_loss = class_loss + binary_cross_entropy_with_logits(predictions[:, 5:], one_hot, reduction="sum")
-            considered = self._considered(targets, height, width, stride, device) | (expected > 0.0)
+            # Cells in an ignored object do not count.
+            centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
+            free = ~targets.in_ignored(centers).view(-1, 1, height, width)
+            considered = free.expand(-1, ANCHORS_PER_SCALE, -1, -1) | (expected > 0.0)
             each = binary_cross_entropy_with_logits(raw[..., 4], expected, reduction="none")
             object_loss = object_loss + SCALE_WEIGHTS[scale] * (each * considered).mean()
         inverse_count = 1.0 / max(assigned, 1)
@@ -197,9 +200,3 @@ class YoloLoss:
             "class": CLASS_WEIGHT * inverse_count * class_loss,
         }
         return sum(parts.values(), torch.zeros((), device=device)), {k: float(v.detach()) for k, v in parts.items()}
-
-    def _considered(self, targets: Targets, height: int, width: int, stride: int, device: torch.device) -> Tensor:
-        """Return the cells (B, A, H, W) that are not in an ignored object."""
-        centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
-        free = ~targets.in_ignored(centers).view(-1, 1, height, width)
-        return free.expand(-1, ANCHORS_PER_SCALE, -1, -1)
