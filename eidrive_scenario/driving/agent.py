@@ -13,7 +13,7 @@ from eidrive_scenario.driving.communication.message_generator import MessageGene
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore, PointCloudSharing, ReportStore
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
-from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.result_checks import check_control, check_followed, check_plan, is_valid_control
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, Plan, StationAction, StationPerception

@@ -9,7 +9,7 @@ from eidrive_scenario.driving.communication.message_generator import MessageGene
 from eidrive_scenario.driving.communication.report_store import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
-from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.extension_settings import parse_own_settings

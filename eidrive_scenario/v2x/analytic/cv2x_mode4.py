@@ -26,7 +26,7 @@ from eidrive_scenario.v2x.analytic.table import (
     sensed_share,
     signal,
 )
-from eidrive_scenario.v2x.propagation.path_loss import winner_b1
+from eidrive_scenario.v2x.propagation import winner_b1
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, CANDIDATE_SHARE, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
 
 FREQUENCY = 5.91

@@ -24,7 +24,7 @@ from eidrive_scenario.v2x.analytic.table import (
     sensed_share,
     signal,
 )
-from eidrive_scenario.v2x.propagation.path_loss import winner_b1
+from eidrive_scenario.v2x.propagation import winner_b1
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, PREAMBLE, SENSING_DBM, SLOT
 
 FREQUENCY = 5.89

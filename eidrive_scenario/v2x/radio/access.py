@@ -17,7 +17,7 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message
-from eidrive_scenario.v2x.propagation.fading import FadingDraws
+from eidrive_scenario.v2x.propagation import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate
 
 

@@ -17,8 +17,7 @@ from eidrive_scenario.v2x.link_models.delay import ConstantDelay
 from eidrive_scenario.v2x.link_models.loss import LossProcess, NoLoss
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
-from eidrive_scenario.v2x.propagation.fading import FadingDraws, Nakagami
-from eidrive_scenario.v2x.propagation.path_loss import Tr37885
+from eidrive_scenario.v2x.propagation import FadingDraws, Nakagami, Tr37885
 from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate

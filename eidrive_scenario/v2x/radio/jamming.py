@@ -10,7 +10,7 @@ from pydantic import Field
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss
+from eidrive_scenario.v2x.propagation import LinkGeometry, PathLoss
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 ENERGY_DETECTION_DBM = -65.0

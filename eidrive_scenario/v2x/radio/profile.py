@@ -13,8 +13,7 @@ from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.link_models.composed import ComposedProfile
-from eidrive_scenario.v2x.propagation.fading import Fading, NoFading
-from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss, Tr37885
+from eidrive_scenario.v2x.propagation import Fading, LinkGeometry, NoFading, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.jamming import Jammer

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.v2x.counter_random import uniform, uniforms
-from eidrive_scenario.v2x.propagation.path_loss import (
+from eidrive_scenario.v2x.propagation import (
     LinkGeometry,
     LogDistance,
     Tr37885,
