@@ -130,6 +130,10 @@ def build_agent(
     if planner != NO_PLANNER:
         driver = construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed)
         driver.view = view or None
+    controller: VehicleController | None = None
+    if spec.has_wheels:
+        kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
+        controller = _construct(kind, spec, dt, own=vehicle_controller_settings(settings))
     noise, localizer = settings.pose_noise, None
     if settings.localization == "ekf":
         imu = next(sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings))
@@ -148,7 +152,7 @@ def build_agent(
         ),
         fusion=fusion,
         planner=driver,
-        controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
+        controller=controller,
         message_generator=MessageGenerator(
             spec, settings, sensors=len(sensors), view=view, encoder=encoder, seed=seed, dt=dt, number=number
         ),
@@ -156,11 +160,6 @@ def build_agent(
         receives_messages=listens,
         points=points,
     )
-
-
-def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> VehicleController:
-    kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
-    return _construct(kind, spec, dt, own=vehicle_controller_settings(settings))  # type: ignore[no-any-return]
 
 
 def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | None:

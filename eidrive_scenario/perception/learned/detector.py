@@ -160,25 +160,26 @@ class LearnedDetector(Detector):
         Image boxes that no body fills are omitted.
         """
         clouds: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
-        lifted = most_certain([self._lift_with(found, readings, camera, *cloud) for cloud in clouds.items()])
-        return lifted if lifted.scores.all() else lifted.subset(np.flatnonzero(lifted.scores).tolist())
-
-    def _lift_with(
-        self, found: ImageDetections, readings: Readings, camera: str, lidar: str, cloud: LidarReading | None
-    ) -> Detections:
-        categories = [object_category(name) for name in found.classes]
-        rows = [row for row, category in enumerate(categories) if category is not None]
-        return lift(
-            found.boxes[rows],
-            [category for category in categories if category is not None],
-            found.scores[rows],
-            readings.cameras[camera],
-            cloud,
-            time=readings.time,
-            ground=float(readings.ego.position[2]),
-            surroundings=self._map_context,
-            pattern=self._patterns.get(lidar),
+        categories = {row: object_category(name) for row, name in enumerate(found.classes)}
+        used = {row: category for row, category in categories.items() if category is not None}
+        rows = list(used)
+        lifted = most_certain(
+            [
+                lift(
+                    found.boxes[rows],
+                    list(used.values()),
+                    found.scores[rows],
+                    readings.cameras[camera],
+                    cloud,
+                    time=readings.time,
+                    ground=float(readings.ego.position[2]),
+                    surroundings=self._map_context,
+                    pattern=self._patterns.get(lidar),
+                )
+                for lidar, cloud in clouds.items()
+            ]
         )
+        return lifted if lifted.scores.all() else lifted.subset(np.flatnonzero(lifted.scores).tolist())
 
 
 class YoloDetector(LearnedDetector):

@@ -62,14 +62,14 @@ def misspelt(name: str) -> str | None:
     Networks distinguish many things that are not used here, so an unknown name is not an error by itself.
     """
     state = light_state(name)
-    if object_category(name) or name == STOP_SIGN or (state and (state in ("off", "unknown") or _lights_a_lamp(state))):
+    if (
+        object_category(name)
+        or name == STOP_SIGN
+        or (state and (state in ("off", "unknown") or any(mode != OFF for _, mode in lamps(state))))
+    ):
         return None
     near = get_close_matches(name, (*CLASSES, *_SAME_AS, LIGHT, *IMAGE_CLASSES), n=1, cutoff=VERY_LIKE)
     return near[0] if near else None
-
-
-def _lights_a_lamp(state: str) -> bool:
-    return any(mode != OFF for _, mode in lamps(state))
 
 
 def suppression_groups(names: Sequence[str]) -> NDArray[np.int64]:

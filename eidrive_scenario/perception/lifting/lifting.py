@@ -261,7 +261,13 @@ def _foreground(
             for rows in parts
             for group in clusters(scan.points[rows], scan.pattern.azimuth, grazing=grazing)
         }
-        candidates = _candidates([groups[key] for key in groups if key not in tried], inside, away, target)
+        candidates = []
+        for group in [groups[key] for key in groups if key not in tried]:
+            points = int(inside[group].sum())
+            weight = points * target.likelihood(float(np.median(away[group]))) if points >= LEAST_POINTS else 0.0
+            if weight > 0.0:
+                candidates.append(_Candidate(group, points, weight))
+        candidates.sort(key=lambda candidate: -candidate.weight)  # the likeliest first
         for candidate in candidates[:MOST_TRIED]:
             fit = scan.fit(candidate.rows, target.classes, target.heading, target.heading_cost)
             if fit is None:
@@ -276,18 +282,6 @@ def _foreground(
             break  # otherwise parts of a grazed surface may be separate clusters
         tried.update(groups)
     return None if best is None else best[1]
-
-
-def _candidates(groups: Sequence[Integers], inside: NDArray[np.bool_], away: Array, target: Target) -> list[_Candidate]:
-    """Return the groups of points that may be the object, the likeliest first."""
-    found = []
-    for group in groups:
-        count = int(inside[group].sum())
-        if count >= LEAST_POINTS:
-            weight = count * target.likelihood(float(np.median(away[group])))
-            if weight > 0.0:
-                found.append(_Candidate(group, count, weight))
-    return sorted(found, key=lambda candidate: -candidate.weight)
 
 
 def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: Target) -> Fit:

@@ -164,7 +164,15 @@ class Tracker(TrackingMethod):
         for row, column in zip(rows, columns, strict=True):
             self._histories[row].record_detection(detections, column)
         self._initiate(detections, [column for column in unassigned.tolist() if column not in on_bodies], noise)
-        self._delete(detections.time)
+        # Tracks are deleted that cannot be confirmed any more, hardly exist, or have coasted for too long.
+        kept = [
+            row
+            for row, (history, existence) in enumerate(zip(self._histories, self._existence.tolist(), strict=True))
+            if existence >= self.settings.delete_existence and history.is_alive(detections.time, self.settings)
+        ]
+        if len(kept) < len(self._histories):
+            self._tracks, self._shape = self._tracks.take(kept), self._shape[kept]
+            self._existence, self._histories = self._existence[kept], [self._histories[row] for row in kept]
         # Road users on foot and on two wheels set off at any time: that they stand must not be concluded.
         vulnerable = [row for row, history in enumerate(self._histories) if history.name in VULNERABLE]
         self._tracks.probability[:, vulnerable] = np.array([[0.0], [1.0]])
@@ -278,20 +286,6 @@ class Tracker(TrackingMethod):
             history.record_scan(True, self.settings)
             history.record_detection(detections, column)
             self._histories.append(history)
-
-    def _delete(self, now: float) -> None:
-        """Delete tracks that cannot be confirmed any more, hardly exist, or have coasted for too long."""
-        existence = self._existence.tolist()
-        kept = [
-            row
-            for row, history in enumerate(self._histories)
-            if existence[row] >= self.settings.delete_existence and history.is_alive(now, self.settings)
-        ]
-        if len(kept) < len(self._histories):
-            self._tracks = self._tracks.take(kept)
-            self._shape = self._shape[kept]
-            self._existence = self._existence[kept]
-            self._histories = [self._histories[row] for row in kept]
 
     def predict(self, time: float) -> Detections | None:
         """Return the confirmed objects predicted to a time [s] after the last detections.

@@ -59,7 +59,12 @@ class CamGenerationRules:
         passed = now - self._sent
         if passed < shortest - EQUAL:
             return False
-        if self._last is None or _has_changed(self._last, state):
+        last = self._last
+        if last is None or (
+            abs(wrap_angle(state.yaw - last.yaw)) > HEADING + EQUAL
+            or math.hypot(state.x - last.x, state.y - last.y) > DISTANCE + EQUAL
+            or abs(state.speed - last.speed) > SPEED + EQUAL
+        ):
             self._interval = min(max(passed, SHORTEST), LONGEST)
             self._repeats = 0
         elif passed >= self._interval - EQUAL:
@@ -84,14 +89,6 @@ class CamGenerationRules:
             return False
         self._low_frequency = now
         return True
-
-
-def _has_changed(last: StationState, state: StationState) -> bool:
-    return (
-        abs(wrap_angle(state.yaw - last.yaw)) > HEADING + EQUAL
-        or math.hypot(state.x - last.x, state.y - last.y) > DISTANCE + EQUAL
-        or abs(state.speed - last.speed) > SPEED + EQUAL
-    )
 
 
 RETENTION = 2.0 * LONGEST
@@ -153,7 +150,8 @@ class CpmGenerationRules:
         present = {row: _report(detections, row, now) for row in rows}
         vulnerable = [row for row in rows if detections.classes[row] in VULNERABLE]
         chosen = [row for row in rows if row not in vulnerable and self._vehicle_due(numbers[row], present[row])]
-        if any(self._person_due(numbers[row], now) for row in vulnerable):
+        reports = [self._reported.get(numbers[row]) for row in vulnerable]
+        if any(last is None or now - last.time >= LONGEST / 2.0 - EQUAL for last in reports):
             chosen += vulnerable
         sensors = now - self._sensors >= SENSORS - EQUAL
         if not chosen and not sensors:
@@ -175,10 +173,6 @@ class CpmGenerationRules:
             or abs(wrap_angle(present.direction - last.direction)) > HEADING + EQUAL
             or present.time - last.time >= LONGEST - EQUAL
         )
-
-    def _person_due(self, number: int, now: float) -> bool:
-        last = self._reported.get(number)
-        return last is None or now - last.time >= LONGEST / 2.0 - EQUAL
 
     def _utility(self, number: int, present: _ReportedObject, score: float) -> float:
         """Return the utility of an object. New objects come first, then those of higher quality or larger change.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,14 +147,6 @@ class LinkBudget:
         self._keys = np.stack([keys("shadowing"), keys("blockage")])
         self._sight_keys = keys("sight")
 
-    def _names_of(self, pairs: Sequence[int]) -> Sequence[tuple[str, str]]:
-        """Return the names of the stations of these pairs."""
-        if self._pairs is None:
-            names, ends = self._names, zip(self._first.tolist(), self._second.tolist(), strict=True)
-            self._pairs = [(names[a], names[b]) for a, b in ends]
-        known = self._pairs
-        return known if len(pairs) == len(known) else [known[pair] for pair in pairs]
-
     def _link_geometry(
         self, surroundings: RadioEnvironment, distance: Array
     ) -> tuple[LinkGeometry, dict[tuple[int, int], tuple[str, ...]]]:
@@ -169,7 +161,11 @@ class LinkBudget:
             between.tops[hidden] = between.upper[hidden] + 0.1
         elif self._line_of_sight == "rays" and surroundings.sight is not None and len(distance):
             near = np.flatnonzero(distance < self._reach)
-            sight = surroundings.sight(self._names_of(near.tolist()))
+            if self._pairs is None:
+                rows = zip(self._first.tolist(), self._second.tolist(), strict=True)
+                self._pairs = [(self._names[a], self._names[b]) for a, b in rows]
+            all_near = len(near) == len(self._pairs)
+            sight = surroundings.sight(self._pairs if all_near else [self._pairs[pair] for pair in near.tolist()])
             between.states[near], between.tops[near] = sight.states, sight.heights
             for ray, names in sight.blockers.items():
                 pair = int(near[ray])

@@ -186,18 +186,17 @@ class Sidelink(MediumAccess):
             earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
             occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
             in_time = occasion * SUBFRAME <= ready + settings.latency + TIME_TOLERANCE
-            if in_time and not self._is_released(grant, now, occasion):
+            # A resource that was not used for some time, or for some occasions, is released.
+            interval, limit = settings.interval_subframes, settings.reselect_after
+            used = grant.subframe - interval if grant.used is None else grant.used
+            is_released = (now - used) * SUBFRAME > UNUSED or (
+                limit is not None and (occasion - used) // interval - 1 >= limit
+            )
+            if in_time and not is_released:
                 return occasion
         earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
         self._grants[row] = grant = self._select(row, now, earliest, width, length)
         return grant.subframe
-
-    def _is_released(self, grant: Grant, now: int, occasion: int) -> bool:
-        """Return True if a resource is released because it was not used."""
-        used = grant.subframe - self._settings.interval_subframes if grant.used is None else grant.used
-        unused = (occasion - used) // self._settings.interval_subframes - 1
-        limit = self._settings.reselect_after
-        return (now - used) * SUBFRAME > UNUSED or (limit is not None and unused >= limit)
 
     def _select(self, row: int, now: int, earliest: int, width: int, length: int) -> Grant:
         """Select a new resource among the candidates after sensing, and draw its reselection counter."""
