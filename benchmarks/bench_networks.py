@@ -19,8 +19,7 @@ import torch
 
 from eidrive_scenario.perception.learned.network_loading import SHIPPED
 from eidrive_scenario.perception.learned.networks.blocks import fold
-from eidrive_scenario.perception.learned.torch_devices import prepare
-from eidrive_scenario.perception.learned.torch_weights import trainable
+from eidrive_scenario.perception.learned.torch_network import prepare, trainable
 from eidrive_scenario.perception.learned.weights import read
 
 WARM_UP = 5

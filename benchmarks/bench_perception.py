@@ -25,7 +25,7 @@ from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.lidar.detector import LidarDetector
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings

@@ -10,8 +10,6 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
 
-MAX_SCALAR = 64
-"""Maximum number of pairs for scalar evaluation, which is then faster than arrays."""
 OUTSIDE = 1e6
 """Cost of a pair outside the gate: finite, so that a full assignment exists, and above any sum of gated costs."""
 
@@ -24,24 +22,9 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     """
     if not len(first) or not len(second):
         return []
-    if len(first) * len(second) <= MAX_SCALAR:
-        return associate_small(first.tolist(), second.tolist(), gate)
     offset = first[:, None, :] - second[None, :, :]
     distance = np.sqrt(np.einsum("nmi,nmi->nm", offset, offset))
     return assign_matrix(distance, distance < gate)
-
-
-def associate_small(
-    first: Sequence[Sequence[float]], second: Sequence[Sequence[float]], gate: float
-) -> list[tuple[int, int]]:
-    """Return the result of `associate`, evaluated pair by pair."""
-    near = [
-        (row, column, distance)
-        for row, one in enumerate(first)
-        for column, other in enumerate(second)
-        if (distance := math.dist(one, other)) < gate
-    ]
-    return assign(*zip(*near, strict=True)) if near else []
 
 
 def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
@@ -49,14 +32,8 @@ def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
 
     Costs are smaller than OUTSIDE by more than their sum. Each row and column is used at most once.
     """
-    rows, columns = (side.tolist() for side in np.nonzero(inside))
-    found = _assign_stars(rows, columns, cost[inside].tolist())
-    if found is not None:
-        return found
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = (side.tolist() for side in linear_sum_assignment(np.where(inside, cost, OUTSIDE)))
-    return [(row, column) for row, column in zip(rows, columns, strict=True) if inside[row, column]]
+    rows, columns = np.nonzero(inside)
+    return assign(rows.tolist(), columns.tolist(), cost[inside].tolist())
 
 
 def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""README.md and the tables of options: agreement with the command line, the pytest plugin and the files of the project."""
+"""README.md and the tables of commands and options: agreement with the code and with the files of the project."""
 
 from __future__ import annotations
 

@@ -19,9 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.detector import LearnedDetector
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import DESCRIPTION

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, object_category
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, object_category
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings

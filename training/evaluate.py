@@ -16,9 +16,8 @@ from typing import Any
 
 import cv2
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.world.weather import Weather, load_weather

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.detector import LearnedDetector
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from training.dataset import Dataset, shows_enough, write
 from training.labels import Label

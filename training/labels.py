@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import rotation_matrix
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
 from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.rendering.meshes.signs import sign_face
 from eidrive_scenario.roads.model.signal_states import lamp_colors, lamps, lit

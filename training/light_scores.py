@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.perception.learned.classes import LIGHT_STATES
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.detector import ImageDetections
+from eidrive_scenario.perception.learned.image_network import LIGHT_STATES, ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap
 from training.light_scenes import LightScene
 from training.tables import WEATHERS, Table

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.experiments.average_precision import match
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.networks.suppression import overlap
 from training.dataset import Dataset
 from training.scoring import EvaluatedImage

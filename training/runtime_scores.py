@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, ImageNetwork
 from eidrive_scenario.perception.learned.network_loading import build_network, weights_path
-from eidrive_scenario.perception.learned.runtime_selection import Runtime, is_installed, runtime_versions, runtimes_of
+from eidrive_scenario.perception.learned.runtimes import Runtime, is_installed, runtime_versions, runtimes_of
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from training.dataset import Dataset
 from training.image_evaluation import evaluate_dataset

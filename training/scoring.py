@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, match, recall_at
-from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, light_state
+from eidrive_scenario.perception.detector import ImageDetections
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, light_state
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

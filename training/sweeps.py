@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.experiments.average_precision import match
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, VEHICLES
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, VEHICLES
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, VEHICLES
 from training.scoring import ROAD_USERS, EvaluatedImage, Part, as_one_light, mean_precision, score
 
 Array = NDArray[np.float64]

@@ -22,17 +22,14 @@ from numpy.typing import NDArray
 from torch import nn
 
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, best_confidence, match
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
-from eidrive_scenario.perception.learned.networks.boxes import centered
-from eidrive_scenario.perception.learned.networks.ssd import Ssd, default_boxes
-from eidrive_scenario.perception.learned.networks.ssd_loss import SsdLoss
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, suppression_groups
+from eidrive_scenario.perception.learned.networks.boxes import IGNORED, PADDING, Targets, centered
+from eidrive_scenario.perception.learned.networks.ssd import Ssd, SsdLoss, default_boxes
 from eidrive_scenario.perception.learned.networks.suppression import suppress
-from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets
-from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5
-from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss
+from eidrive_scenario.perception.learned.networks.yolov5 import YoloLoss, YoloV5
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES, Anchors
-from eidrive_scenario.perception.learned.raw_outputs import ssd_candidates, ssd_scales, yolo_candidates, yolo_scales
-from eidrive_scenario.perception.learned.torch_weights import save, untrained
+from eidrive_scenario.perception.learned.own_network import ssd_candidates, ssd_scales, yolo_candidates, yolo_scales
+from eidrive_scenario.perception.learned.torch_network import save, untrained
 from eidrive_scenario.perception.learned.weights import Description
 from training.augment import change_colors, transform_images
 from training.dataset import Dataset

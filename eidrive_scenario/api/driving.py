@@ -11,8 +11,7 @@ from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.communication.radio_line_of_sight import line_of_sight_states
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import PlannerSettings
-from eidrive_scenario.driving.planning.planner import Planner
-from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.planning.route_planner import Planner, RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import (
     DrivingStack,
@@ -22,9 +21,8 @@ from eidrive_scenario.driving.stack import (
     StackInputs,
     StackSettings,
 )
-from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
+from eidrive_scenario.driving.step import AgentStep, Plan, StationAction, StationPerception
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control

@@ -7,9 +7,8 @@ from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.lifting.lifting import lift
-from eidrive_scenario.perception.pose_noise import PoseNoise
-from eidrive_scenario.perception.tracking.method import TrackingMethod
-from eidrive_scenario.perception.tracking.settings import TrackerKind
+from eidrive_scenario.perception.localization import PoseNoise
+from eidrive_scenario.perception.tracking.method import TrackerKind, TrackingMethod
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading

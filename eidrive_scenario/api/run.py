@@ -5,7 +5,7 @@ Stable: all names.
 
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
-from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, NOT_JUDGED, PASSED
 from eidrive_scenario.experiments.judgement import Judgement, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save

@@ -4,12 +4,11 @@ Stable: `Channel`, `LinkChannel`, `ChannelProfile`, `Message`, `ReceivedMessage`
 (`LinkEvents`, `OutcomeBlock`, `OutcomeColumns`) may change with a minor version.
 """
 
-from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.link_channel import LinkChannel
+from eidrive_scenario.v2x.channel import Channel, LinkChannel
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.v2x.profile import ChannelProfile, build_channel, load_profile
-from eidrive_scenario.v2x.propagation.gains import blockage_moments, highway_los
+from eidrive_scenario.v2x.propagation import blockage_moments, highway_los
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.packet_error import CURVES
 from eidrive_scenario.v2x.radio.profile import RadioProfile

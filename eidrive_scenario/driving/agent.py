@@ -11,19 +11,15 @@ from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.own_body import OwnBody
-from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
-from eidrive_scenario.driving.communication.report_store import ReportStore
-from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore, PointCloudSharing, ReportStore
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
-from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.result_checks import check_control, check_followed, check_plan, is_valid_control
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.station_action import OWN_DECISIONS, StationAction
-from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
+from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, Plan, StationAction, StationPerception
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
@@ -64,7 +60,6 @@ class Agent:
         self.fusion = fusion
         self._fusion_checked = is_checked(fusion)
         self.planner = planner
-        self._planner_checked = planner is not None and not is_built_in(type(planner))
         self.controller = controller
         self.receives_messages = receives_messages
         """Whether the station receives messages; a station that does not drive may only transmit."""
@@ -146,13 +141,15 @@ class Agent:
         detections = self._detections
         covariance = self.perception.pose_covariance
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
-        state = self._state(ego)
+        x, y, z = ego.position.tolist()
+        state = StationState(ego.time, x, y, z, ego.yaw, ego.speed, covariance)
         found = fresh if self.points is None else self.points.perceive(readings, fresh, self.perception.pose)
         if found is not None and not own_perception:
             own_state = replace(state, pose_covariance=None)
             change = self.perception.pose_change(found.time)
             self._reports.add(Report(self.name, found, now, own_state, pose_change=change))
-            self._add_own_region(found.time)
+            if self._regions is not None:
+                self._regions.add(self.name, found.time, self._own_body.reference_pose(found.time), self._view)
         obeys = self.planner is not None and self.settings.obey_signals
         return StationPerception(
             now,
@@ -195,8 +192,7 @@ class Agent:
             if self._regions is not None:
                 self.planner.observe_regions(self._regions.newest(now))
             plan = self.planner.plan(ego, perceived.fused, action.requested_goal(perceived.goal), now)
-            if self._planner_checked:
-                check_plan(self.planner, plan)
+            check_plan(self.planner, plan)
         return AgentStep(
             detections=detections,
             inbox=perceived.inbox,
@@ -216,11 +212,6 @@ class Agent:
             estimate=None if self.perception.has_exact_pose else ego,
         )
 
-    def _add_own_region(self, time: float) -> None:
-        """Store the region that the own sensors perceived at `time` [s]."""
-        if self._regions is not None:
-            self._regions.add(self.name, time, self._own_body.reference_pose(time), self._view)
-
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:
             return None
@@ -237,7 +228,3 @@ class Agent:
             check_followed(self.planner, plan)
             check_control(self.controller, "control", control)
         return control
-
-    def _state(self, ego: EgoState) -> StationState:
-        x, y, z = ego.position.tolist()
-        return StationState(ego.time, x, y, z, ego.yaw, ego.speed, self.perception.pose_covariance)

@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
-from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.communication.report_store import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
-from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.extension_settings import parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.localization import Localizer, motion_noise
+from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
-from eidrive_scenario.perception.tracking.method import TrackingMethod
-from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerSettings
+from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.sensor import view_sectors
-from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
+from eidrive_scenario.sensing.settings import ImuSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
@@ -124,24 +120,39 @@ def build_agent(
     points = None
     listens = planner != NO_PLANNER or settings.restricts_senders
     if fusion.shares_points:
-        points = PointCloudSharing(fusion, _joint(settings, installation) if listens else None)
+        joint = None
+        if listens:  # perception of merged points: that of the station, without localization
+            another = build_detector(settings)
+            another.setup(installation)
+            joint = Perception(another, tracker=_tracker(settings, another), latency=settings.detector_latency)
+        points = PointCloudSharing(fusion, joint)
+    driver: Planner | None = None
+    if planner != NO_PLANNER:
+        driver = construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed)
+        driver.view = view or None
+    controller: VehicleController | None = None
+    if spec.has_wheels:
+        kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
+        controller = _construct(kind, spec, dt, own=vehicle_controller_settings(settings))
+    noise, localizer = settings.pose_noise, None
+    if settings.localization == "ekf":
+        imu = next(sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings))
+        localizer = Localizer(spec.name, seed, noise=motion_noise(imu))
     return Agent(
         spec,
         settings,
         perception=Perception(
             detector,
             tracker=_tracker(settings, detector),
-            localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
+            localizer=localizer,
             latency=settings.detector_latency,
             pose_error=settings.pose_error,
-            pose_noise=_pose_noise(settings, spec.name, seed),
+            pose_noise=None if noise is None else PoseNoiseProcess(noise, spec.name, seed),
             false_objects=settings.false_objects,
         ),
         fusion=fusion,
-        planner=None
-        if planner == NO_PLANNER
-        else _planner(planner, settings, installation, view or None, dt=dt, seed=seed),
-        controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
+        planner=driver,
+        controller=controller,
         message_generator=MessageGenerator(
             spec, settings, sensors=len(sensors), view=view, encoder=encoder, seed=seed, dt=dt, number=number
         ),
@@ -149,34 +160,6 @@ def build_agent(
         receives_messages=listens,
         points=points,
     )
-
-
-def _planner(
-    name: str,
-    settings: AgentSettings,
-    installation: DetectorContext,
-    view: tuple[ViewSector, ...] | None,
-    *,
-    dt: float,
-    seed: int,
-) -> Planner:
-    """Build the planner of a vehicle, with the sectors that its detector covers."""
-    kind = registry("planners").load(name, Planner)
-    planner: Planner = construct(kind, settings, installation.spec, installation.roads, dt=dt, seed=seed)
-    planner.view = view
-    return planner
-
-
-def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> VehicleController:
-    kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
-    return _construct(kind, spec, dt, own=vehicle_controller_settings(settings))  # type: ignore[no-any-return]
-
-
-def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception:
-    """Build the perception of merged points: that of the station, without localization."""
-    detector = build_detector(settings)
-    detector.setup(installation)
-    return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
 
 
 def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | None:
@@ -187,13 +170,3 @@ def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | No
     if chosen.kind == NO_TRACKER:
         return None
     return construct(registry("trackers").load(chosen.kind, TrackingMethod), chosen)  # type: ignore[no-any-return]
-
-
-def _pose_noise(settings: AgentSettings, name: str, seed: int) -> PoseNoiseProcess | None:
-    return None if settings.pose_noise is None else PoseNoiseProcess(settings.pose_noise, name, seed)
-
-
-def _localizer(name: str, seed: int, sensors: Mapping[str, SensorSettings]) -> Localizer:
-    """Build the localization filter with the noise of the IMU of the station."""
-    units = [sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings)]
-    return Localizer(name, seed, noise=motion_noise(units[0]))

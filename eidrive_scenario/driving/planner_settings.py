@@ -90,7 +90,7 @@ def split_planner_settings(
         message = f"setting {key!r} of the planner is given twice"
         diagnostics.append(Diagnostic(message, "remove it from 'planner_settings'", source, lines.get(key)))
     for key in [key for key in rest if key not in station_settings]:
-        other = _model_with(key)
+        other = next((model for model in _installed() if key in model.model_fields), None)
         if other is not None:
             _parse(
                 other, {key: rest.pop(key)}, source, lines.get(key, line), lines, origins, diagnostics, incomplete=True
@@ -127,11 +127,6 @@ def _parse(
             if found["type"] != "missing" or not (incomplete or found["loc"][0] in lines):
                 diagnostics.append(diagnostic)
         return None
-
-
-def _model_with(key: str) -> type[PlannerSettings] | None:
-    """Return the settings type of an installed planner that has this setting, or None."""
-    return next((model for model in _installed() if key in model.model_fields), None)
 
 
 def _installed() -> Iterator[type[PlannerSettings]]:

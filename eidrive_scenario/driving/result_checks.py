@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
-from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.result_checks import LARGEST, are_within, describe, raise_not_finite, raise_outside

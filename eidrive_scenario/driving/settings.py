@@ -20,13 +20,13 @@ from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.openscenario.values.references import parameter_hints, resolve_references
 from eidrive_scenario.perception.faults import MAX_FALSE_OBJECTS, FalseObject, PoseError
-from eidrive_scenario.perception.pose_noise import PoseNoise
-from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
+from eidrive_scenario.perception.localization import PoseNoise
+from eidrive_scenario.perception.tracking.method import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.sensor import check_unique, default_sensor, parse_sensor
 from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSettings, TruthSettings
 from eidrive_scenario.settings import Settings, parse_settings
-from eidrive_scenario.v2x.messages.clock import StationClock
+from eidrive_scenario.v2x.messages.message import StationClock
 
 NAME_PROPERTIES = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
 """Properties whose values are names, not YAML."""

@@ -11,12 +11,12 @@ from typing import Any
 
 import msgspec
 
-from eidrive_scenario.driving.station_action import StationAction
-from eidrive_scenario.driving.step import AgentStep, StationPerception
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.requests import Goal, Overrides
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
@@ -154,6 +154,11 @@ class DrivingStack(ABC):
     def resolved_settings(self) -> StackSettings:
         """Return the settings of all stations and of the channel at the start of the run."""
         return StackSettings()
+
+    @property
+    def settings(self) -> Mapping[str, AgentSettings]:
+        """Settings of the stations of the scenario, present or not; empty for a stack with settings of its own."""
+        return MappingProxyType({})
 
     @property
     def possible_drivers(self) -> Collection[str]:

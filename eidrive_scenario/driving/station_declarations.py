@@ -1,4 +1,4 @@
-"""Settings, detectors and encoders that the controllers of a scenario declare, checked before the run."""
+"""Stations as a scenario declares them: settings, detectors, encoders, and the settings with all defaults."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from typing import Any
 
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
+from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
+from eidrive_scenario.extension_settings import optional_settings_type
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.registry import is_built_in, registry
+from eidrive_scenario.registry import distributions, registry
 from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.specs import actor_spec
 
 
@@ -57,7 +61,9 @@ def declared_settings(
         raise SettingError(diagnostics)
     updated = {}
     for name, settings in found.items():
-        update = _by_detector(settings, detector)
+        update: dict[str, Any] = {} if detector is None else {"detector": detector}
+        if detector not in (None, settings.detector):
+            update["detector_settings"] = {}  # those of the file apply to the detector of the file
         if cooperate is not None and (settings.restricts_senders or _drives(scenario, name, settings)):
             update["cooperates_with"] = cooperate
         updated[name] = settings.model_copy(update=update)
@@ -74,18 +80,11 @@ def without_speed(settings: AgentSettings, *, limited: bool) -> bool:
 
     limited  whether there are roads, which have speed limits
 
-    Planners of third parties may choose a speed by themselves.
+    Planners that do not derive from RoutePlanner may choose a speed by themselves.
     """
     planner = registry("planners").load(settings.planner or DEFAULT_PLANNER)
     from_settings = settings.target_speed is not None or (settings.follow_speed_limit and limited)
-    return is_built_in(planner) and not from_settings
-
-
-def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
-    """Return the changes by a detector option; `detector_settings` of the file apply to the detector of the file."""
-    if detector is None:
-        return {}
-    return {"detector": detector} | ({} if detector == settings.detector else {"detector_settings": {}})
+    return issubclass(planner, RoutePlanner) and not from_settings
 
 
 def _drives(scenario: Scenario, name: str, settings: AgentSettings) -> bool:
@@ -183,3 +182,40 @@ def _unknown_senders(
         for sender in settings.cooperates_with or ()
         if sender not in controllers
     ]
+
+
+_WITH_SETTINGS = (
+    ("detectors", "detector"),
+    ("fusion", "fusion"),
+    ("vehicle_controllers", "vehicle_controller"),
+)
+"""Registries and properties of the extensions whose settings are in a property `NAME_settings`."""
+
+
+def resolved_stations(
+    settings: Mapping[str, AgentSettings], channel: str, profile: ChannelProfile | None
+) -> StackSettings:
+    """Return the settings of stations and channel with the defaults of all extensions."""
+    used = {("channels", profile.model)} if profile is not None else set()
+    for station in settings.values():
+        used |= {
+            ("detectors", station.detector),
+            ("fusion", station.fusion),
+            ("planners", station.planner or ""),
+            ("vehicle_controllers", station.vehicle_controller),
+            ("trackers", station.tracker.kind if station.tracker is not None else ""),
+        }
+    stations = {}
+    for name, station in sorted(settings.items()):
+        written = stations[name] = station.model_dump(mode="json")
+        for kind, part in _WITH_SETTINGS:
+            model = optional_settings_type(kind, written[part], registry(kind).load(written[part]))
+            if model is not None:
+                own = model.model_validate(written[f"{part}_settings"])
+                written[f"{part}_settings"] = own.model_dump(mode="json")
+    return StackSettings(
+        channel=channel,
+        channel_profile=None if profile is None else profile.model_dump(mode="json"),
+        stations=stations,
+        extensions=distributions(used),
+    )

@@ -12,36 +12,100 @@ from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.communication.run_channel import RunChannel
-from eidrive_scenario.driving.control.overrides import ControlOverrides
-from eidrive_scenario.driving.detector_batches import prepare_detectors
-from eidrive_scenario.driving.planning.area_checks import areas_off_road
-from eidrive_scenario.driving.report_fusion import fuse_reports
-from eidrive_scenario.driving.resolved_stations import resolved_stations
+from eidrive_scenario.driving.control.vehicle_controller import ControlOverrides
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackInputs, StackSettings
-from eidrive_scenario.driving.station_action import OWN_DECISIONS
 from eidrive_scenario.driving.station_declarations import (
     declared_detectors,
     declared_encoders,
     declared_settings,
     possible_drivers,
+    resolved_stations,
     without_speed,
 )
-from eidrive_scenario.driving.station_readings import read_stations
-from eidrive_scenario.driving.step import AgentStep, StationPerception
-from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
+from eidrive_scenario.driving.station_warnings import areas_off_road, short_channel_delay, short_detector_latencies
+from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, StationPerception
 from eidrive_scenario.errors import Diagnostic, ErrorSubject
+from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.detector import Detector, ImageDetections
 from eidrive_scenario.requests import Overrides
 from eidrive_scenario.sensing.readings import Readings
-from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
+
+
+def read_stations(
+    rigs: Mapping[str, Rig],
+    signal_sensors: Mapping[str, SignalSensor],
+    world: World,
+    view: WorldView,
+    signals: Mapping[str, str],
+) -> dict[str, Readings]:
+    """Return the readings of each station: its sensors, its trailers, and the signals in its sight.
+
+    signals  states of the traffic signals, by id
+    """
+    readings = read_all(list(rigs.values()), world, view)
+    for name, reading in readings.items():
+        attached = [view.row(other) for other in world.attached(name)]
+        if attached:
+            readings[name] = replace(reading, attached=view.boxes[attached])
+    for name, sensor in signal_sensors.items():
+        visible = sensor.read(world, view, view.row(name), signals)
+        readings[name] = replace(readings[name], signals=visible)
+    return readings
+
+
+def prepare_detectors(agents: Mapping[str, Agent], readings: Mapping[str, Readings]) -> None:
+    """Let detectors that process batches prepare the readings of all their stations at once."""
+    batches: dict[type[Detector], list[str]] = {}
+    for name, agent in agents.items():
+        detector = agent.perception.detector
+        if detector.processes_batches:
+            batches.setdefault(type(detector), []).append(name)
+    for kind, names in batches.items():
+        detectors = [agents[name].perception.detector for name in names]
+        _all_of(names).call(kind.prepare_batch, detectors, [readings[name] for name in names])
+
+
+def _fuses_batches(kind: type[FusionMethod]) -> bool:
+    """Return whether the last class that overrides `fuse` has a batch for it, too."""
+    return "fuse_batch" in next(vars(base) for base in kind.__mro__ if {"fuse", "fuse_batch"} & vars(base).keys())
+
+
+def _all_of(stations: Sequence[str]) -> ErrorSubject:
+    """Return the stations of a batch, which errors of its extension name."""
+    names = ", ".join(map(repr, stations))
+    return ErrorSubject(f"station {names}" if len(stations) == 1 else f"stations {names}")
+
+
+def fuse_reports(
+    agents: Mapping[str, Agent], sensed: Mapping[str, StationPerception], now: float
+) -> dict[str, StationPerception]:
+    """Return what each station perceives with the objects after fusion.
+
+    Methods of one class process the reports of all their stations as one batch, unless the class changes `fuse` only.
+    """
+    batches: dict[type[FusionMethod], list[str]] = {}
+    perceived = dict(sensed)
+    for name, agent in agents.items():
+        kind = type(agent.fusion)
+        if _fuses_batches(kind):
+            batches.setdefault(kind, []).append(name)
+        else:
+            perceived[name] = agent.fuse(sensed[name])
+    for kind, names in batches.items():
+        methods, reports = [agents[name].fusion for name in names], [agents[name].reports for name in names]
+        fused = _all_of(names).call(kind.fuse_batch, methods, reports, now)
+        for name, objects in zip(names, fused, strict=True):
+            perceived[name] = agents[name].with_fused(sensed[name], objects)
+    return perceived
 
 
 class Stations(DrivingStack):

@@ -13,13 +13,10 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.assignment import MAX_SCALAR as MAX_SCALAR_PAIRS
-from eidrive_scenario.assignment import associate, associate_small
+from eidrive_scenario.assignment import associate
 from eidrive_scenario.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.method import FusionMethod, Report
 
-MAX_SCALAR = 16
-"""Maximum number of boxes for scalar evaluation, which is then faster than arrays."""
 GATE = 4.0
 """Association gate: maximum distance between boxes of one object, as in EI-Drive [m]."""
 
@@ -49,8 +46,7 @@ class AverageFusion(FusionMethod):
                 return only
             return replace(only, time=now)
         labels = self._labels(present)
-        small = len(labels) <= MAX_SCALAR
-        fused = fuse_average_small(present, labels, now) if small else fuse_average(present, labels, now)
+        fused = fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
         return replace(fused, existence=joint_existence(present, labels))
@@ -61,14 +57,9 @@ class AverageFusion(FusionMethod):
         labels = list(range(len(objects)))
         for report in reports[1:]:
             centers = report.boxes[:, :3]
-            known = [(entry.x, entry.y, entry.z) for entry in objects]
-            plain: list[list[float]] = centers.tolist()
-            small = len(known) * len(plain) <= MAX_SCALAR_PAIRS
-            assigned = (
-                associate_small(known, plain, self.gate) if small else associate(np.array(known), centers, self.gate)
-            )
-            pairs = {column: row for row, column in assigned}
-            for column, (x, y, z) in enumerate(plain):
+            means = np.array([(entry.x, entry.y, entry.z) for entry in objects])
+            pairs = {column: row for row, column in associate(means, centers, self.gate)}
+            for column, (x, y, z) in enumerate(centers.tolist()):
                 label = pairs.get(column)
                 if label is None:
                     label = len(objects)
@@ -109,54 +100,29 @@ class _Object:
 def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: float) -> Detections:
     """Return the means over the boxes of each object; a single box is unchanged to the bit.
 
-    numbers  object of each box
+    numbers  object of each box, in order of appearance
 
     Headings that point backwards from the first one are reversed before: some detectors do not distinguish front and
     rear, and the mean of opposite headings would be a box across the object.
     """
     labels = np.array(numbers, dtype=np.intp)
     boxes = np.concatenate([report.boxes for report in reports])
-    counts = np.bincount(labels)
-    several = counts > 1
-    means = _sums(boxes, labels, len(counts)) / counts[:, None]
-    yaw = boxes[:, 6]
-    _, first = np.unique(labels, return_index=True)
-    front = np.where(np.cos(yaw - yaw[first][labels]) < 0.0, -1.0, 1.0)
-    mean_yaw = np.arctan2(
-        _sums(front * np.sin(yaw), labels, len(counts)), _sums(front * np.cos(yaw), labels, len(counts))
-    )
-    means[several, 6] = mean_yaw[several]
+    count = max(numbers) + 1
+    means = _means(boxes, labels, count)
     words = [word for report in reports for word in report.classes]
-    votes: list[list[str]] = [[] for _ in counts]
-    for label, word in zip(labels.tolist(), words, strict=True):
+    votes: list[list[str]] = [[] for _ in range(count)]
+    yaws: list[list[float]] = [[] for _ in range(count)]
+    for label, word, yaw in zip(numbers, words, boxes[:, 6].tolist(), strict=True):
         votes[label].append(word)
+        yaws[label].append(yaw)
+    means[:, 6] = [_mean_yaw(own) for own in yaws]
     return Detections(
         now,
         means,
-        _sums(np.concatenate([report.scores for report in reports]), labels, len(counts)) / counts,
+        _means(np.concatenate([report.scores for report in reports]), labels, count),
         tuple(map(_most_frequent, votes)),
-        _means_of_known(np.concatenate([report.velocity for report in reports]), labels, len(counts)),
-        _means_of_known(np.concatenate([report.covariance for report in reports]), labels, len(counts)),
-    )
-
-
-def fuse_average_small(reports: Sequence[Detections], labels: Sequence[int], now: float) -> Detections:
-    """Return the result of `fuse_average`, evaluated box by box."""
-    members: list[list[int]] = [[] for _ in range(max(labels) + 1)]
-    for row, label in enumerate(labels):
-        members[label].append(row)
-    boxes = [box for report in reports for box in report.boxes.tolist()]
-    scores = [score for report in reports for score in report.scores.tolist()]
-    words = [word for report in reports for word in report.classes]
-    velocity = [one for report in reports for one in report.velocity.tolist()]
-    covariance = [one for report in reports for one in report.covariance.reshape(-1, 4).tolist()]
-    return Detections(
-        now,
-        np.array([_mean_box([boxes[row] for row in rows]) for rows in members]),
-        np.array([sum([scores[row] for row in rows]) / len(rows) for rows in members]),
-        tuple([_most_frequent([words[row] for row in rows]) for rows in members]),
-        np.array([_mean_of_known([velocity[row] for row in rows]) for rows in members]),
-        np.array([_mean_of_known([covariance[row] for row in rows]) for rows in members]).reshape(-1, 2, 2),
+        _means(np.concatenate([report.velocity for report in reports]), labels, count),
+        _means(np.concatenate([report.covariance for report in reports]), labels, count),
     )
 
 
@@ -165,46 +131,25 @@ def _most_frequent(words: Sequence[str]) -> str:
     return Counter(words).most_common(1)[0][0] if len(words) > 2 else words[0]
 
 
-def _mean_box(boxes: list[list[float]]) -> list[float]:
-    if len(boxes) == 1:
-        return boxes[0]
-    mean = _mean(boxes)
-    first = boxes[0][6]
-    fronts = [-1.0 if math.cos(box[6] - first) < 0.0 else 1.0 for box in boxes]
-    mean[6] = math.atan2(
-        sum([front * math.sin(box[6]) for front, box in zip(fronts, boxes, strict=True)]),
-        sum([front * math.cos(box[6]) for front, box in zip(fronts, boxes, strict=True)]),
+def _mean_yaw(yaws: Sequence[float]) -> float:
+    """Return the circular mean, with headings reversed that point backwards from the first one."""
+    if len(yaws) == 1:
+        return yaws[0]
+    fronts = [-1.0 if math.cos(yaw - yaws[0]) < 0.0 else 1.0 for yaw in yaws]
+    return math.atan2(
+        sum([front * math.sin(yaw) for front, yaw in zip(fronts, yaws, strict=True)]),
+        sum([front * math.cos(yaw) for front, yaw in zip(fronts, yaws, strict=True)]),
     )
-    return mean
 
 
-def _mean(rows: list[list[float]]) -> list[float]:
-    if len(rows) == 2:
-        return [(a + b) / 2.0 for a, b in zip(*rows, strict=True)]
-    return [sum(column) / len(rows) for column in zip(*rows, strict=True)]
+def _means(values: Array, labels: NDArray[np.intp], count: int) -> Array:
+    """Return the means (G, ...) of the values (K, ...) without NaN of each label, added in order; NaN if there is none.
 
-
-def _mean_of_known(rows: list[list[float]]) -> list[float]:
-    """Return the mean of the rows without NaN; NaN if there is none."""
-    known = [row for row in rows if not math.isnan(sum(row))]
-    if not known:
-        return [math.nan] * len(rows[0])
-    return known[0] if len(known) == 1 else _mean(known)
-
-
-def _sums(values: Array, labels: NDArray[np.intp], count: int) -> Array:
-    """Return the sums (count, ...) of the values (K, ...) of each label, added in order."""
-    total = np.zeros((count, *values.shape[1:]))
+    Sums begin with -0, the neutral element of addition, so that a single value is unchanged to the bit.
+    """
+    known = ~np.isnan(values.reshape(len(values), -1)).any(axis=1)
+    values, labels = values[known], labels[known]
+    total, means = np.full((count, *values.shape[1:]), -0.0), np.full((count, *values.shape[1:]), math.nan)
     np.add.at(total, labels, values)
-    return total
-
-
-def _means_of_known(values: Array, labels: NDArray[np.intp], count: int) -> Array:
-    """Return the means (count, ...) of the values (K, ...) without NaN of each label; NaN if there is none."""
-    flat = values.reshape(len(values), -1)
-    known = ~np.isnan(flat).any(axis=1)
-    number = np.bincount(labels[known], minlength=count)
-    total = _sums(flat[known], labels[known], count)
-    mean = np.full(total.shape, np.nan)
-    np.divide(total, number[:, None], out=mean, where=number[:, None] > 0)
-    return mean.reshape((count, *values.shape[1:]))
+    counts = np.bincount(labels, minlength=count).reshape(-1, *[1] * (values.ndim - 1))
+    return np.divide(total, counts, out=means, where=counts > 0)

@@ -12,11 +12,9 @@ from pydantic import Field, PositiveFloat
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, means
-from eidrive_scenario.fusion.grouping import Objects, group_tracks
-from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.fusion.pairs import AssociationGate, Table
-from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
+from eidrive_scenario.fusion.pairs import AssociationGate, Objects, Table, group_tracks
+from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, fuse_headings
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
 from eidrive_scenario.settings import Settings

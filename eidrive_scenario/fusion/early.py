@@ -16,7 +16,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
 )
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
+from eidrive_scenario.v2x.messages.message import PointCloud, compress
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):

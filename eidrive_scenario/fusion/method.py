@@ -13,8 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.messages.message import StationState
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud
+from eidrive_scenario.v2x.messages.message import PointCloud, StationState
 
 
 class Report(msgspec.Struct, frozen=True, gc=False):
@@ -46,7 +45,8 @@ class FusionMethod(ABC):
     shares_points: ClassVar[bool] = False
     """Whether stations send lidar points beside their detections and detect in the points of all stations."""
     is_finite_by_construction: ClassVar[bool] = False
-    """Whether a built-in method only copies and averages finite numbers, so that its results are not checked."""
+    """Whether this class, without those derived from it, only copies and averages finite numbers: its results are not
+    checked."""
 
     def add_report(self, report: Report) -> None:  # noqa: B027 - optional
         """Process a received report. Every report that is not too old is passed in order of arrival, before the next
@@ -81,7 +81,7 @@ class FusionMethod(ABC):
     ) -> Sequence[Detections]:
         """Return the results of `fuse` of several receiving stations, one method of this class each.
 
-        Built-in classes override it to process all stations in common arrays, with the results of separate calls. It is
-        not called for third-party classes, because errors in a batch do not name a station.
+        A class that overrides `fuse` may override it to process all stations in common arrays, with the results of
+        separate calls. Errors in a batch name all its stations.
         """
         return [method.fuse(held, now) for method, held in zip(methods, reports, strict=True)]

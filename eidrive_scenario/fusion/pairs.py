@@ -1,8 +1,10 @@
-"""Association candidates: pairs of estimates within the gate."""
+"""Pairs of tracks of one object: gates, candidates, assignment, and groups of tracks by object."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +23,8 @@ One true pair in a hundred is outside a gate of 99 %, which would split objects 
 """
 LEVEL_TOLERANCE = 2.0
 """Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
-_FEW_PAIRS = 1024
-"""Maximum number of pairs that are all listed, which is faster."""
-_MAX_EXTENT = 1e7
-"""Maximum extent of the tracks and their gates [m] for a search by position, which rounding would affect."""
+_MAX_COORDINATE = 1e7
+"""Maximum coordinate in the search by position [m], which rounding would affect beyond."""
 CERTAIN = -1e3
 """Cost of a pair with the same object id of a station: less than any other."""
 
@@ -68,12 +68,16 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
     if same_station:
-        rows, columns = _pairs_of_one_station(first["station"], second["station"])
+        order = np.argsort(second["station"], kind="stable")
+        begin, end = (np.searchsorted(second["station"][order], first["station"], side) for side in ("left", "right"))
+        rows, columns = ranges(begin, end, order)
     else:
         rows, columns = _pairs_of_two_stations(first, second, own, other)
     x, y = own.x[rows] - other.x[columns], own.y[rows] - other.y[columns]
     limit = own.reach[rows] + other.reach[columns]
-    near = (x * x + y * y <= limit * limit) & _on_one_level(first["body"][rows], second["body"][columns])
+    body, other_body = first["body"][rows], second["body"][columns]  # z, length, width, height
+    apart = np.abs(body[:, 0] - other_body[:, 0]) > 0.5 * (body[:, 3] + other_body[:, 3]) + LEVEL_TOLERANCE
+    near = (x * x + y * y <= limit * limit) & ~apart
     certain = None
     if same_station and second["number"].max(initial=-1) >= 0:
         number = second["number"][columns]
@@ -84,6 +88,8 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     if not near.all():
         rows, columns, x, y = rows[near], columns[near], x[near], y[near]
         certain = None if certain is None else certain[near]
+    # Squared Mahalanobis distances by the closed inverse of 2 x 2 matrices. The cost adds the logarithm of the
+    # determinant, which prevents that an uncertain track wins by its wide gate.
     xx, xy, yy = own.xx[rows] + other.xx[columns], own.xy[rows] + other.xy[columns], own.yy[rows] + other.yy[columns]
     determinant = xx * yy - xy * xy
     mahalanobis = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
@@ -98,12 +104,6 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
         cost[certain] = CERTAIN
     fits = inside | (~vague & (mahalanobis <= UNASSIGNED_GATE))
     return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
-
-
-def _on_one_level(first: Array, second: Array) -> NDArray[np.bool_]:
-    """Return whether bodies (N, 4) of z, length, width and height may be at the same height."""
-    apart = np.abs(first[:, 0] - second[:, 0]) > 0.5 * (first[:, 3] + second[:, 3]) + LEVEL_TOLERANCE
-    return np.asarray(~apart)
 
 
 def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
@@ -124,14 +124,6 @@ def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
     return assigned + assign(*zip(*rest, strict=True)) if rest else assigned
 
 
-def _pairs_of_one_station(first: Integers, second: Integers) -> tuple[Integers, Integers]:
-    """Return rows and columns, in order, of the pairs of one station."""
-    if len(first) * len(second) <= _FEW_PAIRS:
-        return _where(first[:, None] == second)
-    order = np.argsort(second, kind="stable")
-    return ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
-
-
 def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side) -> tuple[Integers, Integers]:
     """Return rows and columns, in order, of the pairs of two stations of one receiving station, the lower one first.
 
@@ -139,43 +131,24 @@ def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side
     """
     station, other_station = first["station"], second["station"]
     receiver, other_receiver = first["receiver"], second["receiver"]
-    distance = (own.reach + other.reach.max()) * (1.0 + 1e-9) + 1e-6  # a margin for rounding
-    extent = max(float(own.x.max()), float(other.x.max())) - min(float(own.x.min()), float(other.x.min()))
-    if len(first) * len(second) <= _FEW_PAIRS or not extent + distance.max() < _MAX_EXTENT:
-        return _all_pairs_of_two_stations(first, second)
+    # Clipping brings no pair farther apart. A reach of unknown or large size covers all clipped positions.
+    x, other_x = (np.clip(side.x, -_MAX_COORDINATE, _MAX_COORDINATE) for side in (own, other))
+    distance = np.fmin(own.reach + other.reach.max(), 2.0 * _MAX_COORDINATE) * (1.0 + 1e-9) + 1e-6  # for rounding
+    extent = max(float(x.max()), float(other_x.max())) - min(float(x.min()), float(other_x.min()))
     # Receiving stations are shifted so far that no pair of two of them is near.
     width = extent + 3.0 * float(distance.max())
-    x, other_x = own.x + width * receiver, other.x + width * other_receiver
+    x, other_x = x + width * receiver, other_x + width * other_receiver
     distance += 1e-12 * max(float(np.abs(x).max()), float(np.abs(other_x).max()))
     order = np.argsort(other_x, kind="stable")
     sorted_x = other_x[order]
     rows, columns = ranges(
         np.searchsorted(sorted_x, x - distance), np.searchsorted(sorted_x, x + distance, "right"), order
     )
+    # Each pair of two stations once, in the order of rows and columns as of a full matrix: ties go by this order.
     ahead = (station[rows] < other_station[columns]) & (receiver[rows] == other_receiver[columns])
     rows, columns = rows[ahead], columns[ahead]
     in_order = np.lexsort((columns, rows))
     return rows[in_order], columns[in_order]
-
-
-def _all_pairs_of_two_stations(first: Table, second: Table) -> tuple[Integers, Integers]:
-    """Return rows and columns of all pairs of two stations of one receiving station; tracks are sorted by it."""
-    rows: list[Integers] = []
-    columns: list[Integers] = []
-    for receiver in np.unique(first["receiver"]).tolist():
-        (begin, end), (other_begin, other_end) = (
-            np.searchsorted(side["receiver"], [receiver, receiver + 1]) for side in (first, second)
-        )
-        before = first["station"][begin:end, None] < second["station"][other_begin:other_end]
-        own, other = _where(before)
-        rows.append(own + begin)
-        columns.append(other + other_begin)
-    return np.concatenate(rows), np.concatenate(columns)
-
-
-def _where(pairs: NDArray[np.bool_]) -> tuple[Integers, Integers]:
-    rows, columns = np.nonzero(pairs)
-    return rows, columns
 
 
 def ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers, Integers]:
@@ -213,3 +186,93 @@ class _Side(NamedTuple):
         statistical = math.sqrt(max(gate.chi_square, UNASSIGNED_GATE)) * np.sqrt(xx + yy)
         reach = np.maximum(statistical, np.where(vague, gate.distance, width))
         return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, width, vague, reach)
+
+
+class Objects(NamedTuple):
+    """Tracks by object: (N,) rows of the tracks, those of one object in sequence, and (G,) their first places."""
+
+    rows: Integers
+    starts: Integers
+
+
+def group_tracks(tracks: Table, gate: AssociationGate) -> Objects:
+    """Return the rows of each object, from tracks at a common time that are sorted by receiving station and station.
+
+    The tracks of each station in turn are assigned to known objects: maximum number, then minimum cost, and at most one
+    per object, because a station reports different objects. Unassigned tracks form new objects. The cost of an object
+    is that of its likeliest member. Objects are in the order of their first tracks. Each receiving station has its own
+    objects.
+    """
+    label = np.arange(len(tracks))
+    station, receiver = tracks["station"], tracks["receiver"]
+    if station[0] == station[-1] and receiver[0] == receiver[-1]:
+        return Objects(label, label)
+    pairs = gated_pairs(tracks, tracks, gate, same_station=False)
+    if not pairs.first:
+        return Objects(label, label)
+    first, second = np.array(pairs.first), np.array(pairs.second)
+    np.minimum.at(label, second, first)
+    unclear = label[first] != label[second]
+    if not all(pairs.inside):
+        unclear |= ~np.array(pairs.inside)
+    twice = _tracks_of_one_station(label, station)
+    if unclear.any() or len(twice):
+        for ambiguous in np.unique(receiver[np.concatenate([first[unclear], twice])]).tolist():
+            begin, end = np.searchsorted(receiver, [ambiguous, ambiguous + 1]).tolist()
+            # Pairs are in order of their rows: those of one receiver are consecutive.
+            part = slice(bisect_left(pairs.first, begin), bisect_left(pairs.first, end))
+            of_first, of_second = ([row - begin for row in side[part]] for side in (pairs.first, pairs.second))
+            own = Pairs(of_first, of_second, pairs.cost[part], pairs.inside[part])
+            for members in _group_sequentially(station[begin:end].tolist(), own):
+                label[[begin + row for row in members]] = begin + members[0]
+    rows = np.argsort(label, kind="stable")
+    grouped = label[rows]
+    return Objects(rows, np.flatnonzero(np.concatenate([[True], grouped[1:] != grouped[:-1]])))
+
+
+def _tracks_of_one_station(label: Integers, station: Integers) -> Integers:
+    """Return tracks of an object (N,) that has another track of their station (N,)."""
+    keys = label * (int(station.max()) + 1) + station
+    order = np.argsort(keys)
+    ordered = keys[order]
+    twice: Integers = order[1:][ordered[1:] == ordered[:-1]]
+    return twice
+
+
+def _group_sequentially(stations: Sequence[int], pairs: Pairs) -> list[list[int]]:
+    partners: dict[int, list[tuple[int, float, bool]]] = {}
+    for first, second, cost, inside in zip(*pairs, strict=True):
+        partners.setdefault(second, []).append((first, cost, inside))
+    objects: list[list[int]] = []
+    object_of: dict[int, int] = {}
+    start = 0
+    for end in range(1, len(stations) + 1):
+        if end < len(stations) and stations[end] == stations[start]:
+            continue
+        assigned = _assign_rows(range(start, end), partners, object_of)
+        for row in range(start, end):
+            if row not in assigned:
+                assigned[row] = len(objects)
+                objects.append([])
+            object_of[row] = assigned[row]
+            objects[assigned[row]].append(row)
+        start = end
+    return objects
+
+
+def _assign_rows(
+    rows: Sequence[int], partners: dict[int, list[tuple[int, float, bool]]], object_of: dict[int, int]
+) -> dict[int, int]:
+    """Return the object of each of these rows of one station; rows without a candidate are omitted."""
+    best: dict[tuple[int, int], tuple[bool, float]] = {}
+    for row in rows:
+        for other, cost, inside in partners.get(row, ()):
+            pair = (object_of[other], row)
+            best[pair] = min((not inside, cost), best.get(pair, (True, math.inf)))
+    pairs = Pairs(
+        [label for label, _ in best],
+        [row for _, row in best],
+        [cost for _, cost in best.values()],
+        [not outside for outside, _ in best.values()],
+    )
+    return {row: label for label, row in assigned_pairs(pairs)}

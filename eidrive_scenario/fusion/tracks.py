@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
-from eidrive_scenario.fusion.headings import initiate_heading, predict_heading, significant_turn_rate, update_heading
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs, ranges
-from eidrive_scenario.fusion.prediction import predict
-from eidrive_scenario.perception.tracking.association import make_plausible
-from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, survived
-from eidrive_scenario.perception.tracking.existence import missed as after_miss
+from eidrive_scenario.fusion.prediction import (
+    initiate_heading,
+    predict,
+    predict_heading,
+    significant_turn_rate,
+    update_heading,
+)
+from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, make_plausible, survived
+from eidrive_scenario.perception.tracking.association import missed as after_miss
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
 
@@ -192,7 +196,11 @@ def update_tracks(
     if not recent.all():
         tracks, times = tracks.take(np.flatnonzero(recent)), times[recent]
     predict_tracks(tracks, times)
-    _add_pose_changes(tracks, reports)
+    for station, report in enumerate(reports):
+        if report.pose_change is not None and report.state is not None:
+            changed = np.flatnonzero(tracks["station"] == station)
+            part = pose_part(tracks["mean"][changed, :2], report.state.x, report.state.y, report.pose_change)
+            tracks["covariance"][changed, :2, :2] += part
     pairs = assigned_pairs(gated_pairs(tracks, born, gate, same_station=True))
     rows = np.array([row for row, _ in pairs], dtype=np.intp)
     columns = np.array([column for _, column in pairs], dtype=np.intp)
@@ -211,15 +219,6 @@ def update_tracks(
     fresh[columns] = False
     both = join_rows([rows_of(tracks), rows_of(born.take(np.flatnonzero(fresh)))])
     return both.take(np.argsort(both["station"], kind="stable"))
-
-
-def _add_pose_changes(tracks: Table, reports: Sequence[Report]) -> None:
-    """Add the uncertainty of predicted tracks that is caused by changes of the pose errors of their stations."""
-    for station, report in enumerate(reports):
-        if report.pose_change is not None and report.state is not None:
-            rows = np.flatnonzero(tracks["station"] == station)
-            part = pose_part(tracks["mean"][rows, :2], report.state.x, report.state.y, report.pose_change)
-            tracks["covariance"][rows, :2, :2] += part
 
 
 def _update(old: Table, new: Table) -> Table:
@@ -246,7 +245,7 @@ def _update(old: Table, new: Table) -> Table:
 
 
 def _existence_after(old: Table, new: Table) -> Array:
-    """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.existence`."""
+    """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.association`."""
     spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
     offset = new["mean"][:, :2] - old["mean"][:, :2]
     x, y, a, b, d = offset[:, 0], offset[:, 1], spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]

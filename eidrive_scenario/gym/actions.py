@@ -9,8 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.driving.station_action import OWN_DECISIONS, StationAction
-from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.driving.step import OWN_DECISIONS, StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.gym.action_settings import ActionSettings, MetaSpeed, Pedals, SendMessages, TargetSpeed
 from eidrive_scenario.gym.libraries import spaces

@@ -8,9 +8,8 @@ from dataclasses import replace
 import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory
-from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.driving.step import AgentStep, StationPerception
+from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation

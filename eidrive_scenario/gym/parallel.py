@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from eidrive_scenario.driving.station_action import StationAction
-from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, suggestion
 from eidrive_scenario.gym.action_settings import ActionSettings
 from eidrive_scenario.gym.environment import final_info

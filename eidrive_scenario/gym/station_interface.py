@@ -8,9 +8,7 @@ from typing import Any
 
 from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
-from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.station_action import StationAction
-from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.gym.action_settings import DRIVING, ActionSettings, MetaSpeed, TargetSpeed, parse_actions
 from eidrive_scenario.gym.actions import ActionDecoder
@@ -96,8 +94,7 @@ class StationInterface:
         self.spec = actor_spec(self.name, simulation.scenario.entities[self.name])
         self._control, self._planner, self._route = None, None, (-1.0, None)
         if self._needs_route:
-            own: AgentSettings = simulation.stack.settings[self.name]  # type: ignore[attr-defined]
-            own = own.model_copy(update={"obey_signals": False})
+            own = simulation.stack.settings[self.name].model_copy(update={"obey_signals": False})
             dt, seed = simulation.settings.dt, simulation.seed
             self._planner = RoutePlanner(own, self.spec, simulation.roads, dt=dt, seed=seed)
         requested = None if perceived.goal is None else perceived.goal.speed

@@ -12,12 +12,38 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec
+
+
+@dataclass(frozen=True)
+class ImageDetections:
+    """Detections of a network in an image: boxes (N, 4) x1 y1 x2 y2 [px], best first, and scores (N,)."""
+
+    boxes: Array
+    scores: Array
+    classes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+
+SAME_OBJECT = 0.1
+"""Overlap in plan view above which two boxes show one object (intersection over union): bodies do not overlap."""
+
+
+def without_duplicates(detections: Detections) -> Detections:
+    """Return the detections except those that overlap one with a higher score, in their order."""
+    overlap = iou_bev(detections.boxes, detections.boxes)
+    kept: list[int] = []
+    for row in np.argsort(-detections.scores, kind="stable").tolist():
+        if not kept or overlap[row, kept].max() <= SAME_OBJECT:
+            kept.append(row)
+    return detections.subset(sorted(kept))
 
 
 @dataclass(frozen=True)
@@ -54,9 +80,9 @@ class Detector(ABC):
     settings_type: ClassVar[type[Settings] | None] = None
     """Type of the property `detector_settings`; None if the detector has no settings."""
     is_finite_by_construction: ClassVar[bool] = False
-    """Whether a built-in detector only copies finite numbers, so that its results are not checked."""
+    """Whether this class, without those derived from it, only copies finite numbers: its results are not checked."""
     processes_batches: bool = False
-    """Whether `prepare_batch` of a built-in detector has an effect."""
+    """Whether `prepare_batch` has an effect."""
     library_versions: Mapping[str, str] = MappingProxyType({})
     """Versions of the libraries that compute the detections, by name; part of the resolved settings."""
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
@@ -79,7 +105,7 @@ class Detector(ABC):
     def prepare_batch(cls, detectors: Sequence[Self], readings: Sequence[Readings]) -> None:
         """Compute at once what `detect` of several stations needs for these readings of one tick.
 
-        Only built-in detectors are prepared. The next `detect` returns the same as without.
+        The next `detect` returns the same as without.
         """
 
     @abstractmethod

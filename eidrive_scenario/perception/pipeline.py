@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,15 +14,55 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
-from eidrive_scenario.perception.localization import Localizer
-from eidrive_scenario.perception.own_bodies import outlines, rows_on_bodies, without_rows
-from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
+from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+
+BODY_MARGIN = 0.9
+"""Maximum distance of a detected box center from the outline of a body at which the box shows this body [m]. It is half
+the width of a car: the center of another car is closer only after a collision."""
+
+
+class Outline(NamedTuple):
+    """Outline of a body with the margin: center [m], cosine and sine of its heading, half length and half width [m]."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    half_length: float
+    half_width: float
+
+
+def outlines(bodies: Array) -> list[Outline]:
+    """Return the outlines of bodies (K, 7)."""
+    return [
+        Outline(x, y, math.cos(yaw), math.sin(yaw), length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN)
+        for x, y, _, length, width, _, yaw in bodies.tolist()
+    ]
+
+
+def rows_on_bodies(detections: Detections, bodies: Sequence[Outline]) -> list[int]:
+    """Return the rows of the detections whose centers are on bodies, or within the margin of them."""
+    rows = []
+    for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist()):
+        for x, y, cos, sin, half_length, half_width in bodies:
+            ahead, left = cos * (bx - x) + sin * (by - y), cos * (by - y) - sin * (bx - x)
+            if abs(ahead) <= half_length and abs(left) <= half_width:
+                rows.append(row)
+                break
+    return rows
+
+
+def without_rows(detections: Detections, rows: Iterable[int]) -> Detections:
+    """Return the detections without these rows."""
+    removed = set(rows)
+    if not removed:
+        return detections
+    return detections.subset([row for row in range(len(detections)) if row not in removed])
 
 
 class Perception:
@@ -49,7 +91,6 @@ class Perception:
         self.detector = detector
         self._checked = is_checked(detector)
         self._tracker = tracker
-        self._tracker_checked = tracker is not None and not is_built_in(type(tracker))
         self._localizer = localizer
         self._latency = latency
         self._pose_error = pose_error
@@ -143,7 +184,7 @@ class Perception:
             newest = self._track(found, past)
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
-            if self._tracker_checked and newest is not None:
+            if newest is not None:
                 check_detections(self._tracker, "predict", newest)
         return newest
 
@@ -157,8 +198,7 @@ class Perception:
             return shares
 
         tracked = self._tracker.update(found, in_view)
-        if self._tracker_checked:
-            check_detections(self._tracker, "update", tracked)
+        check_detections(self._tracker, "update", tracked)
         return tracked
 
 

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.roads import Pose, RoadNetwork, Signal
+from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
@@ -121,17 +121,15 @@ def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[S
             s = 0.0 if direction > 0 else road.length
         pose = roads.lane_pose_at(road.id, number, s)
         heading = pose.h + (0.0 if direction > 0 else math.pi)
-        back = _distance_before(roads.signal_pose(signal), pose, heading) if beyond is not None else 0.0
+        back = 0.0
+        if beyond is not None:  # a light may stand before the entry of the junction
+            light = roads.signal_pose(signal)
+            dx, dy = light.x - pose.x, light.y - pose.y
+            before = -dx * math.cos(heading) - dy * math.sin(heading)
+            aside = abs(dy * math.cos(heading) - dx * math.sin(heading))
+            back = before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
         x, y = pose.x - back * math.cos(heading), pose.y - back * math.sin(heading)
         yield StopLine(signal.id, kind, x, y, pose.z, heading, beyond)
-
-
-def _distance_before(light: Pose, entry: Pose, heading: float) -> float:
-    """Return the distance of a light before the entry of a junction [m], 0 if it does not stand right before it."""
-    dx, dy = light.x - entry.x, light.y - entry.y
-    before = -dx * math.cos(heading) - dy * math.sin(heading)
-    aside = abs(dy * math.cos(heading) - dx * math.sin(heading))
-    return before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
 
 
 def places_along(

@@ -13,8 +13,8 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.geometry import box_corners, rotation_matrix
+from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
-from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.sensing.readings import CameraReading
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
+from eidrive_scenario.driving.communication.report_store import PartialReportAssembler
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
-from eidrive_scenario.driving.motionless import MotionlessStations
+from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.false_tracks import FalseTracks

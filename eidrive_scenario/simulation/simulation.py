@@ -10,10 +10,10 @@ from typing import Self
 
 from msgspec.structs import replace
 
-from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stack import StackFactory
-from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source

@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from eidrive_scenario.driving.planning.area_checks import MARGIN
+from eidrive_scenario.driving.station_warnings import MARGIN
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.openscenario import Scenario

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from eidrive_scenario.driving.planning.area_checks import MARGIN
+from eidrive_scenario.driving.station_warnings import MARGIN
 from eidrive_scenario.errors import Diagnostic, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import FollowTrajectoryAction, Vehicle

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack
-from eidrive_scenario.driving.station_action import StationAction
-from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.world.view import WorldView
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from typing import Any
 
+import numpy as np
+
+from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
-from eidrive_scenario.v2x.radio_environment import RadioEnvironment
-from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+from eidrive_scenario.v2x.radio_environment import EMPTY_RADIO_ENVIRONMENT, RadioEnvironment
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents
+from eidrive_scenario.v2x.statistics.link_statistics import Links, LinkStatistics
 
 OutgoingMessage = tuple[Message, Sequence[str]]
 """A message and its receivers."""
@@ -72,3 +78,117 @@ class Channel(ABC):
     @abstractmethod
     def continue_from(self, previous: Channel) -> None:
         """Take the state of a channel that is replaced during a run; its messages in flight keep their outcome."""
+
+
+class QueuedChannel(Channel):
+    """Base class of channels that deliver messages from queues, with link statistics.
+
+    Messages in flight are passed on to a channel that replaces this one.
+    """
+
+    def __init__(self) -> None:
+        self._links = Links()
+        self.surroundings = EMPTY_RADIO_ENVIRONMENT
+        """Current antenna positions."""
+
+        self._remaining: list[LinkEvent] = []
+
+    def update_environment(self, surroundings: RadioEnvironment) -> None:
+        if surroundings.names != self.surroundings.names:
+            for name in set(self.surroundings.names).difference(surroundings.names):
+                self._links.remove(name)
+        self.surroundings = surroundings
+
+    def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
+        return self._links.deliver(receiver, now)
+
+    def in_flight(self) -> int:
+        return self._links.in_flight()
+
+    def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
+        return self._links.statistics(now, self.channel_busy_ratio)
+
+    def channel_busy_ratio(self, station: str) -> float | None:
+        """Return the channel busy ratio that this station measures; None if the model has none."""
+        return None
+
+    def continue_from(self, previous: Channel) -> None:
+        """Take the links of the previous channel. Raise SettingError if it is not a QueuedChannel."""
+        if not isinstance(previous, QueuedChannel):
+            message = f"{type(self).__name__} cannot continue the messages of {type(previous).__name__}"
+            raise SettingError(Diagnostic(message, "derive both channels from LinkChannel"))
+        previous.finalize()
+        self._links = previous._links
+        self.surroundings = previous.surroundings
+        self._remaining = list(previous.drain_events())
+
+    def finalize(self) -> None:
+        """Determine all pending outcomes before another channel replaces this one."""
+
+    def drain_events(self) -> Sequence[LinkEvent]:
+        events, self._remaining = self._remaining, []
+        return events
+
+
+class LinkChannel(QueuedChannel):
+    """Base class of channels that model every link independently.
+
+    It enforces causal delivery and maintains link statistics. A subclass implements `transmission_outcome`.
+    """
+
+    @abstractmethod
+    def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
+        """Return the delay of a message on one link [s], at least 0, or the reason for its loss."""
+
+    def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
+        events = []
+        for receiver in receivers:
+            outcome = self.transmission_outcome(message, receiver, now)
+            distance = self.surroundings.distance(message.sender, receiver)
+            if isinstance(outcome, str):
+                events.append(self._links.record_loss(message, receiver, now, outcome, distance))
+            else:
+                events.append(self._links.enqueue_delivery(message, receiver, now, outcome, distance))
+        return tuple(events)
+
+    def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
+        return [*self.drain_events(), *super().transmit(outbox, now)]
+
+
+_NUMBER = int | float | np.integer | np.floating
+
+
+def check_interval(channel: Channel, interval: Any) -> None:
+    """Raise InvalidResult unless the interval between messages is a finite number of at least 0 s."""
+    if not isinstance(interval, _NUMBER) or not 0.0 <= interval < math.inf:
+        diagnostic = f"returned {interval!r} (expected a finite number of at least 0 s)"
+        raise InvalidResult(channel, "min_message_interval", diagnostic)
+
+
+def check_delivered(channel: Channel, delivered: Any, now: float) -> None:
+    """Raise InvalidResult unless `deliver` returns messages that have arrived by `now` [s]."""
+    if not isinstance(delivered, tuple | list):
+        raise InvalidResult(channel, "deliver", f"returned {delivered!r} (expected a tuple of ReceivedMessage)")
+    for received in delivered:
+        if not isinstance(received, ReceivedMessage):
+            raise InvalidResult(channel, "deliver", f"returned {received!r} (expected a ReceivedMessage)")
+        arrived: Any = received.arrived
+        if not isinstance(arrived, _NUMBER) or not -math.inf < arrived <= now + 1e-6:
+            text = f"returned a message that arrived at {arrived!r} (expected a time up to {now:g} s)"
+            raise InvalidResult(channel, "deliver", text)
+
+
+def check_events(channel: Channel, events: Any) -> None:
+    """Raise InvalidResult unless `transmit` returns link events."""
+    if isinstance(events, LinkEvents):
+        return
+    if not isinstance(events, Sequence) or not all(isinstance(event, LinkEvent) for event in events):
+        raise InvalidResult(channel, "transmit", f"returned {events!r} (expected a sequence of LinkEvents)")
+
+
+def check_statistics(channel: Channel, statistics: Any) -> None:
+    """Raise InvalidResult unless the link statistics are a mapping."""
+    if not isinstance(statistics, Mapping):
+        raise InvalidResult(
+            channel, "statistics", f"returned {statistics!r} (expected a mapping by sender and receiver)"
+        )

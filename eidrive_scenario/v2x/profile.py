@@ -72,7 +72,9 @@ def load_profile(
         source = Path(text)
     path = _find(source, Path(origin).parent, folders)
     if path is None:
-        names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
+        names = {found.stem for folder in folders for suffix in SUFFIXES for found in folder.glob(f"*{suffix}")} | {
+            NO_COOPERATION
+        }
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
         message = f"no {kind} {quoted(str(source))}"
         hint = file_suggestion(source, SUFFIXES, names, folder=Path(origin).parent)
@@ -118,10 +120,6 @@ def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel |
     if previous is not None:
         channel.continue_from(previous)
     return channel
-
-
-def _profiles(folder: Path) -> list[Path]:
-    return [path for suffix in SUFFIXES for path in folder.glob(f"*{suffix}")]
 
 
 def _find(source: Path, beside: Path, folders: Sequence[Path]) -> Path | None:

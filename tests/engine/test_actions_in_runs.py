@@ -9,7 +9,7 @@ from lone_car import lone_car
 from written_recording import detected
 
 from eidrive_scenario.driving.stack import EmptyStack
-from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, run_file

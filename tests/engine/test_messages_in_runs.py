@@ -11,7 +11,7 @@ from scenario_1 import ONE, FrameCollector, edited, simulate, with_properties
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.v2x.messages.message import Message
-from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
+from eidrive_scenario.v2x.standards import ieee80211p_airtime
 
 LONG_RANGE = '<Property name="mount" value="front"/>\n                  <Property name="range" value="50"/>'
 SHORT_RANGE = LONG_RANGE.replace("50", "5")

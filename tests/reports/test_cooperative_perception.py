@@ -21,7 +21,7 @@ from lxml import etree
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.pose_noise import PoseNoise, PoseNoiseProcess
+from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
 

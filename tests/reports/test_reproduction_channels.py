@@ -15,7 +15,7 @@ from known_episodes import episode
 
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
-from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
+from eidrive_scenario.v2x.standards import ieee80211p_airtime
 
 LINKS = {"age_of_information.mean": 0.1, "age_of_information.p95": 0.2, "packet_reception_ratio": 0.5}
 

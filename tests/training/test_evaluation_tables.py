@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.detector import ImageDetections
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from training import runtime_scores
 from training.dataset import Dataset, encode, write

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
-from eidrive_scenario.driving.planning.area_checks import areas_off_road
 from eidrive_scenario.driving.station_declarations import declared_settings
+from eidrive_scenario.driving.station_warnings import areas_off_road
 from eidrive_scenario.errors import Diagnostic, InputError
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -13,12 +14,19 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
-from eidrive_scenario.v2x.messages.generation.cam import CHECK, EQUAL, LONGEST, SHORTEST, CamGenerationRules
-from eidrive_scenario.v2x.messages.generation.cpm import CpmGenerationRules
-from eidrive_scenario.v2x.messages.generation.object_ids import ObjectIdAssigner
-from eidrive_scenario.v2x.messages.message import Message, StationState
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud
-from eidrive_scenario.v2x.messages.size import cam_size, cpm_size, objects_that_fit
+from eidrive_scenario.v2x.messages.generation import (
+    CHECK,
+    EQUAL,
+    LONGEST,
+    SHORTEST,
+    CamGenerationRules,
+    CpmGenerationRules,
+    ObjectIdAssigner,
+    cam_size,
+    cpm_size,
+    objects_that_fit,
+)
+from eidrive_scenario.v2x.messages.message import Message, PointCloud, StationState
 from eidrive_scenario.world.actor import ActorSpec
 
 
@@ -100,10 +108,18 @@ class MessageGenerator:
         for kind in kinds:
             if etsi and interval > 0.0 and now - max(self._last_generated.values()) < interval - EQUAL:
                 break
-            if etsi:
-                messages = self._due(kind, state, detections, now, max(interval, SHORTEST))
-            else:
-                messages = [self._cam(state, now) if kind == "cam" else self._full_cpm(state, detections, now)]
+            shortest = max(interval, SHORTEST)
+            messages = []
+            if kind == "cam":
+                if not etsi or self._cam_rules.is_due(state, now, shortest):
+                    low = self._cam_rules.low_frequency(now)
+                    own = own_body(self._spec, state)
+                    messages = [self._message(state, own, now, cam_size(low), low_frequency=low, kind="cam")]
+            elif etsi:
+                messages = self._triggered_cpms(state, detections, now, shortest)
+            else:  # an empty CPM states that no object is in sight
+                size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
+                messages = [self._message(state, detections, now, size, listed=self._sensors, sensors=self._view)]
             if points is not None and messages and kind == "cpm":
                 messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
             if messages:
@@ -112,14 +128,6 @@ class MessageGenerator:
         if self._offset > 0.0:
             generated = [replace(message, offset=self._offset) for message in generated]
         return tuple([self._clock.with_station_timestamps(message, now) for message in generated])
-
-    def _due(
-        self, kind: str, state: StationState, detections: Detections, now: float, shortest: float
-    ) -> list[Message]:
-        """Return the messages of this kind that are due by the ETSI generation rules."""
-        if kind == "cpm":
-            return self._triggered_cpms(state, detections, now, shortest)
-        return [self._cam(state, now)] if self._cam_rules.is_due(state, now, shortest) else []
 
     def _is_due_by_rate(self, now: float) -> bool:
         """Return True if a message is due in this tick, in each tick or at a rate."""
@@ -131,13 +139,6 @@ class MessageGenerator:
             return False
         self._periods = period
         return True
-
-    def _full_cpm(self, state: StationState, detections: Detections, now: float) -> Message:
-        """Return a CPM with all detections. An empty CPM states that no object is in sight."""
-        size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
-        number = self._take_number()
-        message = Message(self._spec.name, number, now, state, detections, size, sensors=self._view)
-        return self._sized(message, self._sensors)
 
     def _triggered_cpms(
         self, state: StationState, detections: Detections, now: float, shortest: float
@@ -154,43 +155,40 @@ class MessageGenerator:
         while rows or not generated:
             room = objects_that_fit(mtu, sensors, security)
             part, rows = rows[:room], rows[room:]
-            message = Message(
-                self._spec.name,
-                self._take_number(),
-                now,
+            message = self._message(
                 state,
                 detections.subset(part),
+                now,
                 cpm_size(len(part), sensors, security),
+                listed=sensors,
                 objects=tuple(numbers[row] for row in part),
                 sensors=self._view if sensors else None,
             )
-            generated.append(self._sized(message, sensors))
+            generated.append(message)
             sensors = 0
         return generated
 
-    def _cam(self, state: StationState, now: float) -> Message:
-        """Return a CAM."""
-        low_frequency = self._cam_rules.low_frequency(now)
-        message = Message(
-            self._spec.name,
-            self._take_number(),
-            now,
-            state,
-            own_body(self._spec, state),
-            cam_size(low_frequency),
-            kind="cam",
-        )
-        return self._sized(message, 0, low_frequency)
+    def _message(
+        self,
+        state: StationState,
+        detections: Detections,
+        now: float,
+        size: int,
+        *,
+        listed: int = 0,
+        low_frequency: bool = False,
+        **fields: Any,
+    ) -> Message:
+        """Return the next message, with the size of its encoding if there is an encoder.
 
-    def _sized(self, message: Message, sensors: int, low_frequency: bool = False) -> Message:
+        listed  number of sensors in it;  low_frequency  whether it has the low-frequency container of CAMs
+        """
+        message = Message(self._spec.name, self.number, now, state, detections, size, **fields)
+        self.number += 1
         if self._encoder is None:
             return message
-        encoded = self._encoder.encode(message, sensors=sensors, low_frequency=low_frequency)
+        encoded = self._encoder.encode(message, sensors=listed, low_frequency=low_frequency)
         return replace(message, size=len(encoded) + self._settings.security_bytes)
-
-    def _take_number(self) -> int:
-        self.number += 1
-        return self.number - 1
 
 
 def own_body(spec: ActorSpec, state: StationState) -> Detections:

@@ -13,7 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate
 from eidrive_scenario.fusion.tracks import pose_part
-from eidrive_scenario.perception.own_bodies import BODY_MARGIN, Outline, outlines, rows_on_bodies, without_rows
+from eidrive_scenario.perception.pipeline import BODY_MARGIN, Outline, outlines, rows_on_bodies, without_rows
 from eidrive_scenario.sensing.readings import NOTHING_ATTACHED, EgoState
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import StationState
@@ -111,16 +111,13 @@ class OwnBody:
 
         The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
         """
-        if len(detections.boxes) == 1 and self._is_far(detections.boxes.item(0), detections.boxes.item(1)):
-            return detections
+        center_x, center_y, reach = self._vicinity
+        boxes = detections.boxes
+        if len(boxes) == 1 and math.hypot(boxes.item(0) - center_x, boxes.item(1) - center_y) > reach:
+            return detections  # a single object that is far from all stored places
         place = self._at(detections.time)
         detections = _without_bodies(detections, place.trailers)
         return _without_bodies(detections, [place.body])
-
-    def _is_far(self, x: float, y: float) -> bool:
-        """Return True only if a point [m] is on no stored outline."""
-        center_x, center_y, reach = self._vicinity
-        return math.hypot(x - center_x, y - center_y) > reach
 
     def without_perceived(
         self,

@@ -74,7 +74,7 @@ def line_of_sight_states(
     count = len(pairs)
     view = world.view()
     if count <= _FEW:
-        met = world.first_hit(*_ends(places, pairs))
+        met = world.first_hit([places[first] for first, _ in pairs], [places[second] for _, second in pairs])
         if all(row in (NOTHING, view.rows.get(second)) for row, (_, second) in zip(met, pairs, strict=True)):
             return LineOfSightStates(np.full(count, LOS), np.full(count, -np.inf), {})
     row_of, points = {name: row for row, name in enumerate(places)}, np.array([*places.values()])
@@ -111,7 +111,3 @@ def _share_of_line(begin: Array, end: Array, points: Array) -> Array:
     length = np.maximum(np.einsum("ni,ni->n", along, along), 1e-9)
     share: Array = np.clip(np.einsum("ni,ni->n", points - begin, along) / length, 0.0, 1.0)
     return share
-
-
-def _ends(places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> tuple[list[Place], list[Place]]:
-    return [places[first] for first, _ in pairs], [places[second] for _, second in pairs]

@@ -1,24 +1,177 @@
-"""Newest report of each station, from received messages and from the own sensors."""
+"""Newest report of each station, from messages and own sensors, with perception regions and shared points."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.own_body import OwnBody
-from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
-from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
-from eidrive_scenario.driving.communication.relative_pose import relative_state
-from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.geometry import points_in_box
+from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
+from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
-from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import Message, PointCloud, ReceivedMessage, StationState
+
+
+def relative_state(state: StationState | None, ego: EgoState, covariance: Array | None) -> StationState | None:
+    """Return the reported state of another station with the covariance of its pose relative to that of the receiver.
+
+    ego         assumed pose of the receiver
+    covariance  (3, 3) of its x, y and yaw; None: the pose is exact
+
+    The receiver steers relative to its assumed pose, of which its own detections are free of error. The two pose errors
+    are independent, so that objects of the other station have both. An error of the yaw at the receiver moves a point
+    at distance d by d times the error: about the place of the other station, the error of the receiver is T e with
+    T = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]].
+    """
+    if state is None or covariance is None:
+        return state
+    dx, dy = state.x - float(ego.position[0]), state.y - float(ego.position[1])
+    about = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
+    own = about @ covariance @ about.T
+    return replace(state, pose_covariance=own if state.pose_covariance is None else state.pose_covariance + own)
+
+
+class PartialReportAssembler:
+    """Store of the last report of each object for at most `timeout` [s]."""
+
+    def __init__(self, timeout: float) -> None:
+        self._timeout = timeout
+        self._rows: dict[int, tuple[float, Detections]] = {}
+
+    def update(self, message: Message) -> Detections:
+        """Add a message; return all known objects predicted to the time of the newest measurement.
+
+        Objects are predicted at their last velocity; objects of unknown velocity keep their position.
+        """
+        detections = message.detections
+        for row, number in enumerate(message.objects or ()):
+            held = self._rows.get(number)
+            if held is None or held[0] <= detections.time:
+                self._rows[number] = (detections.time, detections.subset([row]))
+        newest = max([detections.time, *(time for time, _ in self._rows.values())])
+        self._rows = {number: held for number, held in self._rows.items() if newest - held[0] <= self._timeout}
+        return self._predicted_objects(newest)
+
+    def _predicted_objects(self, time: float) -> Detections:
+        if not self._rows:
+            return Detections(time)
+        numbers = sorted(self._rows)
+        known = [self._rows[number][1] for number in numbers]
+        boxes = np.concatenate([one.boxes for one in known])
+        velocity = np.concatenate([one.velocity for one in known])
+        for row, (one, (vx, vy)) in enumerate(zip(known, velocity.tolist(), strict=True)):
+            if not math.isnan(vx + vy):
+                boxes[row, 0] += vx * (time - one.time)
+                boxes[row, 1] += vy * (time - one.time)
+        return Detections(
+            time,
+            boxes,
+            np.concatenate([one.scores for one in known]),
+            tuple(one.classes[0] for one in known),
+            velocity,
+            np.concatenate([one.covariance for one in known]),
+            tuple(numbers),
+            np.concatenate([one.confidence for one in known]),
+        )
+
+
+class PerceptionRegionStore:
+    """Newest perception region of each station, kept for a lifetime [s].
+
+    CPMs list the sensors of the sender once per second only (ETSI TS 103 324); the others apply them at a new pose.
+    """
+
+    def __init__(self, lifetime: float) -> None:
+        self._lifetime = lifetime
+        self._sensors: dict[str, tuple[ViewSector, ...]] = {}
+        self._regions: dict[str, PerceptionRegion] = {}
+
+    def add(
+        self, station: str, time: float, pose: tuple[float, float, float, float], sectors: tuple[ViewSector, ...]
+    ) -> None:
+        """Store the region of a measurement at `time` [s], unless a newer one of the station is stored.
+
+        pose     x, y, z and yaw of the station [m, rad]
+        sectors  covered sectors in the frame of the station
+        """
+        held = self._regions.get(station)
+        if held is None or held.time <= time:
+            self._regions[station] = PerceptionRegion(station, time, tuple([one.placed(*pose) for one in sectors]))
+
+    def add_message(self, message: Message) -> None:
+        """Store the region of a CPM. Without information about the sensors of its sender it has none.
+
+        The message has the pose of the sender at its generation; since the measurement it drove straight on.
+        """
+        if message.kind != "cpm":
+            return
+        if message.sensors is not None:
+            self._sensors[message.sender] = message.sensors
+        sectors = self._sensors.get(message.sender, ())
+        if sectors:
+            state, time = message.state, message.detections.time
+            driven = state.speed * (state.time - time)
+            x, y = state.x - driven * math.cos(state.yaw), state.y - driven * math.sin(state.yaw)
+            self.add(message.sender, time, (x, y, state.z, state.yaw), sectors)
+
+    def newest(self, now: float) -> tuple[PerceptionRegion, ...]:
+        """Return the regions that do not exceed the lifetime at `now` [s], one for each station."""
+        for station, region in list(self._regions.items()):
+            if region.time < now - self._lifetime - TIME_TOLERANCE:
+                del self._regions[station]
+        return tuple(self._regions.values())
+
+
+class PointCloudSharing:
+    """Received point clouds, and detection in them together with the points of the station.
+
+    perception   separate instance for the merged points, as detectors and trackers have state; None for a station that
+                 does not receive messages
+    """
+
+    def __init__(self, fusion: FusionMethod, perception: Perception | None) -> None:
+        self.own: PointCloud | None = None
+        """Newest points of this station, as transmitted."""
+        self._fusion = fusion
+        self._perception = perception
+        self._received: dict[str, tuple[float, Array]] = {}
+
+    def add_points(self, sender: str, cloud: PointCloud, body: Array) -> None:
+        """Store a received cloud without points on the ego body (7,) at the time of measurement.
+
+        An out-of-sequence cloud does not replace a newer one.
+        """
+        held = self._received.get(sender)
+        if held is None or cloud.time >= held[0]:
+            points = cloud.points()
+            self._received[sender] = (cloud.time, points[~points_in_box(points, body)])
+
+    def perceive(self, readings: Readings, alone: Detections | None, pose: PoseUncertainty | None) -> Detections | None:
+        """Return newly available objects in merged points, or None.
+
+        alone  objects in the ego points;  pose  uncertainty of the assumed pose; None: it is exact
+        """
+        self.own = self._fusion.shared_cloud(readings) or self.own
+        if self._perception is None:
+            return alone
+        if pose is not None:
+            self._perception.set_pose(pose)
+        oldest = readings.time - self._fusion.max_point_age - TIME_TOLERANCE
+        self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}
+        return self._perception.perceive(
+            self._fusion.merge_readings(readings, [points for _, (_, points) in sorted(self._received.items())])
+        )
+
 
 SENDER_REPORT_SUFFIX = " itself"
 """Suffix of the reports of a station about itself, which are kept as those of another station."""
@@ -95,7 +248,9 @@ class ReportStore:
             if self._is_expired(message.detections.time, self._lifetime, now):
                 expired.append(row)
                 continue
-            detections = _numbered(message)
+            detections = message.detections
+            if message.objects is not None and not detections.tracks:
+                detections = replace(detections, tracks=message.objects)
             state: StationState | None = message.state
             pose_change: Array | None = None
             if not own:
@@ -106,10 +261,12 @@ class ReportStore:
                 pose_change = 2.0 * state.pose_covariance
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
-            self.add(
-                Report(station, detections, received.arrived, state, complete, pose_change),
-                None if complete else self._assembled_detections(message, pose_covariance),
-            )
+            completed: Detections | None = None
+            if not complete:  # the message lists a part of the objects of its sender
+                if sender not in self._partial:
+                    self._partial[sender] = PartialReportAssembler(self._lifetime)
+                completed = self._without_own_body(message, self._partial[sender].update(message), pose_covariance)
+            self.add(Report(station, detections, received.arrived, state, complete, pose_change), completed)
         if now > self._next_deletion:
             self._delete_old(now)
         return tuple(expired)
@@ -151,13 +308,6 @@ class ReportStore:
             del self._reports[station]
         self._next_deletion = oldest
 
-    def _assembled_detections(self, message: Message, pose_covariance: Array | None) -> Detections:
-        """Return all known objects of the sender of a message that lists a part of them."""
-        memory = self._partial.get(message.sender)
-        if memory is None:
-            memory = self._partial[message.sender] = PartialReportAssembler(self._lifetime)
-        return self._without_own_body(message, memory.update(message), pose_covariance)
-
     def _without_own_body(self, message: Message, detections: Detections, pose_covariance: Array | None) -> Detections:
         """Return detections of a message without the ego body."""
         if message.kind != "cpm" or message.sender == self._name:
@@ -166,10 +316,3 @@ class ReportStore:
         return self._own_body.without_perceived(
             detections, message.sender, message.state, None if own is None else own.detections, pose_covariance
         )
-
-
-def _numbered(message: Message) -> Detections:
-    """Return the detections of a message, with the object ids of the sender as track numbers if it has none."""
-    if message.objects is None or message.detections.tracks:
-        return message.detections
-    return replace(message.detections, tracks=message.objects)

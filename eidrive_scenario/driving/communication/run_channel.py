@@ -10,9 +10,14 @@ from typing import Any
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.registry import is_built_in
-from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
-from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
+from eidrive_scenario.v2x.channel import (
+    Channel,
+    OutgoingMessage,
+    check_delivered,
+    check_events,
+    check_interval,
+    check_statistics,
+)
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -21,7 +26,7 @@ from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, mess
 
 
 class RunChannel:
-    """Channel of a run; the results of one of a third party are checked.
+    """Channel of a run, whose results are checked.
 
     active   channel in use; None without cooperation
     name     of its profile
@@ -33,8 +38,6 @@ class RunChannel:
         self.name = NO_COOPERATION
         self.profile: ChannelProfile | None = None
         self._seed = seed
-        self._checked: Channel | None = None
-        """The channel, if its results are checked: that of a third party."""
         self._retired: Channel | None = None
         """The last channel after cooperation was switched off: its statistics remain part of the result."""
         self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
@@ -55,8 +58,6 @@ class RunChannel:
             self.active = build_channel(profile, self._seed, previous=before)
         except SettingError as error:
             raise error.at(origin, line) from error
-        third_party = self.active is not None and not is_built_in(type(self.active))
-        self._checked = self.active if third_party else None
         self._retired = before if self.active is None else None
         self._statistics = None
         self.profile = profile
@@ -78,8 +79,7 @@ class RunChannel:
         if self.active is None:
             return 0.0
         interval = self.active.min_message_interval(sender)
-        if self._checked is not None:
-            check_interval(self._checked, interval)
+        check_interval(self.active, interval)
         return interval
 
     def deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
@@ -87,8 +87,7 @@ class RunChannel:
         if self.active is None:
             return ()
         delivered = self.active.deliver(receiver, now)
-        if self._checked is not None:
-            check_delivered(self._checked, delivered, now)
+        check_delivered(self.active, delivered, now)
         return delivered
 
     def count_expired(self, sender: str, receiver: str) -> None:
@@ -101,12 +100,12 @@ class RunChannel:
             return ()
         events = self.active.transmit(outbox, now)
         self._statistics = None
-        return self._checked_events(events)
+        return _checked_events(self.active, events)
 
     def final_links(self) -> Sequence[LinkEvent]:
         """Return the outcomes that no `transmit` has returned."""
         channel = self.active or self._retired
-        return () if channel is None else self._checked_events(channel.drain_events())
+        return () if channel is None else _checked_events(channel, channel.drain_events())
 
     def metrics(self, now: float) -> dict[str, float]:
         """Return the counts of messages over all links; nothing if there was never a channel."""
@@ -121,12 +120,11 @@ class RunChannel:
             return {}
         if self._statistics is None or self._statistics[0] != now:
             statistics = channel.statistics(now)
-            if not is_built_in(type(channel)):
-                check_statistics(channel, statistics)
+            check_statistics(channel, statistics)
             self._statistics = now, with_expired(statistics, self._expired)
         return self._statistics[1]
 
-    def _checked_events(self, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:
-        if self._checked is not None:
-            check_events(self._checked, events)
-        return events if isinstance(events, LinkEvents) else tuple(events)
+
+def _checked_events(channel: Channel, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:
+    check_events(channel, events)
+    return events if isinstance(events, LinkEvents) else tuple(events)

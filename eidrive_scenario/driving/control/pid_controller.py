@@ -3,14 +3,59 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-from eidrive_scenario.driving.control.pid import PID, Gains
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.path import LEADS_AWAY
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of the error, its integral [1/s] and its derivative [s]."""
+
+    proportional: float
+    integral: float = 0.0
+    derivative: float = 0.0
+
+
+class PID:
+    """PID controller: output = kp·e + ki·∫e dt + kd·de/dt, within limits.
+
+    Anti-windup by conditional integration: the integral is constant while the output is at a limit that the error
+    exceeds further, and while the error is larger than `band`.
+    """
+
+    def __init__(self, gains: Gains, *, low: float, high: float, dt: float, band: float = math.inf) -> None:
+        self.gains = gains
+        self.low = low
+        self.high = high
+        self.dt = dt
+        self.band = band
+        self._integral = 0.0
+        self._last: float | None = None
+
+    def reset(self) -> None:
+        """Reset integral and derivative."""
+        self._integral = 0.0
+        self._last = None
+
+    def update(self, error: float, feed_forward: float = 0.0) -> float:
+        """Return the output for the error of this tick plus a feed-forward part."""
+        gains = self.gains
+        slope = 0.0 if self._last is None else (error - self._last) / self.dt
+        self._last = error
+        fixed = feed_forward + gains.proportional * error + gains.derivative * slope
+        integral = self._integral + error * self.dt
+        output = fixed + gains.integral * integral
+        free = self.low < output < self.high or (output >= self.high) == (error < 0.0)
+        if free and abs(error) <= self.band:
+            self._integral = integral
+        return min(max(fixed + gains.integral * self._integral, self.low), self.high)
+
 
 LARGEST_ACCELERATION = 3.5
 LARGEST_DECELERATION = 6.5
@@ -59,7 +104,10 @@ class PidController(VehicleController):
             self._speed.reset()
             braking = max(plan.braking + _downhill(ego), 0.0)
             return Control(0.0, _pedal(braking, self.spec.max_deceleration), steering)
-        return self._pedals(self._accelerate(ego, plan) - _downhill(ego), steering)
+        acceleration = self._accelerate(ego, plan) - _downhill(ego)
+        if acceleration >= 0.0:
+            return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
+        return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
 
     def hold_standstill(self) -> Control:
         """Return full brake with the last steering angle."""
@@ -72,11 +120,6 @@ class PidController(VehicleController):
             self._speed.reset()
             return -HOLDING
         return self._speed.update(target - ego.speed, falling or plan.acceleration)
-
-    def _pedals(self, acceleration: float, steering: float) -> Control:
-        if acceleration >= 0.0:
-            return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
-        return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
 
     def _steer(self, ego: EgoState, plan: Plan) -> float:
         x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, NonNegativeFloat, PositiveFloat
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings, Polygon
-from eidrive_scenario.driving.planning.levels import is_on_level, path_heights
+from eidrive_scenario.driving.planning.path import is_on_level, path_heights
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan

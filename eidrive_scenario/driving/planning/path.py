@@ -1,4 +1,4 @@
-"""Planned path: evenly spaced points, and speed limits by curvature."""
+"""Paths, the level of a station on roads above each other, and the lane below it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
 
 SPACING = 1.0
 """Distance between the points of a path [m]."""
@@ -147,3 +151,81 @@ def _smooth(points: Array) -> Array:
         points = points.copy()
         points[1:-1] = (points[:-2] + 2.0 * points[1:-1] + points[2:]) / 4.0
     return points
+
+
+NEAR_PATH = 30.0
+"""Maximum distance from a path within which its height determines the level of an object [m]."""
+SAME_PLACE = 5.0
+"""Difference of distances below which several points of a path are at an object [m], where a path passes below itself.
+"""
+
+
+def path_heights(path: PlannedPath, roads: RoadNetwork | None, z: float) -> Array | None:
+    """Return the heights of the road at the points (M,) of a path [m]; None if all roads are level.
+
+    Each point is on the road of the one before or on one that continues it, where roads cross above each other.
+
+    z  height of the vehicle at the start of the path [m]
+    """
+    if path.heights is None and roads is not None and not roads.is_level:
+        place, found = None, []
+        for x, y in path.points.tolist():
+            place = roads.locate_at(x, y, place, z, reach=5.0)
+            z = z if place is None else roads.road_pose_at(place.road, place.s, place.t).z
+            found.append(z)
+        path.heights = np.array(found)
+    return path.heights
+
+
+def is_on_level(place: Array, points: Array, heights: Array) -> bool:
+    """Return whether an object is on the level of a path (M, 2) with these heights (M,); True far from the path.
+
+    place  x, y, and height of the lower side of the object [m]
+    """
+    gap = np.hypot(*(points - place[:2]).T)
+    nearest = float(gap.min())
+    there = heights[gap <= nearest + SAME_PLACE]
+    return nearest > NEAR_PATH or bool(np.any(np.abs(there - place[2]) <= OTHER_LEVEL))
+
+
+ALIGNED = 0.6
+"""Maximum angle between the headings of a vehicle and of the lane that it follows [rad]."""
+
+
+def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
+    """Return the lane of a vehicle, or None if no road is near.
+
+    The nearest lane may be that of a road above or below, or of crossing traffic in a junction. Then the overlapping
+    lane on the level of the vehicle is selected whose traffic drives closest to its heading, if it is aligned.
+    """
+    x, y, z = ego.position.tolist()
+    place = roads.locate_at(x, y)
+    if place is None:
+        return None
+    is_level = _is_level(roads, place, z)
+    if is_level and _angle(roads, place, ego.yaw) <= ALIGNED:
+        return place
+    height = None if roads.is_level else np.array([z])
+    rows, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
+    keys = [key for key, _ in roads.tables.lane_keys()]
+    found = [
+        roads.location(keys[row].road, keys[row].lane, s)
+        for row, s in zip(rows.tolist(), along.tolist(), strict=True)
+        if roads.tables.lane_drivable[row]
+    ]
+    found = [one for one in found if _is_level(roads, one, z)]
+    best = min(found, key=lambda one: _angle(roads, one, ego.yaw), default=place)
+    return best if not is_level or _angle(roads, best, ego.yaw) <= ALIGNED else place
+
+
+def _is_level(roads: RoadNetwork, place: LaneLocation, z: float) -> bool:
+    """Return whether a lane is on the level of a vehicle at height z [m]."""
+    return roads.is_level or abs(roads.road_pose_at(place.road, place.s, place.t).z - z) <= OTHER_LEVEL
+
+
+def _angle(roads: RoadNetwork, place: LaneLocation, yaw: float) -> float:
+    """Return the angle between a heading and the driving direction of a lane [rad]."""
+    heading = roads.lane_pose_at(place.road, place.lane, place.s).h
+    if roads.driving_direction(place.road, place.lane) < 0:
+        heading += math.pi
+    return abs(float(wrap_angle(yaw - heading)))

@@ -115,7 +115,10 @@ class SignalStops:
             if light.is_yellow:
                 remaining = yellow_time(speed) - (now - self._yellow_since.setdefault(name, now))
             can_stop = can_stop_for_light(left, speed, passes_in_time=left + BEFORE_LINE <= speed * remaining)
-            (self._stopping if can_stop or speed < STANDING else self._too_late).add(name)
+            if can_stop or speed < STANDING:
+                self._stopping.add(name)
+            else:
+                self._too_late.add(name)
         return name in self._stopping
 
     def _sign_holds(self, sign: SignalAhead, left: float, speed: float, now: float) -> bool:

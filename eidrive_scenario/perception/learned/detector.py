@@ -12,24 +12,21 @@ from msgspec.structs import astuple, replace
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.geometry.duplicates import without_duplicates
+from eidrive_scenario.perception.detector import Detector, DetectorContext, ImageDetections, without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
-from eidrive_scenario.perception.geometry.visibility import in_camera
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.geometry.projection import in_camera
 from eidrive_scenario.perception.learned import image_memory
-from eidrive_scenario.perception.learned.classes import object_category
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.image_network import ImageNetwork, object_category
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.network_loading import build_network, check_network, weights_path
-from eidrive_scenario.perception.learned.runtime_selection import (
+from eidrive_scenario.perception.learned.runtimes import (
     runtime_versions,
     select_runtime,
 )
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.perception.learned.weight_files import (
+from eidrive_scenario.perception.learned.weights import (
     check_weights_exist,
 )
 from eidrive_scenario.perception.lifting.lifting import lift
@@ -163,25 +160,26 @@ class LearnedDetector(Detector):
         Image boxes that no body fills are omitted.
         """
         clouds: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
-        lifted = most_certain([self._lift_with(found, readings, camera, *cloud) for cloud in clouds.items()])
-        return lifted if lifted.scores.all() else lifted.subset(np.flatnonzero(lifted.scores).tolist())
-
-    def _lift_with(
-        self, found: ImageDetections, readings: Readings, camera: str, lidar: str, cloud: LidarReading | None
-    ) -> Detections:
-        categories = [object_category(name) for name in found.classes]
-        rows = [row for row, category in enumerate(categories) if category is not None]
-        return lift(
-            found.boxes[rows],
-            [category for category in categories if category is not None],
-            found.scores[rows],
-            readings.cameras[camera],
-            cloud,
-            time=readings.time,
-            ground=float(readings.ego.position[2]),
-            surroundings=self._map_context,
-            pattern=self._patterns.get(lidar),
+        categories = {row: object_category(name) for row, name in enumerate(found.classes)}
+        used = {row: category for row, category in categories.items() if category is not None}
+        rows = list(used)
+        lifted = most_certain(
+            [
+                lift(
+                    found.boxes[rows],
+                    list(used.values()),
+                    found.scores[rows],
+                    readings.cameras[camera],
+                    cloud,
+                    time=readings.time,
+                    ground=float(readings.ego.position[2]),
+                    surroundings=self._map_context,
+                    pattern=self._patterns.get(lidar),
+                )
+                for lidar, cloud in clouds.items()
+            ]
         )
+        return lifted if lifted.scores.all() else lifted.subset(np.flatnonzero(lifted.scores).tolist())
 
 
 class YoloDetector(LearnedDetector):

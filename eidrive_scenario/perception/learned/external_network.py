@@ -12,9 +12,15 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
-from eidrive_scenario.perception.learned.runtime_selection import AUTO, Device, select_runtime
-from eidrive_scenario.perception.learned.runtimes import LAYOUTS, load_onnx, torchscript_network
-from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, refused_torchscript
+from eidrive_scenario.perception.learned.runtimes import (
+    AUTO,
+    LAYOUTS,
+    Device,
+    load_onnx,
+    select_runtime,
+    torchscript_network,
+)
+from eidrive_scenario.perception.learned.weights import TORCHSCRIPT_SUFFIX, refused_torchscript
 
 _ROUNDING = 1e-5
 """Excess of a probability over 1 that single precision explains."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.sensing.readings import SignalReading
 
 CAPACITY = 8192

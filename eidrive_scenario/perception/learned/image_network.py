@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import NamedTuple
 
 import cv2
@@ -12,10 +13,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.perception.learned.classes import suppression_groups
+from eidrive_scenario.detections import CLASSES
+from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.learned.networks.suppression import suppress
+from eidrive_scenario.roads.model.signal_states import OFF, lamps
 from eidrive_scenario.sensing.readings import CameraReading
+
+OBJECT_CLASSES = ("car", "truck", "bus", "motorbike", "bicycle", "pedestrian")
+LIGHT_STATES = ("red", "yellow", "green", "off")
+LIGHT = "traffic light"
+STOP_SIGN = "stop sign"
+IMAGE_CLASSES = (*OBJECT_CLASSES, *(f"{LIGHT} {state}" for state in LIGHT_STATES), STOP_SIGN)
+"""The classes of the shipped weights, in the order of the networks' outputs."""
+
+VEHICLES = ("car", "truck", "bus")
+"""Those of vehicles with four or more wheels; a van is a car."""
+
+VERY_LIKE = 0.85
+"""Similarity (ratio of Ratcliff and Obershelp) from which a name is reported as misspelt."""
+_VEHICLES = (*VEHICLES, "van")
+_SAME_AS = {"van": "car", "person": "pedestrian", "motorcycle": "motorbike"}
+
+
+def image_class(category: str) -> str:
+    """Return the class of the image detectors for this actor category; a van is a car."""
+    return _SAME_AS.get(category, category)
+
+
+def object_category(name: str) -> str | None:
+    """Return the class out of eidrive_scenario.detections.CLASSES for a network class; None for other things."""
+    if name in CLASSES:
+        return name
+    known = _SAME_AS.get(name)
+    return known if known in CLASSES else None
+
+
+def light_state(name: str) -> str | None:
+    """Return the state in the name of a traffic light class; None for all other classes."""
+    if name == LIGHT:
+        return "unknown"
+    return name.removeprefix(f"{LIGHT} ") if name.startswith(f"{LIGHT} ") else None
+
+
+def misspelt(name: str) -> str | None:
+    """Return the class whose name is very similar to this name; None for classes that are in use, and if none is
+    similar.
+
+    Networks distinguish many things that are not used here, so an unknown name is not an error by itself.
+    """
+    state = light_state(name)
+    if (
+        object_category(name)
+        or name == STOP_SIGN
+        or (state and (state in ("off", "unknown") or any(mode != OFF for _, mode in lamps(state))))
+    ):
+        return None
+    near = get_close_matches(name, (*CLASSES, *_SAME_AS, LIGHT, *IMAGE_CLASSES), n=1, cutoff=VERY_LIKE)
+    return near[0] if near else None
+
+
+def suppression_groups(names: Sequence[str]) -> NDArray[np.int64]:
+    """Return the group (C,) of each class: overlapping boxes of one group are one object.
+
+    A traffic light has one state, so its states are one group; a vehicle is not both a car and a truck.
+    """
+    groups: dict[str, int] = {}
+    keys = [LIGHT if light_state(name) else "vehicle" if name in _VEHICLES else name for name in names]
+    return np.array([groups.setdefault(key, len(groups)) for key in keys], dtype=np.int64)
+
 
 LARGEST_OVERLAP = 0.5
 """Overlap above which only the best of several boxes of one group is kept."""
@@ -62,11 +127,11 @@ class ImageNetwork(ABC):
 
     def find_in(self, reading: CameraReading) -> ImageDetections:
         """Return the objects in the image of a camera."""
-        return self.find(reading.rgb)
+        return self.find_in_all([reading])[0]
 
     def find_in_all(self, readings: Sequence[CameraReading]) -> list[ImageDetections]:
-        """Return the objects in the image of each camera, as `find_in` does."""
-        return [self.find_in(reading) for reading in readings]
+        """Return the objects in the image of each camera."""
+        return self._find_all([reading.rgb for reading in readings])
 
     def find(self, image: NDArray[np.uint8]) -> ImageDetections:
         """Return the objects in an image (H, W, 3), red green blue. Boxes without an area in the image are removed."""
@@ -86,10 +151,10 @@ class ImageNetwork(ABC):
 
     def _detections(self, image: NDArray[np.uint8], scaled: _Scaled, candidates: Candidates) -> ImageDetections:
         height, width = image.shape[:2]
-        candidates = _finite(candidates)
-        if len(candidates.scores) > MOST_CANDIDATES:
-            best = np.argsort(-candidates.scores, kind="stable")[:MOST_CANDIDATES]
-            candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
+        rows = np.flatnonzero(np.isfinite(candidates.boxes).all(axis=1))
+        if len(rows) > MOST_CANDIDATES:
+            rows = rows[np.argsort(-candidates.scores[rows], kind="stable")[:MOST_CANDIDATES]]
+        candidates = Candidates(candidates.boxes[rows], candidates.scores[rows], candidates.classes[rows])
         groups = self._groups[candidates.classes]
         kept = suppress(candidates.boxes, candidates.scores, groups, LARGEST_OVERLAP)
         boxes = self.calibrated(candidates.boxes[kept], [self.classes[number] for number in candidates.classes[kept]])
@@ -112,14 +177,6 @@ class ImageNetwork(ABC):
     def candidates_of(self, images: Sequence[NDArray[np.uint8]]) -> list[Candidates]:
         """Return the boxes in each image of the input size, as `candidates` does."""
         return [self.candidates(image) for image in images]
-
-
-def _finite(candidates: Candidates) -> Candidates:
-    """Return the candidates whose boxes have finite edges."""
-    finite = np.isfinite(candidates.boxes).all(axis=1)
-    if finite.all():
-        return candidates
-    return Candidates(candidates.boxes[finite], candidates.scores[finite], candidates.classes[finite])
 
 
 def resized(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:

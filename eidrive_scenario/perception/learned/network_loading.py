@@ -8,9 +8,9 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.own_network import OwnNetwork
-from eidrive_scenario.perception.learned.runtime_selection import is_installed, missing_runtime, select_runtime
+from eidrive_scenario.perception.learned.runtimes import is_installed, missing_runtime, select_runtime
 from eidrive_scenario.perception.learned.settings import EXTERNAL_SUFFIXES, LearnedSettings
-from eidrive_scenario.perception.learned.weight_files import (
+from eidrive_scenario.perception.learned.weights import (
     DEFAULT_CONFIDENCE,
     OWN_SUFFIX,
     TORCHSCRIPT_SUFFIX,

@@ -2,26 +2,87 @@
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import logging
 import os
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
-from eidrive_scenario.perception.learned.runtime_selection import Runtime
-from eidrive_scenario.perception.learned.weight_files import read_weights
+from eidrive_scenario.perception.learned.weights import ONNX_SUFFIX, TORCHSCRIPT_SUFFIX, read_weights
+
+Runtime = Literal["onnxruntime", "openvino", "torch", "opencv"]
+Device = Literal["cpu", "cuda"]
+AUTO = "auto"
+
+FASTEST_FIRST: tuple[Runtime, ...] = ("onnxruntime", "openvino", "torch", "opencv")
+"""Runtimes of the networks of this project by their time for an image on one core of a CPU; OpenCV is a dependency of
+the project, the others are optional."""
+_EXTRAS: Mapping[Runtime, str] = {"openvino": "openvino", "onnxruntime": "onnx", "torch": "learned"}
+"""Optional dependencies of this project that contain each runtime."""
+
+
+def runtimes_of(path: Path, device: Device = "cpu") -> tuple[Runtime, ...]:
+    """Return the runtimes that can execute weights of this file type on a device, the fastest first."""
+    if path.suffix == TORCHSCRIPT_SUFFIX or (device == "cuda" and path.suffix != ONNX_SUFFIX):
+        return ("torch",)
+    if device == "cuda":
+        return ()
+    return ("onnxruntime", "opencv") if path.suffix == ONNX_SUFFIX else FASTEST_FIRST
+
+
+def select_runtime(path: Path, wanted: str = AUTO, device: Device = "cpu") -> Runtime:
+    """Return the runtime for weights: the wanted one, or the fastest that is installed; `torch` if none is.
+
+    Raise SettingError if the wanted runtime cannot execute weights of this file type on the device, or is not
+    installed.
+    """
+    suitable = runtimes_of(path, device)
+    if not suitable:
+        message = f"device {device!r} executes no {path.suffix} weights"
+        raise SettingError(Diagnostic(message, "set `device: cpu`, or use weights .npz or .pt"))
+    if wanted == AUTO:
+        return next((name for name in suitable if is_installed(name)), suitable[0])
+    for name in suitable:
+        if name == wanted:
+            if not is_installed(name):
+                raise missing_runtime(name)
+            return name
+    where = f"{path.suffix or '.npz'} weights on the device {device!r}"
+    message = f"runtime {wanted!r} does not execute {where}"
+    raise SettingError(Diagnostic(message, f"set `runtime` to {AUTO}, {', '.join(suitable)}"))
+
+
+def missing_runtime(name: Runtime) -> SettingError:
+    """Return the error for a runtime that is not installed."""
+    hint = f"run: pip install 'eidrive-scenario[{_EXTRAS[name]}]'"
+    return SettingError(Diagnostic(f"runtime {name!r} is not installed", hint))
+
+
+def runtime_versions(name: Runtime) -> Mapping[str, str]:
+    """Return name and version of a runtime; nothing if it is not installed. No library is imported."""
+    if name == "opencv":
+        return {name: cv2.__version__}
+    return {name: version(name)} if is_installed(name) else {}
+
+
+def is_installed(name: Runtime) -> bool:
+    """Return whether the library of a runtime is installed."""
+    return name == "opencv" or importlib.util.find_spec(name) is not None
+
 
 LAYOUTS = (
     "yolov5 (1, N, 5 + C): cx cy w h objectness, probability of each class; "
@@ -55,7 +116,9 @@ def load_onnx(runtime: Runtime, path: Path, threads: int, content: bytes | None 
         content = read_weights(path)
     if runtime == "openvino":
         return openvino_network(path, threads, content)
-    return (onnxruntime_network if runtime == "onnxruntime" else opencv_network)(path, threads, content)
+    if runtime == "onnxruntime":
+        return onnxruntime_network(path, threads, content)
+    return opencv_network(path, threads, content)
 
 
 def openvino_network(path: Path, threads: int, content: bytes) -> Compute:
@@ -175,7 +238,7 @@ def torchscript_network(path: Path, threads: int, device: str = "cpu") -> Comput
     """Return the function of a TorchScript model, executed by torch on a device. Loading can execute any code."""
     import torch
 
-    from eidrive_scenario.perception.learned.torch_devices import prepare
+    from eidrive_scenario.perception.learned.torch_network import prepare
 
     prepare(threads, device)
     content = read_weights(path)

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.perception.learned.classes import misspelt, object_category
 from eidrive_scenario.perception.learned.external_network import Layout
-from eidrive_scenario.perception.learned.runtime_selection import Device, Runtime
-from eidrive_scenario.perception.learned.weight_files import (
+from eidrive_scenario.perception.learned.image_network import misspelt, object_category
+from eidrive_scenario.perception.learned.runtimes import Device, Runtime
+from eidrive_scenario.perception.learned.weights import (
     MAX_CLASSES,
     MAX_SIDE,
     ONNX_SUFFIX,

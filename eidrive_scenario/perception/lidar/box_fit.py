@@ -13,8 +13,119 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION
 from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
-from eidrive_scenario.perception.lidar.l_shape import Rectangle, bounds, rectangles
-from eidrive_scenario.perception.lidar.span import RANGE_NOISE, Span, blend_size, complete_span, size_cost
+
+HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
+"""Tested headings of the first axis [rad]."""
+CLOSEST = 0.03
+"""Minimum distance from an edge that counts [m]."""
+MOST_POINTS = 300
+"""Maximum number of points in the search for the heading; the extent uses all points."""
+AS_GOOD = 0.9
+"""Share of the best closeness from which a heading is equivalent: with few points there are several."""
+MOST = 4
+"""Maximum number of returned rectangles."""
+
+
+class Rectangle(NamedTuple):
+    """Rectangle in plan view: the heading of its first axis [rad], and its bounds along both axes [m]."""
+
+    yaw: float
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    @property
+    def widest(self) -> float:
+        """Length of the longer side [m]."""
+        return max(self.high[0] - self.low[0], self.high[1] - self.low[1])
+
+
+def rectangles(plan: Array) -> list[Rectangle]:
+    """Return the rectangles around points (N, 2) whose edges are closest to them, the best first.
+
+    Search by the closeness criterion: Zhang, Xu, Dong and Dolan, Efficient L-shape fitting for vehicle detection using
+    laser scanners, IV 2017, algorithm 4. Other headings that are peaks of about the same closeness follow.
+    """
+    chosen = plan if len(plan) <= MOST_POINTS else plan[:: math.ceil(len(plan) / MOST_POINTS)]
+    cos, sin = np.cos(HEADINGS)[:, None], np.sin(HEADINGS)[:, None]
+    along, across = cos * chosen[:, 0] + sin * chosen[:, 1], cos * chosen[:, 1] - sin * chosen[:, 0]
+    nearest = np.minimum(_to_edge(along), _to_edge(across))
+    # The second term decides between headings that are equal by the criterion, by the distances of all points. Without
+    # it the first one would be selected, and a mirrored object would not have a mirrored heading.
+    closeness = np.sum(1.0 / np.maximum(nearest, CLOSEST), axis=1) + 1.0 / (1.0 + np.sum(nearest, axis=1))
+    peaks = (closeness >= np.roll(closeness, 1)) & (closeness > np.roll(closeness, -1))
+    peaks |= closeness == closeness.max()
+    good = np.flatnonzero(peaks & (closeness >= AS_GOOD * closeness.max()))
+    order = good[np.argsort(-closeness[good], kind="stable")][:MOST]
+    return [bounds(plan, float(HEADINGS[number])) for number in order.tolist()]
+
+
+def bounds(plan: Array, yaw: float) -> Rectangle:
+    """Return the rectangle of a given heading around points (N, 2)."""
+    along = math.cos(yaw) * plan[:, 0] + math.sin(yaw) * plan[:, 1]
+    across = math.cos(yaw) * plan[:, 1] - math.sin(yaw) * plan[:, 0]
+    return Rectangle(yaw, (float(along.min()), float(across.min())), (float(along.max()), float(across.max())))
+
+
+def _to_edge(values: Array) -> Array:
+    """Return the distance (H, N) of each value from the end of its row's range that is closer to the whole row."""
+    to_high, to_low = values.max(axis=1, keepdims=True) - values, values - values.min(axis=1, keepdims=True)
+    nearer_high = np.einsum("hn,hn->h", to_high, to_high) < np.einsum("hn,hn->h", to_low, to_low)
+    nearest: Array = np.where(nearer_high[:, None], to_high, to_low)
+    return nearest
+
+
+RANGE_NOISE = 0.03
+"""Standard deviation of the points on a surface [m]."""
+
+
+class Span(NamedTuple):
+    """Extent of a box along one axis, as far as the points determine it."""
+
+    low: float
+    high: float
+    gap: float
+    """Maximum extent of the object beyond its points; inf if the side along this axis is not visible [m]."""
+    open_low: bool
+    """Whether the object may extend beyond its points at either end."""
+    open_high: bool
+    hidden: bool
+    """Whether something nearer hides one of the ends."""
+
+
+def size_cost(span: Span, mean: float, deviation: float) -> float:
+    """Return the squared deviation of the size from the usual one; 0 if the unseen part may explain it."""
+    measured = span.high - span.low
+    if measured > mean:
+        return ((measured - mean) / deviation) ** 2
+    least = mean - measured - span.gap
+    if span.hidden or least <= 0.0:
+        return 0.0
+    return (least / deviation) ** 2
+
+
+def blend_size(measured: float, gap: float, mean: float, deviation: float) -> float:
+    """Return the fusion of a measured size, which may be up to `gap` too small, with the usual one [m]."""
+    if not math.isfinite(gap):
+        return max(measured, mean)
+    expected, variance = measured + gap / 2.0, gap**2 / 12.0 + RANGE_NOISE**2
+    return max(measured, (expected * deviation**2 + mean * variance) / (variance + deviation**2))
+
+
+def complete_span(span: Span, mean: float, deviation: float) -> tuple[float, float, float]:
+    """Return size, middle and variance of the middle along one axis."""
+    measured = span.high - span.low
+    if span.hidden or span.gap > 2.0 * mean:
+        size, spread = max(measured, mean), deviation**2
+    else:
+        size = blend_size(measured, span.gap, mean, deviation)
+        variance = span.gap**2 / 12.0
+        spread = variance * deviation**2 / (variance + deviation**2)
+    if span.open_low == span.open_high:
+        unseen = size - measured
+        return size, (span.low + span.high) / 2.0, unseen**2 / 12.0 + RANGE_NOISE**2
+    middle = span.low + size / 2.0 if span.open_high else span.high - size / 2.0
+    return size, middle, spread / 4.0 + RANGE_NOISE**2
+
 
 THIN = 3.0 * RANGE_NOISE
 """Maximum extent of points that may be those of a surface across the axis [m]."""

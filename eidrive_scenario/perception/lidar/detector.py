@@ -11,8 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.geometry.duplicates import without_duplicates
+from eidrive_scenario.perception.detector import Detector, DetectorContext, without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import (
     LevelFrame,
     Pattern,
@@ -20,7 +19,7 @@ from eidrive_scenario.perception.geometry.lidar_geometry import (
     pattern_from_settings,
 )
 from eidrive_scenario.perception.geometry.map_context import MapContext
-from eidrive_scenario.perception.geometry.visibility import in_lidar
+from eidrive_scenario.perception.geometry.projection import in_lidar
 from eidrive_scenario.perception.lidar.objects import UNLIKELY, FittedObject, objects
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.sensing.readings import LidarReading, Readings

@@ -14,8 +14,8 @@ from eidrive_scenario.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
 from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
-from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
+from eidrive_scenario.perception.lidar.segmentation import clusters
 
 UNLIKELY = 16.0
 """Sum of squared size deviations above which a cluster is not a road user: with three sizes, one in a thousand exceeds
@@ -90,15 +90,11 @@ def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], 
         if fit is not None:
             found.append(FittedObject(rows, fit))
         elif len(rows) > min_points:
-            found += _split(scan, rows, min_points)
+            # A cluster that is larger than any road user: its parts at a finer distance.
+            parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
+            fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
+            found += [FittedObject(part, fit) for part, fit in fits if fit is not None]
     return found
-
-
-def _split(scan: Scan, rows: Integers, min_points: int) -> list[FittedObject]:
-    """Return the parts of a cluster that is larger than any road user."""
-    parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
-    fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
-    return [FittedObject(part, fit) for part, fit in fits if fit is not None]
 
 
 def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:

@@ -13,7 +13,7 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, Pattern
 from eidrive_scenario.perception.geometry.size_priors import LARGEST
 from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box
-from eidrive_scenario.perception.lidar.ground import CLEARANCE, ground_height
+from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, ground_height
 from eidrive_scenario.sensing.readings import LidarReading
 
 NEARER = 0.5

@@ -12,14 +12,52 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION, MapContext
 from eidrive_scenario.perception.geometry.projection import NEAREST, level_frame, straight_boxes
 from eidrive_scenario.perception.geometry.size_priors import possible_classes, prior_of
-from eidrive_scenario.perception.lifting.image_edges import (
-    EDGE_DEVIATION,
-    EDGE_SHARE,
-    edges_behind_others,
-    edges_in_image,
-    largest_sides,
-)
 from eidrive_scenario.sensing.readings import CameraReading
+
+EDGE_DEVIATION = 1.5
+"""Standard deviation between the edges of a box and of the object [px]; EDGE_SHARE of the box size is added."""
+EDGE_SHARE = 0.02
+AT_BORDER = 2.0
+"""Distance from the border of the image within which an edge is that of the image, not of the object [px]; EDGE_SHARE
+of the box size is added."""
+HIDDEN_SHARE = 0.8
+"""Share of an edge in a nearer box above which the edge is that of the nearer object. Below it, the rest of the edge
+shows the end of this object."""
+
+
+def edges_in_image(boxes: Array, camera: CameraReading) -> Bools:
+    """Return whether (N, 4) the edges of image boxes (N, 4) are those of objects, not of the image."""
+    width, height = camera.size
+    inside = np.concatenate([boxes[:, :2], (width, height) - boxes[:, 2:]], axis=1)
+    return np.asarray(inside > (AT_BORDER + EDGE_SHARE * largest_sides(boxes))[:, None])
+
+
+def largest_sides(boxes: Array) -> Array:
+    """Return the longer side (N,) of image boxes (N, 4) [px]."""
+    return np.asarray(np.maximum(boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]))
+
+
+def edges_behind_others(boxes: Array) -> Bools:
+    """Return which edges (N, 4) of boxes (N, 4) are where another box hides the object.
+
+    The other box extends lower in the image, so it is nearer, and contains most of the length of the edge.
+    """
+    low, high = boxes[:, :2], boxes[:, 2:]
+    size = np.maximum(high - low, 1e-6)
+    nearer = high[None, :, 1] > high[:, None, 1] + EDGE_DEVIATION
+    shared = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
+    beside = shared > HIDDEN_SHARE * size[:, None]
+    margin = EDGE_DEVIATION + EDGE_SHARE * size
+    hidden = np.zeros((len(boxes), 4), dtype=bool)
+    for edge in range(4):
+        axis = edge % 2
+        place = boxes[:, edge][:, None]
+        within = (place > low[None, :, axis] - margin[:, None, axis]) & (
+            place < high[None, :, axis] + margin[:, None, axis]
+        )
+        hidden[:, edge] = (nearer & within & beside[:, :, 1 - axis]).any(axis=1)
+    return hidden
+
 
 HEADINGS = 12
 """Number of tested headings over half a turn."""
@@ -231,7 +269,8 @@ class _View:
         damping = np.full((count, tried), 1e-3)
         error, gradient, information = self._linearize(place, headings, ground)
         for _ in range(ROUNDS):
-            scaled = information + damping[..., None, None] * _diagonal(information)
+            # Levenberg-Marquardt: the damping scales with the diagonal, which has a positive lower bound.
+            scaled = information + damping[..., None, None] * np.maximum(information, 1e-9) * np.eye(2)
             step = np.linalg.solve(scaled, gradient[..., None])[..., 0]
             longest = 0.3 * np.linalg.norm(place, axis=-1) + 0.5
             length = np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
@@ -300,8 +339,3 @@ class _View:
         axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
         sizes = (self._deviations[:, :2] / 2.0) ** 2
         return np.asarray(scale[:, None, None] * fit + np.einsum("nij,nj,nkj->nik", axes, sizes, axes))
-
-
-def _diagonal(matrices: Array) -> Array:
-    """Return the diagonals of matrices (..., 2, 2) as matrices, with a positive lower bound."""
-    return np.maximum(matrices, 1e-9) * np.eye(2)

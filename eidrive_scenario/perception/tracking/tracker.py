@@ -12,15 +12,64 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.geometry import iou_bev, wrap_angle
-from eidrive_scenario.perception.tracking.association import associate, position_noise
-from eidrive_scenario.perception.tracking.existence import MOST, detected, likelihood_ratio, missed, survived
-from eidrive_scenario.perception.tracking.history import TrackHistory
+from eidrive_scenario.perception.tracking.association import (
+    MOST,
+    associate,
+    detected,
+    likelihood_ratio,
+    missed,
+    position_noise,
+    survived,
+)
 from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT, InteractingModels, Tracks
-from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerKind, TrackerSettings, TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
-from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+
+
+class TrackHistory:
+    """Detection history of one track."""
+
+    __slots__ = ("_last_detection", "_names", "_recent", "hits", "is_often_detected", "number", "score")
+
+    def __init__(self) -> None:
+        self.is_often_detected = False
+        """Whether the object was detected in n of m successive scans."""
+        self.number: int | None = None
+        """Track number once the track is confirmed."""
+        self.hits = 0
+        self.score = 0.0
+        """Score of the last detection."""
+        self._recent: list[bool] = []
+        self._names: dict[str, float] = {}
+        self._last_detection = -math.inf
+
+    @property
+    def name(self) -> str:
+        """Class with the largest sum of detection scores."""
+        return max(self._names, key=lambda name: self._names[name])
+
+    def record_scan(self, hit: bool, settings: TrackerSettings) -> None:
+        """Record whether the scan contained a detection of the object."""
+        self.hits += hit
+        if not self.is_often_detected:
+            self._recent = [*self._recent, hit][-settings.confirm[1] :]
+            self.is_often_detected = sum(self._recent) >= settings.confirm[0]
+
+    def record_detection(self, detections: Detections, column: int) -> None:
+        """Record the detection that is assigned to the object."""
+        self._last_detection = detections.time
+        self.score = float(detections.scores[column])
+        name = detections.classes[column]
+        self._names[name] = self._names.get(name, 0.0) + self.score
+
+    def is_alive(self, now: float, settings: TrackerSettings) -> bool:
+        """Return whether the track is kept."""
+        if self.is_often_detected:
+            return now - self._last_detection <= settings.coast + TIME_TOLERANCE
+        return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
+
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
@@ -42,8 +91,8 @@ class Tracker(TrackingMethod):
     The assignment of tracks and boxes maximizes the total likelihood (Hungarian method). Each pair has a squared
     Mahalanobis distance within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor
     tracking, 1995, section 2.3.2). An unassigned box initiates a track, which is reported after confirmation. Each
-    track has a probability of existence, see `eidrive_scenario.perception.tracking.existence`. The reported score of an
-    object is that of its last detection times this probability.
+    track has a probability of existence (`perception.tracking.association`). The reported score of an object is that of
+    its last detection times this probability.
     """
 
     settings_type: ClassVar[type[TrackerKind]] = TrackerSettings
@@ -115,11 +164,24 @@ class Tracker(TrackingMethod):
         for row, column in zip(rows, columns, strict=True):
             self._histories[row].record_detection(detections, column)
         self._initiate(detections, [column for column in unassigned.tolist() if column not in on_bodies], noise)
-        self._delete(detections.time)
+        # Tracks are deleted that cannot be confirmed any more, hardly exist, or have coasted for too long.
+        kept = [
+            row
+            for row, (history, existence) in enumerate(zip(self._histories, self._existence.tolist(), strict=True))
+            if existence >= self.settings.delete_existence and history.is_alive(detections.time, self.settings)
+        ]
+        if len(kept) < len(self._histories):
+            self._tracks, self._shape = self._tracks.take(kept), self._shape[kept]
+            self._existence, self._histories = self._existence[kept], [self._histories[row] for row in kept]
         # Road users on foot and on two wheels set off at any time: that they stand must not be concluded.
         vulnerable = [row for row, history in enumerate(self._histories) if history.name in VULNERABLE]
         self._tracks.probability[:, vulnerable] = np.array([[0.0], [1.0]])
-        return self._confirm_and_report(detections.time)
+        for history, existence in zip(self._histories, self._existence.tolist(), strict=True):
+            if history.number is None and history.is_often_detected and existence >= self.settings.confirm_existence:
+                self._confirmed += 1
+                history.number = self._confirmed
+        shown = [row for row, history in enumerate(self._histories) if history.number is not None]
+        return self._report(detections.time, shown, self._tracks.take(shown), self._existence[shown])
 
     def _boxes_on_bodies(
         self,
@@ -225,20 +287,6 @@ class Tracker(TrackingMethod):
             history.record_detection(detections, column)
             self._histories.append(history)
 
-    def _delete(self, now: float) -> None:
-        """Delete tracks that cannot be confirmed any more, hardly exist, or have coasted for too long."""
-        existence = self._existence.tolist()
-        kept = [
-            row
-            for row, history in enumerate(self._histories)
-            if existence[row] >= self.settings.delete_existence and history.is_alive(now, self.settings)
-        ]
-        if len(kept) < len(self._histories):
-            self._tracks = self._tracks.take(kept)
-            self._shape = self._shape[kept]
-            self._existence = self._existence[kept]
-            self._histories = [self._histories[row] for row in kept]
-
     def predict(self, time: float) -> Detections | None:
         """Return the confirmed objects predicted to a time [s] after the last detections.
 
@@ -256,15 +304,6 @@ class Tracker(TrackingMethod):
         if shown and step > 0.0:
             tracks = self._filter.predict(tracks, step)
         return self._report(time, shown, tracks, survived(self._existence[shown], step, self.settings.lifetime))
-
-    def _confirm_and_report(self, now: float) -> Detections:
-        for history, existence in zip(self._histories, self._existence.tolist(), strict=True):
-            if history.number is None and history.is_often_detected and existence >= self.settings.confirm_existence:
-                self._confirmed += 1
-                history.number = self._confirmed
-        shown = [row for row, history in enumerate(self._histories) if history.number is not None]
-        tracks = self._tracks.take(shown)
-        return self._report(now, shown, tracks, self._existence[shown])
 
     def _report(self, time: float, rows: list[int], tracks: Tracks, existence: Array) -> Detections:
         histories = [self._histories[row] for row in rows]

@@ -12,11 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.v2x.analytic.levels import (
+from eidrive_scenario.v2x.analytic.table import (
     RATIOS,
     REACH,
     SHADOWING,
     STEP,
+    ErrorTable,
     autocorrelation,
     errors_over,
     interference,
@@ -25,8 +26,7 @@ from eidrive_scenario.v2x.analytic.levels import (
     sensed_share,
     signal,
 )
-from eidrive_scenario.v2x.analytic.table import ErrorTable
-from eidrive_scenario.v2x.propagation.gains import winner_b1
+from eidrive_scenario.v2x.propagation import winner_b1
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, CANDIDATE_SHARE, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
 
 FREQUENCY = 5.91

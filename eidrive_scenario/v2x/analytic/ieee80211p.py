@@ -10,10 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.v2x.analytic.levels import (
+from eidrive_scenario.v2x.analytic.table import (
     RATIOS,
     REACH,
     SHADOWING,
+    ErrorTable,
     autocorrelation,
     errors_over,
     interference,
@@ -23,8 +24,7 @@ from eidrive_scenario.v2x.analytic.levels import (
     sensed_share,
     signal,
 )
-from eidrive_scenario.v2x.analytic.table import ErrorTable
-from eidrive_scenario.v2x.propagation.gains import winner_b1
+from eidrive_scenario.v2x.propagation import winner_b1
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, PREAMBLE, SENSING_DBM, SLOT
 
 FREQUENCY = 5.89

@@ -1,7 +1,12 @@
-"""Result of an analytic model: error probability of each cause of loss, by distance."""
+"""Tables of packet errors over distance, and the received levels that analytic models compute them from.
+
+Both analytic models average a packet error curve over shadowed signal and shadowed interference. Each average is one
+correlation and one matrix product.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,3 +56,95 @@ class ErrorTable:
             if draw < reached:
                 return cause
         return None
+
+
+STEP = 0.1
+"""Grid step of the power levels [dB]."""
+LEVELS: Array = np.round(np.arange(-2000, 2001) * STEP, 1)
+"""Power levels (L,) [dBm]."""
+RATIOS: Array = np.round(np.arange(-4000, 4001) * STEP, 1)
+"""Ratios (2 L - 1,) of two power levels [dB]."""
+SHADOWING = 3.0
+"""Standard deviation of the shadowing in both models [dB]."""
+REACH, FARTHEST_INTERFERER = 1500, 1000
+"""Maximum distances at which vehicles contribute to the load and interfere [m]."""
+
+
+def sensed_share(power: Array, threshold: float, spread: float) -> Array:
+    """Return the share of packets above the threshold, by mean power and spread of the shadowing [dBm, dB]."""
+
+    from scipy.special import erf
+
+    share: Array = 0.5 * (1.0 + erf((power - threshold) / (spread * math.sqrt(2.0))))
+    return share
+
+
+def signal(power: Array, spread: float, threshold: float) -> Array:
+    """Return the power distribution (D, L) of the sensed packets, for mean powers (D,) [dBm]."""
+    density = np.exp(-0.5 * ((LEVELS - power[:, None]) / spread) ** 2)
+    density[:, threshold > LEVELS] = 0.0
+    return _normalize(density)
+
+
+def noise_alone(noise: float) -> Array:
+    """Return the distribution (1, L) of a constant noise power [dBm]."""
+    density = np.zeros((1, len(LEVELS)))
+    density[0, round((noise - LEVELS[0]) / STEP)] = 1.0
+    return density
+
+
+def interference(power: Array, spread: float, noise: float) -> Array:
+    """Return the distribution (I, L) of noise plus one shadowed interferer, for mean powers (I,) [dBm]."""
+    total = 10.0 ** (LEVELS[noise < LEVELS] / 10.0)
+    alone = total - 10.0 ** (noise / 10.0)
+    exponent = -0.5 * ((10.0 * np.log10(alone) - power[:, None]) / spread) ** 2
+    density = np.zeros((len(power), len(LEVELS)))
+    density[:, noise < LEVELS] = total / alone * np.exp(exponent)
+    return _normalize(density)
+
+
+def errors_over(packets: Array, curve: Array) -> Array:
+    """Return the packet error rate (D, L) at each level of noise and interference.
+
+    packets  (D, L) distributions of the signal power;  curve  (2 L - 1,) packet error rate by RATIOS
+    """
+    middle = len(LEVELS) - 1
+    full = _convolve(packets, curve[None, ::-1], axes=1)
+    errors: Array = np.clip(full[:, middle : middle + len(LEVELS)], 0.0, 1.0)
+    return errors
+
+
+def interferer_positions(density: float) -> Array:
+    """Return the positions of interferers relative to the receiver [m], spaced by 1/density on both sides."""
+    count = round(FARTHEST_INTERFERER * density)
+    positions = np.arange(-count, count + 1) / density
+    others: Array = positions[positions != 0.0]
+    return others
+
+
+def loss_by_interferer(with_interferer: Array, alone: Array) -> Array:
+    """Return the probability (D, I) that an interferer destroys a packet that is received without it.
+
+    with_interferer  (D, I) packet error rates with each interferer;  alone  (D,) without one
+    """
+    certain = alone[:, None] >= 1.0
+    added = (with_interferer - alone[:, None]) / np.where(certain, 1.0, 1.0 - alone[:, None])
+    return np.where(certain, 0.0, added)
+
+
+def autocorrelation(values: Array) -> Array:
+    """Return the autocorrelation of a sequence at lags 0, 1, 2, …"""
+    correlated: Array = _convolve(values, values[::-1], axes=0)[len(values) - 1 :]
+    return correlated
+
+
+def _normalize(density: Array) -> Array:
+    shares: Array = density / density.sum(axis=1, keepdims=True)
+    return shares
+
+
+def _convolve(first: Array, second: Array, axes: int) -> Array:
+    from scipy.signal import fftconvolve  # here, as its import takes a fifth of the time of `eidrive check`
+
+    convolved: Array = fftconvolve(first, second, axes=axes)
+    return convolved

@@ -6,12 +6,10 @@ import math
 from typing import ClassVar, Literal
 
 from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
-from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.link_models.delay import ConstantDelay, Delay
-from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
-from eidrive_scenario.v2x.link_models.loss import Loss, NoLoss
-from eidrive_scenario.v2x.link_models.loss_process import LossProcess
-from eidrive_scenario.v2x.link_random import LinkRandom
+from eidrive_scenario.v2x.channel import LinkChannel
+from eidrive_scenario.v2x.counter_random import LinkRandom
+from eidrive_scenario.v2x.link_models.delay import ConstantDelay, Delay, TraceDelay
+from eidrive_scenario.v2x.link_models.loss import Loss, LossProcess, NoLoss
 from eidrive_scenario.v2x.messages.message import Message
 from eidrive_scenario.v2x.profile import ChannelProfile
 

@@ -1,18 +1,129 @@
-"""One-way delay models. A distribution is given by its quantile function: one uniform number gives one delay.
-
-With common random numbers, a larger mean gives a larger delay of every message, so that the arms of an experiment are
-comparable message by message.
-"""
+"""Delays of messages on one link, by distributions or from a recorded trace."""
 
 from __future__ import annotations
 
+import csv
 import math
+from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from eidrive_scenario.errors import quoted, shortened
+from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
+
+MAX_BYTES = 32 * MIB
+"""Maximum size of a file of measured delays [bytes]."""
+UNITS = {"s": 1.0, "ms": 1e-3}
+"""Factor from each unit to seconds."""
+
+
+class TraceDelay(Settings):
+    """Measured delays.
+
+    seconds  values [s], as an alternative to `file`
+    file     CSV file, relative to the profile
+    column   name of the column in the first row of the file, or its index from 0
+    unit     unit of the file, `s` or `ms`
+    replay   false: drawn from the values, with linear interpolation; true: message n of a link has value n, and the
+             trace repeats
+    """
+
+    kind: Literal["trace"]
+    seconds: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1, repr=False)]
+    file: Path | None = None
+    column: str | int = 0
+    unit: Literal["s", "ms"] = "s"
+    replay: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        if data.get("file") is None:
+            idle = [name for name in ("column", "unit") if name in data]
+            if idle:
+                raise ValueError(f"{idle[0]} requires file and has no effect with seconds")
+            return data
+        if data.get("seconds") is not None:
+            raise ValueError("either seconds or file is expected, not both")
+        scale = UNITS.get(str(data.get("unit", "s")), 1.0)
+        values = _column(Path(str(data["file"])), data.get("column", 0))
+        return {**data, "seconds": [scale * value for value in values]}
+
+    @cached_property
+    def _ascending(self) -> list[float]:
+        return sorted(self.seconds)
+
+    @property
+    def random(self) -> bool:
+        """Whether delays are drawn at random."""
+        return not self.replay
+
+    def quantile(self, u: float) -> float:
+        """Return the quantile of the delay at probability `u` [s]."""
+        ascending = self._ascending
+        place = u * (len(ascending) - 1)
+        below = min(int(place), len(ascending) - 1)
+        above = min(below + 1, len(ascending) - 1)
+        return ascending[below] + (place - below) * (ascending[above] - ascending[below])
+
+    def at(self, number: int) -> float:
+        """Return the delay of message `number` of a link in a replayed trace [s]."""
+        return self.seconds[number % len(self.seconds)]
+
+
+def _column(path: Path, column: object) -> list[float]:
+    """Return the numbers in a column of a CSV file. A first row of words names the columns.
+
+    Raise ValueError if the file cannot be read, the column is missing, or a value is not a delay.
+    """
+    if not isinstance(column, str | int) or isinstance(column, bool):
+        raise ValueError(f"column is invalid (got {quoted(column)}; expected a name or an index from 0)")
+    try:
+        text = read_regular_file(path, MAX_BYTES).decode("utf-8")
+        reader = csv.reader(text.splitlines(keepends=True))
+        rows = [(reader.line_num, row) for row in reader if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else reason_of(error)
+        raise ValueError(f"cannot read {_format_path(path)}: {reason}") from error
+    if not rows:
+        raise ValueError(f"{_format_path(path)} is empty")
+    header = [cell.strip() for cell in rows[0][1]]
+    if isinstance(column, str):
+        if column not in header:
+            raise ValueError(f"{_format_path(path)} has no column {quoted(column)} in its first row")
+        place = header.index(column)
+    else:
+        place = column
+    if not 0 <= place < len(header):
+        raise ValueError(f"{_format_path(path)} has no column {quoted(place)} (expected 0 to {len(header) - 1})")
+    body = rows[1:] if isinstance(column, str) or not _is_number(header[place]) else rows
+    if not body:
+        raise ValueError(f"{_format_path(path)} has no delays")
+    values = []
+    for number, row in body:
+        # The row is not quoted: the path may refer to a file with other, confidential content.
+        if place >= len(row) or not _is_number(row[place]):
+            raise ValueError(f"{_format_path(path)}:{number}: column {place} is not a delay")
+        if float(row[place]) < 0.0:
+            raise ValueError(f"{_format_path(path)}:{number}: delay is negative")
+        values.append(float(row[place]))
+    return values
+
+
+def _format_path(path: Path) -> str:
+    return shortened(str(path), 200)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 class ConstantDelay(Settings):

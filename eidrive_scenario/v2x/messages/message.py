@@ -1,16 +1,89 @@
-"""Messages and the outcomes of their transmissions."""
+"""Messages between stations, with lidar points, and the clocks that stamp them."""
 
 from __future__ import annotations
 
+import dataclasses
+from dataclasses import dataclass
 from typing import Literal
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud
+
+Bytes = NDArray[np.uint8]
+
+HEADER_BYTES = 32
+"""Size of the header [bytes]: time (8), corner (3 x 4), cell (2), cells along each axis (3 x 2), points (4)."""
+_SEVEN_BITS = 7
+_MAX_BYTES = 9
+"""Maximum length of one encoded step [bytes]: 63 bits."""
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points measured at `time` [s], in the world frame by the pose estimate of the sender.
+
+    corner  (3,) corner of the grid [m]
+    cell    edge length of the cells [m]
+    shape   number of cells along x, y and z
+    steps   index differences between occupied cells in the order of x, y, z, in LEB128 as in protobuf: base 128, least
+            significant digit first, highest bit set in all bytes of a number except the last
+    """
+
+    time: float
+    corner: tuple[float, float, float]
+    cell: float
+    shape: tuple[int, int, int]
+    steps: Bytes
+
+    @property
+    def size(self) -> int:
+        """Size of the encoded point cloud [bytes]."""
+        return HEADER_BYTES + len(self.steps)
+
+    def points(self) -> Array:
+        """Return the centers of the occupied cells (N, 3) [m]."""
+        _, along, up = self.shape
+        cells = np.cumsum(_decode_numbers(self.steps))
+        indices = np.stack([cells // (along * up), cells // up % along, cells % up], axis=1)
+        return np.asarray(np.asarray(self.corner) + (indices + 0.5) * self.cell, dtype=np.float64)
+
+
+def compress(points: Array, time: float, cell: float) -> PointCloud:
+    """Return the points (N, 3) on a grid of this cell size [m], one point per cell, within half a cell."""
+    if not len(points):
+        return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))
+    low = np.floor(points.min(axis=0) / cell).astype(np.int64)
+    indices = np.floor(points / cell).astype(np.int64) - low
+    wide, along, up = (indices.max(axis=0) + 1).tolist()
+    occupied = np.unique((indices[:, 0] * along + indices[:, 1]) * up + indices[:, 2])
+    x, y, z = (low * cell).tolist()
+    return PointCloud(time, (x, y, z), cell, (wide, along, up), _encode_numbers(np.diff(occupied, prepend=0)))
+
+
+def _encode_numbers(numbers: NDArray[np.int64]) -> Bytes:
+    groups = numbers[:, None] >> (_SEVEN_BITS * np.arange(_MAX_BYTES)) & 127
+    later = np.cumsum(groups[:, ::-1], axis=1)[:, ::-1] - groups
+    needed = (later > 0) | (groups > 0)
+    needed[:, 0] = True
+    last = later == 0
+    digits: Bytes = np.where(last, groups, groups + 128)[needed].astype(np.uint8)
+    return digits
+
+
+def _decode_numbers(data: Bytes) -> NDArray[np.int64]:
+    if not len(data):
+        return np.empty(0, dtype=np.int64)
+    ends = np.flatnonzero(data < 128)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    place = np.arange(len(data)) - np.repeat(starts, ends - starts + 1)
+    return np.asarray(np.add.reduceat((data.astype(np.int64) & 127) << (_SEVEN_BITS * place), starts), dtype=np.int64)
+
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
 """State of a line of sight: free, blocked by vehicles only, or by a building or the ground (3GPP TR 37.885, 6.2.1)."""
@@ -85,3 +158,36 @@ class LinkEvent(msgspec.Struct, frozen=True, gc=False):
     snr_db: float | None = None
     los: LineOfSight | None = None
     blockers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StationClock:
+    """Clock that shows true time + offset + drift · true time [s]; `drift` is a ratio, 20e-6 for 20 ppm."""
+
+    offset: float = 0.0
+    drift: float = 0.0
+
+    def error(self, now: float) -> float:
+        """Return the difference between station time and true time [s]."""
+        return self.offset + self.drift * now
+
+    def with_station_timestamps(self, message: Message, now: float) -> Message:
+        """Return a message of this station with timestamps of this clock; `generated` stays in true time."""
+        return _shift_timestamps(message, self.error(now))
+
+    def with_local_timestamps(self, message: Message, now: float) -> Message:
+        """Return a received message with timestamps relative to this clock, which the station assumes to be true."""
+        return _shift_timestamps(message, -self.error(now))
+
+
+def _shift_timestamps(message: Message, error: float) -> Message:
+    if error == 0.0:
+        return message
+    return replace(
+        message,
+        detections=replace(message.detections, time=message.detections.time + error),
+        state=replace(message.state, time=message.state.time + error),
+        points=None
+        if message.points is None
+        else dataclasses.replace(message.points, time=message.points.time + error),
+    )

@@ -17,7 +17,7 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message
-from eidrive_scenario.v2x.propagation.fading import FadingDraws
+from eidrive_scenario.v2x.propagation import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate
 
 
@@ -91,7 +91,12 @@ class MediumAccess(ABC):
 
     def enqueue(self, transmissions: Sequence[Transmission]) -> None:
         """Add transmissions, which enter the queue of their sender when they are ready."""
-        self._arrivals = deque(sorted([*self._arrivals, *transmissions], key=_queue_key))
+        self._arrivals = deque(
+            sorted(
+                [*self._arrivals, *transmissions],
+                key=lambda entry: (entry.ready, entry.message.sender, entry.message.number),
+            )
+        )
 
     @property
     def waiting(self) -> list[Transmission]:
@@ -233,7 +238,3 @@ def reorder_rows(values: NDArray[Any], rows: Sequence[int | None], fresh: float)
 def _is_outdated(entry: Transmission, *, by: Transmission) -> bool:
     """Return True if another message of the same kind was sent in a later tick."""
     return entry.message.kind == by.message.kind and entry.sent < by.sent
-
-
-def _queue_key(transmission: Transmission) -> tuple[float, str, int]:
-    return transmission.ready, transmission.message.sender, transmission.message.number

@@ -10,32 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
-from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
+from eidrive_scenario.v2x.channel import Channel, OutgoingMessage, QueuedChannel
+from eidrive_scenario.v2x.counter_random import Keys, LinkRandom, combine_keys, key, uniform
 from eidrive_scenario.v2x.link_models.composed import delay_of
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
-from eidrive_scenario.v2x.link_models.loss import NoLoss
-from eidrive_scenario.v2x.link_models.loss_process import LossProcess
-from eidrive_scenario.v2x.link_random import LinkRandom
+from eidrive_scenario.v2x.link_models.loss import LossProcess, NoLoss
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
-from eidrive_scenario.v2x.propagation.fading import FadingDraws, Nakagami
-from eidrive_scenario.v2x.propagation.path_loss import Tr37885
-from eidrive_scenario.v2x.queued_channel import QueuedChannel
+from eidrive_scenario.v2x.propagation import FadingDraws, Nakagami, Tr37885
 from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
-from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
+from eidrive_scenario.v2x.radio.events import DroppedBlock, LinkCounterTable, ReceptionBlock
 from eidrive_scenario.v2x.radio.jamming import Jamming
-from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
-from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
-from eidrive_scenario.v2x.statistics.links import ABSENT
+from eidrive_scenario.v2x.statistics.link_statistics import ABSENT, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import queue_entry
 
 
@@ -112,15 +106,18 @@ class RadioChannel(QueuedChannel):
         self._advance(now)
         offered: list[Transmission] = []
         for message, receivers in outbox:
-            row = self._row(message.sender)
+            rows = self._rows_of(message.sender, receivers)
+            if message.sender not in self._rows or len(rows) < len(receivers):
+                missing = next(name for name in (message.sender, *receivers) if name not in self._rows)
+                raise ValueError(f"station {missing!r} has no antenna position in the radio environment")
+            row = self._rows[message.sender]
             ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
             entry = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
-            rows = self._rows_of(message.sender, receivers)
-            if len(rows) < len(receivers):
-                missing = next(name for name in receivers if name not in self._rows)
-                raise ValueError(_no_position(missing))
             self._counters.send(row, rows, message.size)
-            (self._drop if self._jamming.blocks(message.sender) else offered.append)(entry)
+            if self._jamming.blocks(message.sender):
+                self._drop(entry)
+            else:
+                offered.append(entry)
         self._access.enqueue(offered)
         return self.drain_events()
 
@@ -175,12 +172,6 @@ class RadioChannel(QueuedChannel):
             rows = np.array([self._rows[name] for name in receivers if name in self._rows], dtype=np.int64)
             cached = self._receivers[sender] = (tuple(receivers), rows)
         return cached[1]
-
-    def _row(self, name: str) -> int:
-        row = self._rows.get(name)
-        if row is None:
-            raise ValueError(_no_position(name))
-        return row
 
     def _set_stations(self, names: tuple[str, ...], now: float) -> None:
         """Replace the stations. Pending messages of removed stations are lost."""
@@ -313,7 +304,3 @@ class RadioChannel(QueuedChannel):
         self._dropped.append(
             LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
         )
-
-
-def _no_position(name: str) -> str:
-    return f"station {name!r} has no antenna position in the radio environment"

@@ -1,9 +1,10 @@
-"""Medium access of IEEE 802.11p: carrier sensing with random backoff (IEEE 802.11-2012, 9.19)."""
+"""Medium access of IEEE 802.11p: carrier sensing with random backoff (IEEE 802.11-2012, 9.19), preambles."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,57 @@ from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate
-from eidrive_scenario.v2x.radio.preambles import PreambleDetection
 from eidrive_scenario.v2x.standards import SLOT
+
+
+class PreambleDetection:
+    """Messages to which N stations are locked, each to the end of its message.
+
+    A station does not lock to a message while it transmits, and stops to receive when it starts to transmit. Of
+    messages that start at the same time none is earlier: they interfere with each other.
+
+    sensing_dbm  minimum power of a message to which a station locks [dBm]
+    """
+
+    def __init__(self, count: int, sensing_dbm: float) -> None:
+        self._sensing_dbm = sensing_dbm
+        self._until = np.full(count, -math.inf)
+        """Time until which each station is locked or transmits [s]."""
+
+    def reorder(self, rows: Sequence[int | None]) -> None:
+        """Reorder the state of the stations; `rows` contains the former row of each station, None for new ones."""
+        self._until = reorder_rows(self._until, rows, -math.inf)
+
+    def detect(self, started: Sequence[Transmission], rows: Mapping[str, int], power: Array) -> None:
+        """Set `busy` of these transmissions. Those of a later call may not start earlier.
+
+        rows   row of each station
+        power  (N, N) received power by sender (row) and receiver (column) [dBm]
+        """
+        pending = sorted(started, key=_start)
+        while pending:
+            instant = pending[0].start + TIME_TOLERANCE
+            count = bisect_right(pending, instant, key=_start)
+            together, pending = pending[:count], pending[count:]
+            busy = self._until > instant
+            until = self._until.copy()
+            for entry in together:
+                entry.busy = busy
+                row = rows[entry.message.sender]
+                received = power[row] if entry.gain is None else power[row] + entry.gain
+                locks = ~busy & (received >= self._sensing_dbm)
+                until[locks] = np.maximum(until[locks], entry.end)
+            for entry in together:
+                until[rows[entry.message.sender]] = entry.end
+            self._until = until
+
+
+def _start(entry: Transmission) -> float:
+    return entry.start
+
 
 AIFS = 32e-6 + 6 * SLOT
 """SIFS and 6 slots: access category AC_BE in the OCB mode (IEEE 802.11-2012, table 8-106) [s]."""
-MAX_SCALAR = 6
-"""Maximum number of stations for scalar evaluation, which is then faster than arrays."""
 CONTENTION_WINDOW = 15
 """aCWmin: the backoff of broadcast messages is 0 to 15 slots, and they are never retransmitted."""
 
@@ -82,30 +127,16 @@ class Csma(MediumAccess):
 
     def starts(self) -> Array:
         """Return the predicted start of the first message of each station (N,) [s]; infinity for empty queues."""
-        return self._starts_scalar() if len(self.names) <= MAX_SCALAR else self._starts_array()
-
-    def _starts_scalar(self) -> Array:
-        """Return `starts`, evaluated station by station."""
-        free, slots, fixed = self.free_from.tolist(), self._slots.tolist(), self._fixed.tolist()
-        starts = []
-        for row, ready in enumerate(self.ready.tolist()):
-            if ready == math.inf:
-                starts.append(math.inf)
-                continue
-            if math.isnan(slots[row]) and ready < free[row] + AIFS:
-                self._draw(np.array([row]))
-                slots[row] = float(self._slots[row])
-            waited = ready if math.isnan(slots[row]) else max(ready, free[row]) + AIFS + slots[row] * SLOT
-            starts.append(waited if math.isnan(fixed[row]) else fixed[row])
-        return np.array(starts)
-
-    def _starts_array(self) -> Array:
-        met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS) & np.isfinite(self.ready)
+        # NaN and infinity select the cases: no backoff yet, an empty queue, no fixed start.
+        met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS)
         if met_busy.any():
-            self._draw(np.flatnonzero(met_busy))
+            rows = np.flatnonzero(met_busy)
+            heads = [self._head[row] for row in rows.tolist()]
+            numbers = np.array([head.message.number for head in heads if head is not None])
+            self._slots[rows] = np.floor(uniforms(self._keys[rows], numbers) * (CONTENTION_WINDOW + 1))
         waited = np.maximum(self.ready, self.free_from) + AIFS + self._slots * SLOT
-        contending = np.where(np.isnan(self._slots), self.ready, waited)
-        return np.where(np.isnan(self._fixed), contending, self._fixed)
+        starts = np.where(np.isnan(self._slots), self.ready, waited)
+        return np.where(np.isnan(self._fixed), starts, self._fixed)
 
     def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
         self._slots[row] = self._fixed[row] = math.nan
@@ -128,6 +159,7 @@ class Csma(MediumAccess):
         unaware = others & (starts < start + SLOT - TIME_TOLERANCE)
         self._fixed[unaware] = starts[unaware]
         waiting = others & ~unaware & ~np.isnan(self._slots)
+        # Slots that were idle between the end of AIFS and this start; the backoff freezes while the medium is busy.
         counted = np.floor((start - np.maximum(self.ready, self.free_from) - AIFS + TIME_TOLERANCE) / SLOT)
         self._slots[waiting] -= np.clip(counted[waiting], 0.0, self._slots[waiting])
 
@@ -136,9 +168,3 @@ class Csma(MediumAccess):
         self.free_from = reorder_rows(self.free_from, rows, -math.inf)
         self._keys = self._backoff_keys()
         self._preambles.reorder(rows)
-
-    def _draw(self, rows: NDArray[np.int64]) -> None:
-        """Draw the backoff of the first message of these stations [slots]."""
-        heads = [self._head[row] for row in rows.tolist()]
-        numbers = np.array([head.message.number for head in heads if head is not None])
-        self._slots[rows] = np.floor(uniforms(self._keys[rows], numbers) * (CONTENTION_WINDOW + 1))

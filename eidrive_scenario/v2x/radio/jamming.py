@@ -10,8 +10,8 @@ from pydantic import Field
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss
-from eidrive_scenario.v2x.radio_environment import LOS, RadioEnvironment
+from eidrive_scenario.v2x.propagation import LinkGeometry, PathLoss
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 ENERGY_DETECTION_DBM = -65.0
 """Power of any signal from which a station senses a busy channel of 10 MHz [dBm] (IEEE 802.11-2012, 18.3.10.6)."""
@@ -39,17 +39,9 @@ def jamming_power(
     total = np.zeros(len(positions))
     for jammer in jammers:
         place = np.array([jammer.x, jammer.y, jammer.z])
-        count = len(positions)
-        heights = positions[:, 2]
-        between = LinkGeometry(
-            np.linalg.norm(positions - place, axis=1),
-            np.full(count, LOS),
-            np.minimum(heights, jammer.z),
-            np.maximum(heights, jammer.z),
-            np.full(count, -np.inf),
-            np.zeros(count, dtype=np.int64),
-        )
-        loss = path_loss.loss(between, frequency_ghz, np.full(count, 0.5))
+        heights, distance = positions[:, 2], np.linalg.norm(positions - place, axis=1)
+        between = LinkGeometry.in_sight(distance, np.minimum(heights, jammer.z), np.maximum(heights, jammer.z))
+        loss = path_loss.loss(between, frequency_ghz, np.full(len(positions), 0.5))
         total += 10.0 ** ((jammer.power_dbm + gain_dbi - loss) / 10.0)
     return total
 

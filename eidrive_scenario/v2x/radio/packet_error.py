@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -30,37 +29,21 @@ class ErrorCurve:
         """Return the curve with the same error rates at ratios that are higher [dB]."""
         return replace(self, ratios=tuple(ratio + by for ratio in self.ratios))
 
+    @cached_property
+    def _points(self) -> tuple[Array, Array]:
+        """Ratios and error rates as arrays, which `numpy.interp` would otherwise make of them in each call."""
+        return np.array(self.ratios), np.array(self.errors)
+
     def at(self, ratio_db: Array, size: float | Array) -> Array:
         """Return the packet error rate of packets of `size` [bytes], broadcast.
 
         Sizes other than that of the curve assume independent byte errors: 1 - (1 - PER)^(size / size of the curve).
         """
-        errors = np.interp(ratio_db, self.ratios, self.errors, left=1.0, right=self.floor)
+        errors = np.interp(ratio_db, *self._points, left=1.0, right=self.floor)
         if self.size is None:
             return errors
         scaled: Array = 1.0 - (1.0 - errors) ** (np.asarray(size) / self.size)
         return scaled
-
-    def of(self, ratio_db: float, size: float) -> float:
-        """Return the packet error rate of one packet."""
-        if ratio_db < self.ratios[0]:
-            error = 1.0
-        elif ratio_db > self.ratios[-1]:
-            error = self.floor
-        else:
-            error = interpolate(ratio_db, self.ratios, self.errors)
-        return error if self.size is None else 1.0 - (1.0 - error) ** (size / self.size)
-
-
-def interpolate(x: float, places: Sequence[float], values: Sequence[float]) -> float:
-    """Return `numpy.interp` of one number: linear between ascending places, constant beyond their ends."""
-    after = bisect_right(places, x)
-    if after == 0:
-        return values[0]
-    if after == len(places):
-        return values[-1]
-    low, high = places[after - 1], places[after]
-    return (values[after] - values[after - 1]) / (high - low) * (x - low) + values[after - 1]
 
 
 CURVE_RATE_MBPS = 6.0

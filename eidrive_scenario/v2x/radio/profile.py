@@ -13,16 +13,22 @@ from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.link_models.composed import ComposedProfile
-from eidrive_scenario.v2x.propagation.fading import Fading, NoFading
-from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss, Tr37885
+from eidrive_scenario.v2x.propagation import Fading, LinkGeometry, NoFading, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.access import QueueSettings
-from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SENSITIVITIES, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.jamming import Jammer
 from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
-from eidrive_scenario.v2x.radio_environment import LOS
-from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
+from eidrive_scenario.v2x.standards import (
+    ANTENNA_HEIGHT,
+    BITS_PER_SYMBOL,
+    NOISE_DBM,
+    RESOURCE_BLOCKS,
+    SENSING_DBM,
+    SENSITIVITIES,
+    SUBFRAME,
+    ieee80211p_airtime,
+)
 
 Technology = Literal["80211p", "cv2x_mode4"]
 Level = Annotated[float, Field(ge=-200.0, le=100.0)]
@@ -172,10 +178,7 @@ class RadioProfile(ComposedProfile):
         if self.background is None:
             return None
         table = self.background.table()
-        count = len(table.distance)
-        heights, no_vehicles = np.full(count, ANTENNA_HEIGHT), np.zeros(count, dtype=np.int64)
-        between = LinkGeometry(
-            table.distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), no_vehicles
-        )
-        los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
+        heights = np.full(len(table.distance), ANTENNA_HEIGHT)
+        between = LinkGeometry.in_sight(table.distance, heights, heights)
+        los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(len(heights), 0.5))
         return table, np.maximum.accumulate(los_loss)

@@ -7,10 +7,154 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
-from eidrive_scenario.v2x.statistics.age_of_information import AgeOfInformation
+
+MAX_BREAKPOINTS = 1 << 20
+"""Maximum number of exact breakpoints over all links, 24 bytes each: six hours of one link at 20 Hz."""
+GRID = 0.01
+"""Relative width of the classes of compacted ages."""
+RESOLUTION = 2.0**-40
+"""Resolution of the time spent below an age [s]."""
+LEAST = 1e-6
+"""Maximum age that is compacted to 0 [s]."""
+
+
+class AgeStatistics(NamedTuple):
+    """Age of information of L links [s]: mean and 95th percentile over time, and mean peak age; NaN if undefined.
+
+    The peak age is the age immediately before an update. The first update of a link has none.
+    """
+
+    mean: Array
+    p95: Array
+    peak: Array
+
+
+class AgeOfInformation:
+    """Accumulated age of information. The age rises with slope 1 from a floor, the age at an update, to a peak.
+
+    The time spent below an age x is piecewise linear in x with breakpoints at floors and peaks. All means are exact.
+    The percentile is exact up to MAX_BREAKPOINTS breakpoints. Above, stored ages are rounded by at most 0.5 % to bound
+    the memory of long runs.
+    """
+
+    def __init__(self) -> None:
+        self._floor = np.zeros(0)
+        """Age at the last update of each link [s]; NaN before the first, and after the receiver has left."""
+        self._time, self._area, self._peaks = np.zeros(0), np.zeros(0), np.zeros(0)
+        self._updates = np.zeros(0, dtype=np.int64)
+        self._breakpoints: list[tuple[Integers, Array, Integers]] = []
+        """Breakpoints: link, age, and change of the slope (1 at floors, -1 at peaks)."""
+        self._number = 0
+        self._limit = MAX_BREAKPOINTS
+
+    def resize(self, links: int) -> None:
+        """Extend the state to this number of links."""
+        more = links - len(self._floor)
+        self._floor = np.concatenate([self._floor, np.full(more, np.nan)])
+        self._time, self._area, self._peaks = (
+            np.concatenate([values, np.zeros(more)]) for values in (self._time, self._area, self._peaks)
+        )
+        self._updates = np.concatenate([self._updates, np.zeros(more, dtype=np.int64)])
+
+    def record_updates(self, links: Integers, floors: Array, peaks: Array) -> None:
+        """Add updates (K,), sorted by link and then by time.
+
+        floors, peaks  age immediately after and before each update [s]; the peak of the first update is infinity
+        """
+        begins = np.diff(links, prepend=-1) > 0
+        low = np.where(begins, self._floor[links], np.roll(floors, 1))
+        ends = np.append(begins[1:], True) if len(links) else begins
+        self._floor[links[ends]] = floors[ends]
+        later = np.isfinite(peaks)
+        of, low, peaks = links[later], low[later], peaks[later]
+        high = np.maximum(peaks, low)
+        count = len(self._floor)
+        self._peaks += np.bincount(of, peaks, count)
+        self._updates += np.bincount(of, minlength=count)
+        self._add(of, low, high)
+
+    def end(self, links: Integers, ages: Array) -> None:
+        """End the age of links at these ages (K,) [s]; the next update of a link counts as its first."""
+        low = self._floor[links]
+        self._add(links, low, np.maximum(ages, low))
+        self._floor[links] = np.nan
+
+    def _add(self, of: Integers, low: Array, high: Array) -> None:
+        """Add rises of the age (K,) from `low` to `high` [s]."""
+        count = len(self._floor)
+        self._time += np.bincount(of, high - low, count)
+        self._area += np.bincount(of, 0.5 * (high**2 - low**2), count)
+        self._breakpoints.append(_breakpoints(of, low, high))
+        self._number += 2 * len(of)
+        if self._number > self._limit:
+            self._compact()
+
+    def statistics(self, now: float, newest: Array, order: Integers) -> AgeStatistics:
+        """Return the statistics at `now` of the links in `order`; `newest` (L,) are the newest generation times [s]."""
+        running = ~np.isnan(self._floor)
+        low = np.where(running, self._floor, 0.0)
+        high = np.where(running, np.maximum(now - newest, low), 0.0)
+        time, area = self._time + (high - low), self._area + 0.5 * (high**2 - low**2)
+        defined = time > 0.0
+        mean = np.divide(area, time, out=np.full(len(low), np.nan), where=defined)
+        peak = np.divide(self._peaks, self._updates, out=np.full(len(low), np.nan), where=self._updates > 0)
+        return AgeStatistics(mean[order], self._percentile(0.95, low, high, defined, order), peak[order])
+
+    def _percentile(self, share: float, low: Array, high: Array, defined: NDArray[np.bool_], order: Integers) -> Array:
+        """Return the age below which each link spent this share of the time (L,) [s]."""
+        selected = order[defined[order]]
+        place_of = np.full(len(low), -1)
+        place_of[selected] = np.arange(len(selected))
+        links, levels, weights = self._all_breakpoints(_breakpoints(np.arange(len(low)), low, high))
+        places = place_of[links]
+        wanted = places >= 0
+        places, levels, weights = places[wanted], levels[wanted], weights[wanted]
+        rising = np.lexsort((levels, places))
+        places, levels, above = places[rising], levels[rising], np.cumsum(weights[rising])
+        percentile = np.full(len(order), np.nan)
+        if not len(selected):
+            return percentile
+        # Integer arithmetic makes the result of a link independent of other links; no age exceeds the last level.
+        exact = np.round(levels / RESOLUTION).astype(np.int64)
+        spent = np.cumsum(np.concatenate([[0], above[:-1] * np.diff(exact)]))
+        first = np.searchsorted(places, np.arange(len(selected)))
+        last = np.append(first[1:], len(places)) - 1
+        spent -= spent[first][places]
+        target = share * spent[last]
+        after = np.clip(first + np.add.reduceat(spent < target[places], first, dtype=np.int64), first + 1, last)
+        before = after - 1
+        within = (target - spent[before]) / np.maximum(spent[after] - spent[before], 1)
+        percentile[defined[order]] = levels[before] + within * (levels[after] - levels[before])
+        return percentile
+
+    def _all_breakpoints(self, *more: tuple[Integers, Array, Integers]) -> tuple[Integers, Array, Integers]:
+        links, levels, weights = zip(*self._breakpoints, *more, strict=True)
+        return np.concatenate(links), np.concatenate(levels), np.concatenate(weights)
+
+    def _compact(self) -> None:
+        """Round the ages and merge equal ones."""
+        links, levels, weights = self._all_breakpoints()
+        rounded = np.exp(GRID * np.round(np.log(np.maximum(levels, LEAST)) / GRID))
+        levels = np.where(levels < LEAST, 0.0, rounded)
+        order = np.lexsort((levels, links))
+        links, levels, weights = links[order], levels[order], weights[order]
+        begins = np.flatnonzero((np.diff(links, prepend=-1) > 0) | (np.diff(levels, prepend=-1.0) != 0.0))
+        sums = np.add.reduceat(weights, begins)
+        left = begins[sums != 0]
+        self._breakpoints = [(links[left], levels[left], sums[sums != 0])]
+        self._number = len(left)
+        self._limit = max(MAX_BREAKPOINTS, 2 * self._number)
+
+
+def _breakpoints(links: Integers, low: Array, high: Array) -> tuple[Integers, Array, Integers]:
+    weights = np.ones(2 * len(links), dtype=np.int64)
+    weights[len(links) :] = -1
+    return np.concatenate([links, links]), np.concatenate([low, high]), weights
+
 
 Entry = tuple[float, str, int, float, ReceivedMessage]
 """Time of arrival [s], sender, number, time of sending [s], and received message; receivers may share an entry."""
@@ -76,7 +220,10 @@ class ReceptionLog:
         links = sorted(code_of)
         codes = np.array([code_of[link] for link in links], dtype=np.int64)
         columns = (self._received, self._delay_sum, self._delay_max, self._newest)
-        ages = [_none_for_nan(age) for age in self._ages.statistics(now, self._newest_present, codes)]
+        ages = [
+            [None if math.isnan(age) else age for age in column.tolist()]
+            for column in self._ages.statistics(now, self._newest_present, codes)
+        ]
         rows = zip(*(column[codes].tolist() for column in columns), *ages, strict=True)
         return {link: ReceptionStatistics(*row) for link, row in zip(links, rows, strict=True)}
 
@@ -122,10 +269,6 @@ class ReceptionLog:
         self._ages.record_updates(codes[fresh], (arrived - generated)[fresh], (arrived - before)[fresh])
         np.maximum.at(self._newest, codes, generated)
         np.maximum.at(self._newest_present, codes, generated)
-
-
-def _none_for_nan(ages: Array) -> list[float | None]:
-    return [None if math.isnan(age) else age for age in ages.tolist()]
 
 
 def _largest_before(groups: Integers, values: Array) -> Array:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control.pid import PID, Gains
-from eidrive_scenario.driving.control.pid_controller import PidController
+from eidrive_scenario.driving.control.pid_controller import PID, Gains, PidController
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings

@@ -10,7 +10,7 @@ from opendrive_xml import elevation_xml, map_xml, road_xml
 from planned_drive import detections
 from signal_street import CAR
 
-from eidrive_scenario.driving.planning.lane_below import lane_below
+from eidrive_scenario.driving.planning.path import lane_below
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.library import library_path

@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.perception.faults import PoseError, with_pose_error
-from eidrive_scenario.perception.own_bodies import outlines, rows_on_bodies, without_rows
+from eidrive_scenario.perception.pipeline import outlines, rows_on_bodies, without_rows
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement

@@ -15,13 +15,12 @@ from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
-from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
+from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 from eidrive_scenario.v2x.messages.asn1 import cpm_value
-from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
-from eidrive_scenario.v2x.messages.point_cloud import compress
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState, compress
 from eidrive_scenario.world.actor import ActorSpec
 
 AHEAD = ViewSector(2.0, 0.0, 1.5, 0.0, math.radians(50.0), 60.0)

@@ -11,7 +11,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
-from eidrive_scenario.driving.communication.relative_pose import relative_state
+from eidrive_scenario.driving.communication.report_store import relative_state
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.fusion.tracks import pose_part

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.result_checks import check_plan
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import InvalidResult

@@ -25,8 +25,7 @@ from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.camera_images import camera_file, image_file
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings
-from eidrive_scenario.v2x.messages.message import Message, StationState
-from eidrive_scenario.v2x.messages.point_cloud import compress
+from eidrive_scenario.v2x.messages.message import Message, StationState, compress
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"

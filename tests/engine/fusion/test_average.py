@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.assignment import associate
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small
+from eidrive_scenario.fusion.average import AverageFusion, fuse_average
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry
 
@@ -66,9 +66,8 @@ def test_average_box_has_mean_position_size_velocity_and_circular_yaw() -> None:
 @pytest.mark.parametrize(("second", "mean"), [(math.pi, 0.0), (math.pi + 0.2, 0.1), (-math.pi + 0.2, 0.1), (0.4, 0.2)])
 def test_average_of_opposite_headings_is_not_across_the_car(second: float, mean: float) -> None:
     """A lidar does not distinguish front and rear: the front is that of the first report."""
-    for build in (fuse_average, fuse_average_small):
-        reports = [one.detections for one in (report("A", (10.0, 0.0)), report("B", (10.0, 0.0), yaw=second))]
-        assert build(reports, [0, 0], 1.0).boxes[0, 6] == pytest.approx(mean)
+    reports = [one.detections for one in (report("A", (10.0, 0.0)), report("B", (10.0, 0.0), yaw=second))]
+    assert fuse_average(reports, [0, 0], 1.0).boxes[0, 6] == pytest.approx(mean)
 
 
 def test_average_of_a_single_box_is_unchanged() -> None:
@@ -181,12 +180,17 @@ def several_reports(draw: st.DrawFn) -> tuple[list[Detections], list[int]]:
 
 @settings(max_examples=150, deadline=None)
 @given(several_reports())
-def test_fuse_average_and_fuse_average_small_agree(given: tuple[list[Detections], list[int]]) -> None:
-    few, many = fuse_average_small(*given, 1.0), fuse_average(*given, 1.0)
-    assert (few.time, few.classes) == (many.time, many.classes)
-    np.testing.assert_allclose(few.boxes[:, :6], many.boxes[:, :6], atol=1e-12)
-    lengths = [np.hypot(np.cos(box[6]) - np.cos(other[6]), np.sin(box[6]) - np.sin(other[6]))
-               for box, other in zip(few.boxes, many.boxes, strict=True)]  # fmt: skip
-    assert max(lengths) < 1e-6
-    for name in ("scores", "velocity", "covariance"):
-        np.testing.assert_allclose(getattr(few, name), getattr(many, name), atol=1e-12)
+def test_fuse_average_of_any_reports_is_the_mean_of_the_known_values(given: tuple[list[Detections], list[int]]) -> None:
+    reports, labels = given
+    fused = fuse_average(reports, labels, 1.0)
+    for label in range(max(labels) + 1):
+        own = np.array(labels) == label
+        for name in ("boxes", "scores", "velocity", "covariance"):
+            values = np.concatenate([getattr(report, name) for report in reports])[own].reshape(own.sum(), -1)
+            known = values[~np.isnan(values).any(axis=1)]
+            mean = known.mean(axis=0) if len(known) else np.full(values.shape[1], math.nan)
+            got = getattr(fused, name)[label].reshape(-1)
+            columns = slice(None, 6) if name == "boxes" else slice(None)
+            np.testing.assert_allclose(got[columns], mean[columns], atol=1e-12)
+            if len(known) == 1:
+                np.testing.assert_array_equal(got, known[0])

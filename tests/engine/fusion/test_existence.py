@@ -10,10 +10,10 @@ import pytest
 from msgspec.structs import replace
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small
+from eidrive_scenario.fusion.average import AverageFusion, fuse_average
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion, CovarianceIntersectionSettings
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.perception.tracking.existence import LIFETIME, missed
+from eidrive_scenario.perception.tracking.association import LIFETIME, missed
 
 Make = Callable[..., Report]
 Fuse = Callable[..., Detections]
@@ -102,11 +102,7 @@ def test_average_existence_uses_scores_of_stations_without_existence(report: Mak
     assert (alone.time, alone.existence.tolist()) == (0.3, [0.5])
 
 
-def test_fuse_average_variants_do_not_set_existence(report: Make) -> None:
+def test_fuse_average_does_not_set_existence(report: Make) -> None:
     """The caller sets the existence probability."""
     known = [report("A", 0.0, [(10.0, 0.0)]).detections, report("B", 0.0, [(10.5, 0.0)]).detections]
-    assert (
-        fuse_average(known, [0, 0], 0.0).existence.shape
-        == fuse_average_small(known, [0, 0], 0.0).existence.shape
-        == (0,)
-    )
+    assert fuse_average(known, [0, 0], 0.0).existence.shape == (0,)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.fusion.headings import (
+from eidrive_scenario.fusion.prediction import (
     fuse_headings,
     initiate_heading,
     predict_heading,

@@ -1,11 +1,10 @@
-"""Association candidates of many tracks: the same as those of all pairs."""
+"""Association candidates of many tracks, compared with all pairs."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from eidrive_scenario.fusion import pairs
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, gated_pairs
 from eidrive_scenario.fusion.tracks import TRACK
 
@@ -27,36 +26,37 @@ def random_tracks(rng: np.random.Generator, count: int, spread: float) -> Table:
 
 @pytest.mark.parametrize("same_station", [True, False])
 @pytest.mark.parametrize("spread", [5.0, 60.0, 3000.0])
-def test_candidates_of_many_tracks_equal_those_of_all_pairs(
-    monkeypatch: pytest.MonkeyPatch, spread: float, same_station: bool
-) -> None:
+def test_candidates_of_many_tracks_equal_those_of_one_by_one(spread: float, same_station: bool) -> None:
     rng = np.random.default_rng(int(spread))
-    first, second = random_tracks(rng, 70, spread), random_tracks(rng, 90, spread)
-    first["mean"][:, 0] += rng.choice([0.0, 1e6], 70)
-    monkeypatch.setattr(pairs, "_FEW_PAIRS", first.size * second.size)
-    expected = gated_pairs(first, second, GATE, same_station=same_station)
-    monkeypatch.setattr(pairs, "_FEW_PAIRS", 0)
-    assert gated_pairs(first, second, GATE, same_station=same_station) == expected
-    itself = gated_pairs(second, second, GATE, same_station=same_station)
-    monkeypatch.setattr(pairs, "_FEW_PAIRS", second.size**2)
-    assert gated_pairs(second, second, GATE, same_station=same_station) == itself
-    assert itself.first
+    first, second = random_tracks(rng, 30, spread), random_tracks(rng, 40, spread)
+    first["mean"][:, 0] += rng.choice([0.0, 1e6], 30)
+    for one, other in ((first, second), (second, second)):
+        pairs = gated_pairs(one, other, GATE, same_station=same_station)
+        assert list(zip(*pairs, strict=True)) == pairs_one_by_one(one, other, same_station)
+    assert pairs.first or spread == 3000.0
 
 
-def test_infinitely_wide_track_is_a_candidate_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+def pairs_one_by_one(first: Table, second: Table, same_station: bool) -> list[tuple[int, int, float, bool]]:
+    """Return the candidates, each from a comparison of two single tracks."""
+    found = []
+    for row in range(len(first)):
+        for column in range(len(second)):
+            pair = gated_pairs(first[row : row + 1], second[column : column + 1], GATE, same_station=same_station)
+            found += [(row, column, *rest) for rest in zip(pair.cost, pair.inside, strict=True)]
+    return found
+
+
+def test_infinitely_wide_track_is_a_candidate_of_all() -> None:
     tracks = random_tracks(np.random.default_rng(1), 40, 1000.0)
     tracks["covariance"][7], tracks["vague"] = np.eye(4) * 1e30, False
-    monkeypatch.setattr(pairs, "_FEW_PAIRS", 0)
-    few = gated_pairs(tracks, tracks, GATE, same_station=False)
-    monkeypatch.setattr(pairs, "_FEW_PAIRS", 1600)
-    assert few == gated_pairs(tracks, tracks, GATE, same_station=False)
-    wide = {row for pair in zip(few.first, few.second, strict=True) if 7 in pair for row in pair}
+    pairs = gated_pairs(tracks, tracks, GATE, same_station=False)
+    assert list(zip(*pairs, strict=True)) == pairs_one_by_one(tracks, tracks, False)
+    wide = {row for pair in zip(pairs.first, pairs.second, strict=True) if 7 in pair for row in pair}
     others = np.flatnonzero(tracks["station"] != tracks["station"][7]).tolist()
     assert wide == {7, *others}
 
 
-@pytest.mark.parametrize("few", [0, 10**6])
-def test_pairs_of_several_receiving_stations_equal_those_of_each(monkeypatch: pytest.MonkeyPatch, few: int) -> None:
+def test_pairs_of_several_receiving_stations_equal_those_of_each() -> None:
     """Tracks of two receiving stations are no candidates, though they are at the same places."""
     rng = np.random.default_rng(5)
     parts = [random_tracks(rng, count, spread) for count, spread in ((40, 30.0), (1, 30.0), (70, 90.0), (25, 8.0))]
@@ -67,7 +67,6 @@ def test_pairs_of_several_receiving_stations_equal_those_of_each(monkeypatch: py
         found = gated_pairs(part, part, GATE, same_station=False)
         expected += [(first + begin, second + begin) for first, second in zip(found.first, found.second, strict=True)]
         begin += len(part)
-    monkeypatch.setattr(pairs, "_FEW_PAIRS", few)
     both = np.concatenate(parts)
     found = gated_pairs(both, both, GATE, same_station=False)
     assert list(zip(found.first, found.second, strict=True)) == expected

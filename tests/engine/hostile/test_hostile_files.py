@@ -18,7 +18,7 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.files.bounded import MIB, RefusedFileError, read_regular_file
 from eidrive_scenario.files.yaml_text import load_yaml_file
 from eidrive_scenario.library import definition
-from eidrive_scenario.perception.learned.weight_files import read_arrays
+from eidrive_scenario.perception.learned.weights import read_arrays
 
 SECRET = "root:x:0:0:hunter2"
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
-from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box
-from eidrive_scenario.perception.lidar.l_shape import rectangles
+from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box, rectangles
 
 PATTERN = Pattern(math.radians(1.0), math.radians(1.0), math.radians(15.0))
 CLASSES = ("car", "van", "truck", "bus", "motorbike", "bicycle", "pedestrian")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, missed, survived
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, missed, survived
+from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
 
 

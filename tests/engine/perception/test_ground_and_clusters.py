@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.perception.lidar.clustering import clusters
-from eidrive_scenario.perception.lidar.ground import CLEARANCE, ground_height
+from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, clusters, ground_height
 
 
 def rings(height: float, slope: tuple[float, float] = (0.0, 0.0), columns: int = 90) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_memory import ImageMemory

@@ -13,10 +13,9 @@ from msgspec.structs import replace
 
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.perception.detector import DetectorContext
-from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, misspelt, object_category
+from eidrive_scenario.perception.detector import DetectorContext, ImageDetections
 from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector, merge_duplicates
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.registry import registry

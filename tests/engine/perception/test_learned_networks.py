@@ -11,23 +11,38 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
 
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES  # noqa: E402
-from eidrive_scenario.perception.learned.image_network import Candidates  # noqa: E402
+from eidrive_scenario.perception.learned.image_network import (  # noqa: E402
+    IMAGE_CLASSES,
+    Candidates,
+)
 from eidrive_scenario.perception.learned.networks.blocks import fold  # noqa: E402
-from eidrive_scenario.perception.learned.networks.boxes import centered, complete_iou, corners, pairwise_iou  # noqa: E402
-from eidrive_scenario.perception.learned.networks.ssd import Ssd, decode, default_boxes, encode  # noqa: E402
-from eidrive_scenario.perception.learned.networks.ssd_loss import (  # noqa: E402
+from eidrive_scenario.perception.learned.networks.boxes import (  # noqa: E402
+    IGNORED,
+    PADDING,
+    Targets,
+    centered,
+    complete_iou,
+    corners,
+    pairwise_iou,
+)
+from eidrive_scenario.perception.learned.networks.ssd import (  # noqa: E402
     BACKGROUND,
     UNLABELED,
+    Ssd,
     SsdLoss,
+    decode,
+    default_boxes,
+    encode,
     hardest,
     match,
 )
 from eidrive_scenario.perception.learned.networks.ssd_sizes import BOXES_PER_CELL, STRIDES  # noqa: E402
-from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets  # noqa: E402
-from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5  # noqa: E402
-from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss, assign  # noqa: E402
-from eidrive_scenario.perception.learned.raw_outputs import (  # noqa: E402
+from eidrive_scenario.perception.learned.networks.yolov5 import (  # noqa: E402
+    YoloLoss,
+    YoloV5,
+    assign,
+)
+from eidrive_scenario.perception.learned.own_network import (  # noqa: E402
     ssd_candidates,
     ssd_scales,
     yolo_candidates,

@@ -11,12 +11,18 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.library import library_path
-from eidrive_scenario.perception.detector import DetectorContext
+from eidrive_scenario.perception.detector import DetectorContext, ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
-from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.detector import YoloDetector
-from eidrive_scenario.perception.learned.lamps import NONE, SHOWN, WEIGHTS, crops, lamp_network
-from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
+from eidrive_scenario.perception.learned.lights import (
+    NONE,
+    SHOWN,
+    WEIGHTS,
+    LightsOnMap,
+    crops,
+    lamp_network,
+    signal_kinds,
+)
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.perception.learned import network_loading, runtime_selection
+from eidrive_scenario.perception.learned import network_loading, runtimes
 from eidrive_scenario.perception.learned.detector import YoloDetector
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.own_network import Infer, OwnNetwork
-from eidrive_scenario.perception.learned.runtime_selection import Runtime, is_installed, select_runtime
+from eidrive_scenario.perception.learned.runtimes import Runtime, is_installed, select_runtime
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import read
 from eidrive_scenario.settings import parse_settings
@@ -40,7 +40,7 @@ def need(runtime: Runtime) -> None:
 
 def installed(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
     """Let these runtimes appear to be the installed ones."""
-    for module in (runtime_selection, network_loading):
+    for module in (runtimes, network_loading):
         monkeypatch.setattr(module, "is_installed", lambda name: name in names)
 
 
@@ -66,7 +66,7 @@ def test_onnx_model_passes_the_checker_of_onnx(name: str) -> None:
 def test_runtime_outputs_equal_trained_network_of_torch(name: str, runtime: Runtime) -> None:
     """The reference has separate batch normalizations, as in training."""
     torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
-    from eidrive_scenario.perception.learned.torch_weights import load
+    from eidrive_scenario.perception.learned.torch_network import load
 
     need(runtime)
     path = SHIPPED / f"{name}.npz"
@@ -190,8 +190,7 @@ def assert_independent_of_the_batch(infer: Infer) -> None:
 @NETWORKS
 def test_outputs_do_not_depend_on_other_images_of_the_batch(name: str) -> None:
     pytest.importorskip("torch", reason="needs the extra 'learned'")
-    from eidrive_scenario.perception.learned.torch_network import TorchNetwork
-    from eidrive_scenario.perception.learned.torch_weights import trainable
+    from eidrive_scenario.perception.learned.torch_network import TorchNetwork, trainable
 
     batched, single = (TorchNetwork(trainable(read(SHIPPED / f"{name}.npz")), 1, batch=batch) for batch in (4, 1))
     assert_independent_of_the_batch(batched)

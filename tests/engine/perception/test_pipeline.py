@@ -16,8 +16,7 @@ from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer
 from eidrive_scenario.perception.oracle import OracleDetector
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracking.method import TrackingMethod
-from eidrive_scenario.perception.tracking.settings import TrackerKind, TrackerSettings
+from eidrive_scenario.perception.tracking.method import TrackerKind, TrackerSettings, TrackingMethod
 from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.sensing.readings import EgoState, Readings, SignalReading, TruthReading
 from eidrive_scenario.world.actor import ActorSpec

@@ -10,8 +10,8 @@ import pytest
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.pose_noise import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 
 EGO = EgoState(0.0, np.array([5.0, 1.0, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.perception.learned import runtime_selection
+from eidrive_scenario.perception.learned import runtimes
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
-from eidrive_scenario.perception.learned.runtime_selection import (
+from eidrive_scenario.perception.learned.runtimes import (
+    Compute,
     Runtime,
     is_installed,
+    load_onnx,
     runtime_versions,
     select_runtime,
 )
-from eidrive_scenario.perception.learned.runtimes import Compute, load_onnx
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 RED_BOXES = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
@@ -36,8 +37,8 @@ ROW = [20.0, 30.0, 8.0, 6.0, 1.0, 0.1, 0.9]
 @pytest.fixture
 def without_onnxruntime(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let ONNX Runtime appear not to be installed."""
-    installed = runtime_selection.is_installed
-    monkeypatch.setattr(runtime_selection, "is_installed", lambda module: module != "onnxruntime" and installed(module))
+    installed = runtimes.is_installed
+    monkeypatch.setattr(runtimes, "is_installed", lambda module: module != "onnxruntime" and installed(module))
 
 
 def load_network(path: Path, threads: int) -> Compute:

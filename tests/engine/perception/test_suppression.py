@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.perception.learned.classes import (
+from eidrive_scenario.perception.learned.image_network import (
     IMAGE_CLASSES,
     image_class,
     light_state,

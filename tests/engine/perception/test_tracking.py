@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from scipy.stats import chi2
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
 
 DT = 0.1

@@ -11,10 +11,10 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.tracks import pose_part
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.pose_noise import PoseNoise, PoseNoiseProcess
+from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty, UncertainPose
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.perception.geometry.visibility import in_camera, in_lidar
+from eidrive_scenario.perception.geometry.projection import in_camera, in_lidar
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
 NONE = np.empty((0, 7))

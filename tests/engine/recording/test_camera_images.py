@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.recording.camera_images import (
     camera_file,
     draw_image_detections,

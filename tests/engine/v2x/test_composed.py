@@ -13,8 +13,8 @@ from radio_traffic import composed
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel
 from eidrive_scenario.v2x.link_models.delay import Delay, LognormalDelay
+from eidrive_scenario.v2x.messages.generation import cpm_size
 from eidrive_scenario.v2x.messages.message import Message, StationState
-from eidrive_scenario.v2x.messages.size import cpm_size
 
 
 def message(sender: str, number: int) -> Message:

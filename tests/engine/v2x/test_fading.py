@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from radio_traffic import exchange, message, radio
 
 from eidrive_scenario.v2x.messages.message import LinkEvent
-from eidrive_scenario.v2x.propagation.fading import Nakagami
+from eidrive_scenario.v2x.propagation import Nakagami
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 

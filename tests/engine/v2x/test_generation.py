@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.messages.clock import StationClock
-from eidrive_scenario.v2x.messages.generation.cam import CamGenerationRules
-from eidrive_scenario.v2x.messages.generation.cpm import CpmContents, CpmGenerationRules, quality
-from eidrive_scenario.v2x.messages.generation.object_ids import ObjectIdAssigner
-from eidrive_scenario.v2x.messages.message import Message, StationState
-from eidrive_scenario.v2x.messages.point_cloud import compress
-from eidrive_scenario.v2x.messages.size import cam_size, cpm_size, objects_that_fit
+from eidrive_scenario.v2x.messages.generation import (
+    CamGenerationRules,
+    CpmContents,
+    CpmGenerationRules,
+    ObjectIdAssigner,
+    cam_size,
+    cpm_size,
+    objects_that_fit,
+    quality,
+)
+from eidrive_scenario.v2x.messages.message import Message, StationClock, StationState, compress
 
 DT = 0.05
 

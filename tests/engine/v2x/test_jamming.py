@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 from radio_traffic import DT, QUIET, exchange, message, radio
 
-from eidrive_scenario.v2x.propagation.path_loss import LogDistance
+from eidrive_scenario.v2x.propagation import LogDistance
 from eidrive_scenario.v2x.radio.jamming import Jammer, jamming_power
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 

@@ -11,7 +11,7 @@ from radio_traffic import composed, message
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
-from eidrive_scenario.v2x.statistics.links import Links
+from eidrive_scenario.v2x.statistics.link_statistics import Links
 
 DT = 0.05
 STATIONS = ("Ego", "RSU", "Spectator")

@@ -14,7 +14,7 @@ from radio_traffic import composed
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
+from eidrive_scenario.v2x.link_models.delay import TraceDelay
 from eidrive_scenario.v2x.link_models.loss import DistanceLoss, GilbertElliottLoss, Loss
 from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.profile import load_profile

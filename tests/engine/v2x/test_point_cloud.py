@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.codec import codec
-from eidrive_scenario.v2x.messages.point_cloud import HEADER_BYTES, PointCloud, compress
+from eidrive_scenario.v2x.messages.message import HEADER_BYTES, PointCloud, compress
 
 COORDINATE = st.floats(-500.0, 500.0)
 

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.v2x.counter_random import uniform, uniforms
-from eidrive_scenario.v2x.propagation.gains import (
+from eidrive_scenario.v2x.propagation import (
+    LinkGeometry,
+    LogDistance,
+    Tr37885,
+    WinnerB1,
     blockage_moments,
     building_nlos,
     free_space,
@@ -17,11 +21,10 @@ from eidrive_scenario.v2x.propagation.gains import (
     urban_los,
     winner_b1,
 )
-from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, LogDistance, Tr37885, WinnerB1
-from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.packet_error import CURVES
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV
+from eidrive_scenario.v2x.standards import fragments, ieee80211p_airtime
 
 D = np.array([10.0, 100.0, 1000.0])
 
@@ -151,14 +154,6 @@ def test_packet_error_curves_decrease_and_larger_packets_have_more_errors() -> N
             )
 
 
-@pytest.mark.parametrize("name", CURVES)
-def test_packet_error_curve_scalar_and_array_evaluation_agree(name: str) -> None:
-    ratios = np.linspace(-5.0, 25.0, 301)
-    for size in (100.0, 350.0, 1400.0):
-        one_by_one = [CURVES[name].of(ratio, size) for ratio in ratios.tolist()]
-        assert one_by_one == pytest.approx(CURVES[name].at(ratios, size).tolist(), abs=1e-12)
-
-
 def test_uniform_and_uniforms_agree_to_the_bit() -> None:
     keys = np.array([0, 1, 2**63, 2**64 - 1, 0x9E3779B97F4A7C15], dtype=np.uint64)
     for count in (-1, 0, 1, 12345678):
@@ -171,10 +166,10 @@ def test_log_distance_equals_free_space_at_its_reference_distance() -> None:
     assert free_space(1.0, 5.15) == pytest.approx(46.6777, abs=0.01)
     model = LogDistance(kind="log_distance", exponent=2.5)
     assert model.loss(between(LOS, 100.0), 5.9, np.array([0.5]))[0] == pytest.approx(97.86, abs=0.005)
-    assert model.loss_of(Link(100.0, NLOSV, 1.6, 1.6, 3.0, 2), 5.9, 0.5) == pytest.approx(97.86 + 2 * 6.9, abs=0.005)
+    assert model.loss(between(NLOSV, 100.0), 5.9, np.array([0.5]))[0] == pytest.approx(97.86 + 6.9, abs=0.005)
     assert model.loss(between(NLOS, 100.0), 5.9, np.array([0.5]))[0] == pytest.approx(111.42, abs=0.005)
     given = LogDistance(kind="log_distance", exponent=3.0, reference_distance=10.0, reference_loss_db=60.0)
-    assert [given.loss_of(Link(d, LOS, 1.6, 1.6, 0.0, 0), 5.9, 0.5) for d in (1, 10, 100)] == [60, 60, 90]
+    assert [given.loss(between(LOS, d), 5.9, np.array([0.5]))[0] for d in (1.0, 10.0, 100.0)] == [60, 60, 90]
 
 
 def test_nist_packet_errors_of_qpsk_equal_ns_3() -> None:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 from radio_traffic import DT, QUIET, Place, exchange, message, radio
 
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
-from eidrive_scenario.v2x.radio import budget, csma, reception
-from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
-from eidrive_scenario.v2x.radio_environment import NLOSV, LineOfSightStates, RadioEnvironment
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.standards import ieee80211p_airtime
 
 ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}
 PROFILES: list[dict[str, object]] = [
@@ -69,39 +65,6 @@ def test_radio_channel_with_reversed_stations_returns_equal_outcomes(profile: di
     forward = outcomes(ROW)
     assert outcomes(dict(reversed(ROW.items()))) == forward
     assert len(forward) > 300
-
-
-def mixed_sight(pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
-    """Return LOS, NLOSv behind a truck, or NLOS, depending on the letters of the stations."""
-    states = np.array([(ord(first) + 2 * ord(second)) % 3 for first, second in pairs], dtype=np.int64)
-    heights = np.where(states == NLOSV, 3.0, -np.inf)
-    return LineOfSightStates(states, heights, {ray: ("Truck",) for ray in np.flatnonzero(states == NLOSV).tolist()})
-
-
-@pytest.mark.parametrize(("path_loss", "power"), [("tr37885", 5), ("winner_b1", 20), ("log_distance", 20)])
-@pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
-def test_radio_channel_scalar_and_array_evaluation_return_equal_outcomes(
-    monkeypatch: pytest.MonkeyPatch, profile: dict[str, object], path_loss: str, power: float
-) -> None:
-    def outcomes() -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
-        near = {name: (110.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCD")}
-        carrier = radio(3, **{"path_loss": {"kind": path_loss}, "tx_power_dbm": power, **profile, "jitter": 0.01})
-        return exchange(carrier, near, 60, speed=9.0, sizes=(200, 900), sight=mixed_sight)
-
-    scalar, scalar_deliveries = outcomes()
-    monkeypatch.setattr(budget, "MAX_SCALAR", 0)
-    monkeypatch.setattr(reception, "MAX_SCALAR", 0)
-    monkeypatch.setattr(csma, "MAX_SCALAR", 0)
-    array, array_deliveries = outcomes()
-    assert len(scalar) == len(array) > 400
-    assert len({event.reason for event in scalar}) > 2
-    for one, other in zip(scalar, array, strict=True):
-        assert replace(one, path_loss_db=None, snr_db=None) == replace(other, path_loss_db=None, snr_db=None)
-        if one.reason not in ("queue", "loss", "burst"):
-            assert (one.path_loss_db, one.snr_db) == pytest.approx((other.path_loss_db, other.snr_db), abs=1e-9)
-    assert [(name, at, received.arrived) for name, at, received in scalar_deliveries] == [
-        (name, at, received.arrived) for name, at, received in array_deliveries
-    ]
 
 
 def test_radio_channel_without_reordering_delays_messages_behind_earlier_ones() -> None:

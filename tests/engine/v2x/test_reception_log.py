@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
-from eidrive_scenario.v2x.statistics import age_of_information, reception_log
+from eidrive_scenario.v2x.statistics import reception_log
 from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog
 
 NAMES = ("A", "B", "C")
@@ -68,15 +68,15 @@ def test_reception_log_of_a_long_run_has_bounded_memory(monkeypatch: pytest.Monk
     for receiver, entry in entries(3000):
         exact.record(receiver, [entry])
     at_end = exact.statistics_by_link(1000.0)
-    monkeypatch.setattr(age_of_information, "MAX_BREAKPOINTS", 500)
-    monkeypatch.setattr(age_of_information, "GRID", 0.04)
+    monkeypatch.setattr(reception_log, "MAX_BREAKPOINTS", 500)
+    monkeypatch.setattr(reception_log, "GRID", 0.04)
     monkeypatch.setattr(reception_log, "MAX_PENDING", 50)
     bounded = ReceptionLog()
     kept = []
     for receiver, entry in entries(3000):
         bounded.record(receiver, [entry])
         kept.append(bounded._ages._number)
-    classes = len(at_end) * math.log(LONGEST / SHORTEST) / age_of_information.GRID
+    classes = len(at_end) * math.log(LONGEST / SHORTEST) / reception_log.GRID
     assert max(kept) < 2.0 * classes + 100 < 0.5 * exact._ages._number
     for name, link in bounded.statistics_by_link(1000.0).items():
         assert link[:4] == pytest.approx(at_end[name][:4])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from radio_traffic import DT, exchange, message, radio
 
-from eidrive_scenario.v2x.propagation.path_loss import Tr37885
+from eidrive_scenario.v2x.propagation import Tr37885
 from eidrive_scenario.v2x.radio.budget import LinkBudget
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
-from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
+from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import RoadNetwork, outlines
 from eidrive_scenario.roads.model.location import LaneKey
@@ -93,7 +92,7 @@ class ConflictWays:
         lit = [(passage.start - AROUND, passage.end + AROUND) for passage in passages if passage.has_light]
         for number, outline in enumerate(self._crosswalks):
             ways = _beside_crosswalk(line, number, outline, self._half_width)
-            found += [way._replace(has_light=_is_within(way, lit)) for way in ways]
+            found += [way._replace(has_light=any(low <= way.start <= high for low, high in lit)) for way in ways]
         return _grouped(sorted(found, key=lambda way: way.start), self._length + ROOM)
 
     def _of_junction(self, line: ReferenceLine, own: Passage) -> Iterator[ConflictWay]:
@@ -227,7 +226,3 @@ def _grouped(ways: list[ConflictWay], room: float) -> list[ConflictWay]:
         lane = min(lane, way.start) if way.kind == "lane" else lane
         found.append(way._replace(hold=hold, look=lane if way.kind == "lane" else hold))
     return found
-
-
-def _is_within(way: ConflictWay, ranges: list[tuple[float, float]]) -> bool:
-    return any(first <= way.start <= last for first, last in ranges)

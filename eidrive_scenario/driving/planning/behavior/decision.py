@@ -8,35 +8,85 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.bounds import FREE, Course
-from eidrive_scenario.driving.planning.behavior.lateral import ROUTE, Body, LateralProfile, towards
-from eidrive_scenario.driving.planning.behavior.maneuvers import passing_profiles
-from eidrive_scenario.driving.planning.behavior.oncoming import OncomingTraffic
-from eidrive_scenario.driving.planning.behavior.options import URGENT, Options
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, passing_profiles
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    ROUTE,
+    Body,
+    LateralProfile,
+    Option,
     Precedence,
-    Proposal,
+    Start,
     Wall,
     conflicts,
     crossing_walls,
     inside_way,
     leading,
     proposals_for,
+    towards,
 )
-from eidrive_scenario.driving.planning.behavior.reasons import reason_of
-from eidrive_scenario.driving.planning.behavior.rollout import Roller
-from eidrive_scenario.driving.planning.behavior.scoring import evaluate
+from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
+from eidrive_scenario.driving.planning.behavior.scoring import URGENT, OncomingTraffic, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
+
+def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, tuple[int, ...]]:
+    """Return the reason of a proposal, and the rows of its objects."""
+    chosen = options.options[best]
+    proposal, profile = chosen.proposal, chosen.profile
+    owners = situation.prediction.objects
+    if proposal.is_emergency:
+        threat = _threat(options, best)
+        if threat is None:
+            return "emergency braking", ()
+        owner = owners[threat]
+        return f"emergency braking: collision course with {situation.kind_of(owner)}", situation.rows_of(owner)
+    maneuver = "" if profile.name == ROUTE else f"{profile.name}; "
+    causes = options.rolled.cause[best].tolist()
+    for cause in causes:
+        if cause >= 0:
+            verb = "stop for" if situation.approaches(owners[cause]) else "follow"
+            return f"{maneuver}{verb} {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
+        if cause <= WALL:
+            wall = chosen.walls[WALL - cause]
+            held = None if wall.owner is None else owners[wall.owner]
+            return f"{maneuver}{wall.reason}", situation.rows_of(held)
+    if proposal.share < 1.0 and owners:
+        return f"{maneuver}slow down for traffic ahead", ()
+    if proposal.share < 1.0:
+        return f"{maneuver}{chosen.walls[0].reason if chosen.walls else 'curve or end of route ahead'}", ()
+    if LIMIT in causes and causes[0] != FREE:
+        hidden = situation.hidden_at(float(options.rolled.s[best, causes.index(LIMIT) + 1]))
+        if hidden:
+            return f"{maneuver}caution before a hidden {hidden}", ()
+        return f"{maneuver}curve or end of route ahead", ()
+    return f"{maneuver}keep speed", ()
+
+
+def _threat(options: Options, emergency: int) -> int | None:
+    """Return the hypothesis for which the vehicle brakes in an emergency: that with which the first other proposal
+    collides, else the one for which it brakes."""
+    others = (row for row, option in enumerate(options.options) if not option.proposal.is_emergency)
+    other = next(others, emergency)
+    threat = int(options.evaluation.cause[other])
+    if threat >= 0:
+        return threat
+    for cause in options.rolled.cause[other].tolist():
+        if cause >= 0:
+            return int(cause)
+        if cause <= WALL:
+            wall = options.options[other].walls[WALL - int(cause)]
+            return wall.owner
+    return None
+
+
 OFF_PROFILE = 0.8
 """Distance from the current profile above which the vehicle starts a new one from its position [m]."""
 SATISFIED = 0.85
-"""Share of the wanted progress from which on no other maneuver is considered."""
+"""Share of the wanted progress from which on no other maneuver is considered; a choice, as the next two times."""
 DWELL = 2.0
 """Time for which a maneuver is kept unless it becomes risky [s]."""
 PERSISTENT = 0.5
@@ -165,14 +215,14 @@ class Decider:
             hardest = float(steps[: round(URGENT / self._times[1])].min())
             if hardest < -RELEASE * self._settings.hard_deceleration:
                 best = options.emergency
-        self._brakes = options.proposals[best].is_emergency
+        self._brakes = options.options[best].proposal.is_emergency
         return best
 
     def _without_hard_braking(
         self, situation: Situation, scene: Surroundings, options: Options, threat: int
     ) -> Decision:
         """Return the decision if a hypothesis of uncertain existence is no reason for more than a gentle stop."""
-        certain = self._options(situation, only_certain(scene), options.profiles[:1])
+        certain = self._options(situation, only_certain(scene), [options.options[0].profile])
         choice, stop = int(np.argmax(certain.evaluation.score)), certain.gentle
         if self._acceleration(certain, choice) < self._acceleration(certain, stop):
             return self._decision(situation, certain, choice)
@@ -203,7 +253,7 @@ class Decider:
             start, slope = current.offset_at(s), current.slope_at(s)
         if abs(start - value) < 0.02 and abs(slope) < 0.01:
             return LateralProfile(name, (s,), (value,))
-        return towards(name, value, s, start, slope, situation.speed, self._settings.lateral_acceleration)
+        return towards(name, value, Start(s, start, slope, situation.speed), self._settings.lateral_acceleration)
 
     def _options(
         self,
@@ -221,50 +271,37 @@ class Decider:
             center = (situation.s + self._center, situation.d)
             hidden = self._oncoming.first_hidden(scene, beside, center, situation.now)
             profiles = profiles + more
-        proposals: list[Proposal] = []
-        walls: list[list[Wall]] = []
-        leads: list[Bools] = []
-        ways: list[Bools] = []
+        options: list[Option] = []
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
         here = (self._front, situation.s, situation.speed)
         stops = [situation.stop] if situation.stop is not None else []
         for number, profile in enumerate(profiles):
             way = inside_way(scene, profile, self._half_width)
-            ways.append(way)
-            found = conflicts(scene, way, situation.s)
-            made = proposals_for(number, found, self._settings, emergency=self._emergency, is_current=number == 0)
+            crossing = conflicts(scene, way, situation.s)
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
-            for proposal in made:
+            for proposal in proposals_for(
+                number, crossing, self._settings, emergency=self._emergency, is_current=number == 0
+            ):
                 kind = proposal.precedence
                 if kind not in reactions:
-                    before = [*crossing_walls(found, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = before, leading(scene, way, found, situation.s + self._center, proposal)
-                walls.append(reactions[kind][0])
-                leads.append(reactions[kind][1])
-            proposals += made
-        rolled = self._roller.roll(
-            proposals,
-            Course(situation.line.along, situation.limits, situation.wanted),
-            (situation.s, situation.speed),
-            (self._front, self._center),
-            scene,
-            leads,
-            walls,
-        )
+                    walls = [*crossing_walls(crossing, self._times, here, kind, reasons), *stops]
+                    reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
+                options.append(Option(proposal, profile, way, *reactions[kind]))
+        course = Course(situation.line.along, situation.limits, situation.wanted)
+        start, body = (situation.s, situation.speed), (self._front, self._center)
+        rolled = self._roller.roll(options, course, start, body, scene)
         evaluation = evaluate(
-            proposals,
-            profiles,
-            ways,
+            options,
             rolled,
             scene,
             self._times,
             self._body,
             self._settings,
-            situation.wanted,
-            self._kept_names(situation),
-            hidden,
+            wanted=situation.wanted,
+            kept=self._kept_names(situation),
+            hidden=hidden,
         )
-        return Options(profiles, proposals, walls, rolled, evaluation)
+        return Options(options, rolled, evaluation)
 
     def _kept_names(self, situation: Situation) -> frozenset[str]:
         """Return the current maneuver, and the route if its lateral motion is complete: then the vehicle returns."""
@@ -297,15 +334,14 @@ class Decider:
         is_due = now - self._switched >= DWELL and now - self._challenger[1] >= PERSISTENT - TIME_TOLERANCE
         if is_due:
             return best
-        same = [row for row, p in enumerate(options.proposals) if options.profiles[p.profile].name == name]
+        same = [row for row, option in enumerate(options.options) if option.profile.name == name]
         if not same:
             return best
         kept = max(same, key=lambda row: float(options.evaluation.score[row]))
         return kept if not math.isfinite(options.evaluation.collision[kept]) else best
 
     def _decision(self, situation: Situation, options: Options, best: int) -> Decision:
-        proposal = options.proposals[best]
-        profile = options.profiles[proposal.profile]
+        proposal, profile = options.options[best].proposal, options.options[best].profile
         if self._current is None or profile.name != self._current.name:
             self._switched = situation.now
         self._current = profile

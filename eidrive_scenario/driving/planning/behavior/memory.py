@@ -159,7 +159,9 @@ class ObjectMemory:
         self._objects = found + lost
         uncertainty = self._settings.uncertainty
         for known in self._objects:
-            is_still = known.speed < STILL or _still_stands(known, uncertainty)
+            # It stands on while it has moved no farther and no faster than the errors of place and velocity explain.
+            moved = math.hypot(known.x - known.stands_at[0], known.y - known.stands_at[1])
+            is_still = known.speed < STILL or (known.seems_to_stand and moved <= uncertainty * known.error)
             if is_still and known.still_since is None:
                 known.stands_at = known.x, known.y
             known.still_since = (now if known.still_since is None else known.still_since) if is_still else None
@@ -244,15 +246,6 @@ def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:
     nearest = gap.argmin(axis=1)
     near = gap[np.arange(len(places)), nearest] < GATE
     return tuple(dict.fromkeys(nearest[near].tolist()))
-
-
-def _still_stands(known: KnownObject, uncertainty: float) -> bool:
-    """Return whether an object that stood has moved no farther and no faster than the errors of its place and velocity
-    explain."""
-    if not known.seems_to_stand:
-        return False
-    moved = math.hypot(known.x - known.stands_at[0], known.y - known.stands_at[1])
-    return moved <= uncertainty * known.error
 
 
 def _is_among(lost: KnownObject, found: list[KnownObject]) -> bool:

@@ -15,6 +15,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
 from eidrive_scenario.driving.planning.behavior.occlusion import HiddenTraffic, Occluders
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
@@ -22,7 +23,6 @@ from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_lim
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
@@ -121,7 +121,11 @@ class BehaviorPlanner(RoutePlanner):
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
         if self.observes_regions and self.roads is not None:
-            self._ways = self._find_ways(self.roads, line)
+            if self._conflict_ways is None:
+                self._conflict_ways = ConflictWays(
+                    self.roads, self._rules or JunctionRules(self.roads), self.spec.size[:2]
+                )
+            self._ways = self._conflict_ways.along(line, self._passages)
         shift = None
         if before is not None:
             (s, d), (s_before, d_before) = (some.place(x, y, 0, len(some.points)) for some in (line, before))
@@ -129,12 +133,6 @@ class BehaviorPlanner(RoutePlanner):
         self._decision = None
         self._decider.line_changed(shift)
         return line
-
-    def _find_ways(self, roads: RoadNetwork, line: ReferenceLine) -> list[ConflictWay]:
-        """Return the ways on which unseen traffic may meet the vehicle."""
-        if self._conflict_ways is None:
-            self._conflict_ways = ConflictWays(roads, self._rules or JunctionRules(roads), self.spec.size[:2])
-        return self._conflict_ways.along(line, self._passages)
 
     def _caution(
         self, ego: EgoState, objects: Detections, line: ReferenceLine, s: float, wanted: float, now: float
@@ -193,11 +191,13 @@ class BehaviorPlanner(RoutePlanner):
         known = self._memory.update(objects, now, self._in_view(ego))
         lanes = self._predictor.lanes(known)
         self._predictor.follow_lanes(known, lanes)
-        reach = self._reach(ego, wanted)
+        reach = MARGIN_AHEAD + 2.0 * max(ego.speed, wanted) * self.planner_settings.horizon
         rows = [row for row, entry in enumerate(known) if math.hypot(entry.x - x, entry.y - y) < reach]
         near = [known[row] for row in rows]
         stop = self._stop(line.path, ego, x, y, now)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
+        low = line.index_at(s - MARGIN_AHEAD)
+        high = line.index_at(s + max(ego.speed, wanted) * self.planner_settings.horizon + MARGIN_AHEAD) + 1
         situation = Situation(
             line=line,
             limits=limits,
@@ -208,7 +208,7 @@ class BehaviorPlanner(RoutePlanner):
             wanted=wanted,
             objects=near,
             prediction=self._predictor.predict(near, [lanes[row] for row in rows]),
-            window=self._window(line, s, max(ego.speed, wanted)),
+            window=(low, max(high, low + 2)),
             stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
             now=now,
             gives_way=self._gives_way(s),
@@ -240,15 +240,6 @@ class BehaviorPlanner(RoutePlanner):
             return np.asarray(np.logical_or.reduce(shown))
 
         return in_view
-
-    def _reach(self, ego: EgoState, wanted: float) -> float:
-        return MARGIN_AHEAD + 2.0 * max(ego.speed, wanted) * self.planner_settings.horizon
-
-    def _window(self, line: ReferenceLine, s: float, speed: float) -> tuple[int, int]:
-        """Return the range of the points of the line that matter."""
-        low = line.index_at(s - MARGIN_AHEAD)
-        high = line.index_at(s + speed * self.planner_settings.horizon + MARGIN_AHEAD) + 1
-        return low, max(high, low + 2)
 
 
 def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[int, ...]) -> Plan:

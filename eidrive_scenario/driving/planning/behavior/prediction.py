@@ -9,9 +9,8 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
-from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
+from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
 
@@ -160,7 +159,8 @@ class Predictor:
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            (found if fits else too_fast).append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
+            fitting = found if fits else too_fast
+            fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if len(found) == MOST_HYPOTHESES:
                 break
         found = found or too_fast

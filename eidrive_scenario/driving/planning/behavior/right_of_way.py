@@ -1,10 +1,12 @@
-"""Right of way at junctions without lights: signs, priorities of the map, priority to the right, left turns."""
+"""Right of way, and the courses of lanes that others may follow."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +15,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.traffic_lights import StopLine, places_along, stop_lines
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.location import LaneKey
 
 BEFORE_ENTRY = 25.0
 """Maximum distance of a sign before the junction to which it belongs [m]."""
@@ -184,3 +187,164 @@ def _runs(inside: list[set[str]]) -> Iterator[tuple[str, int, int]]:
             while last + 1 < len(inside) and name in inside[last + 1]:
                 last += 1
             yield name, first, last
+
+
+SPACING = 2.0
+"""Distance between the points of a course [m]."""
+LENGTH = 180.0
+"""Minimum length of a course beyond its first lane, unless the lanes end [m]."""
+SIMILAR_TURN = 0.6
+"""Maximum difference of the turn of a branch to the smallest turn at which it is likely, too [rad]."""
+MOST = 4
+"""Maximum number of courses from one lane."""
+
+
+FASTEST_TURN = 7.0
+"""Maximum lateral acceleration of a vehicle that follows a course [m/s²], near the limit of adhesion."""
+FASTEST_STOP = 6.0
+"""Maximum deceleration before a curve [m/s²]."""
+
+
+class Course:
+    """Center line of a lane and its successors: points (M, 2) [m], distances along it (M,) [m].
+
+    half_width  of the lane at its start [m]
+    stops       distances at which stop signs hold the traffic [m];  passages  of junctions
+    heights     of the road (M,) [m]
+    """
+
+    def __init__(
+        self,
+        points: Array,
+        along: Array,
+        half_width: float,
+        stops: tuple[float, ...] = (),
+        passages: tuple[Passage, ...] = (),
+        heights: Array | None = None,
+    ) -> None:
+        self.points, self.along, self.half_width = points, along, half_width
+        self.heights: Array = np.zeros(len(along)) if heights is None else heights
+        self.stops, self.passages = stops, passages
+        self._x, self._y = (np.ascontiguousarray(column) for column in points.T)
+        step = np.diff(points, axis=0)
+        unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+        self._heading = np.arctan2(unit[:, 1], unit[:, 0])
+        self._segments: Array = np.stack([self._x[:-1], self._y[:-1], along[:-1], *unit.T, self._heading])
+        """Start, distance along the course, direction and heading of the segments (6, M - 1)."""
+        self._inside = along[1:-1]
+        """Distances at which the next segment begins."""
+
+    def place(self, x: float, y: float) -> tuple[float, float, float]:
+        """Return the distance along the course, the offset to the left and the heading at the nearest point."""
+        gap = (self._x - x) ** 2 + (self._y - y) ** 2
+        index = min(int(gap.argmin()), len(gap) - 2)
+        x0, y0, x1, y1 = self._corners[index]
+        length = math.hypot(x1 - x0, y1 - y0) or 1.0
+        ux, uy = (x1 - x0) / length, (y1 - y0) / length
+        ahead = (x - x0) * ux + (y - y0) * uy
+        return self._places[index] + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
+
+    def can_follow(self, along: float, speed: float) -> bool:
+        """Return whether a vehicle with a speed [m/s] at a distance along the course can pass the curves ahead."""
+        return speed <= self._fastest[max(bisect_right(self._places, along) - 1, 0)]
+
+    @cached_property
+    def _corners(self) -> list[tuple[float, float, float, float]]:
+        """Start and end of each segment [m]."""
+        x, y = self._x.tolist(), self._y.tolist()
+        return list(zip(x[:-1], y[:-1], x[1:], y[1:], strict=True))
+
+    @cached_property
+    def _places(self) -> list[float]:
+        found: list[float] = self.along.tolist()
+        return found
+
+    @cached_property
+    def _fastest(self) -> list[float]:
+        """Maximum speed at each point from which a vehicle can pass the curves ahead [m/s]."""
+        turn = np.abs(np.diff(np.unwrap(self._heading)))
+        length = (self.along[2:] - self.along[:-2]) / 2.0
+        curvature = np.concatenate([[0.0], turn / np.maximum(length, 1e-9), [0.0]])
+        # The mean of neighbors: the course has an angle at each of its points, and a lane may begin with one.
+        curvature = np.convolve(curvature, np.ones(3) / 3.0, mode="same") if len(curvature) > 3 else curvature
+        speeds: list[float] = np.sqrt(FASTEST_TURN / np.maximum(curvature, 1e-6)).tolist()
+        steps: list[float] = np.diff(self.along).tolist()
+        for index in range(len(steps) - 1, -1, -1):
+            speeds[index] = min(speeds[index], math.sqrt(speeds[index + 1] ** 2 + 2.0 * FASTEST_STOP * steps[index]))
+        return speeds
+
+    def poses(self, along: Array, left: Array | float) -> tuple[Array, Array, Array]:
+        """Return x, y and heading (K,) at distances along the course and offsets to the left; straight beyond it."""
+        index = self._inside.searchsorted(along, side="right")
+        x, y, begin, ux, uy, heading = self._segments.take(index, axis=1)
+        ahead = along - begin
+        return x + ahead * ux - left * uy, y + ahead * uy + left * ux, heading
+
+
+class LaneCourses:
+    """Courses of all lanes of a road network, computed when they are first needed."""
+
+    def __init__(self, roads: RoadNetwork, rules: JunctionRules) -> None:
+        self._roads = roads
+        self._rules = rules
+        self._courses: dict[int, tuple[Course, ...]] = {}
+        self._keys = [key for key, _ in roads.tables.lane_keys()]
+
+    def ahead(self, row: int) -> tuple[Course, ...]:
+        """Return the likely courses from the start of a lane (running number), in its driving direction."""
+        found = self._courses.get(row)
+        if found is None:
+            chains = self._chains([self._keys[row]], 0.0)[:MOST]
+            found = tuple(course for chain in chains if (course := self.course_of(chain)) is not None)
+            self._courses[row] = found
+        return found
+
+    def _chains(self, chain: list[LaneKey], length: float) -> list[list[LaneKey]]:
+        """Return the lanes that continue a chain, at most MOST alternatives."""
+        while length < LENGTH:
+            key = chain[-1]
+            direction = self._roads.driving_direction(key.road, key.lane)
+            branches = [branch for branch in self._roads.movement.branches(key, direction) if branch.lane not in chain]
+            # Those whose turn is about as small as the smallest are likely.
+            least = min((abs(branch.turn) for branch in branches), default=0.0)
+            branches = [branch for branch in branches if abs(branch.turn) <= least + SIMILAR_TURN]
+            if not branches:
+                break
+            if len(branches) > 1:
+                chains: list[list[LaneKey]] = []
+                for branch in branches:
+                    chains += self._chains([*chain, branch.lane], length + self._length(branch.lane))
+                return chains[:MOST]
+            chain = [*chain, branches[0].lane]
+            length += self._length(branches[0].lane)
+        return [chain]
+
+    def _length(self, key: LaneKey) -> float:
+        return self._roads.road(key.road).sections[key.section].length
+
+    def course_of(self, chain: list[LaneKey]) -> Course | None:
+        """Return the course along consecutive lanes; None if it has no length."""
+        tables = self._roads.tables
+        rows, places = [], []
+        for key in chain:
+            section = self._roads.road(key.road).sections[key.section]
+            count = max(math.ceil(section.length / SPACING), 1)
+            s = np.linspace(section.s, section.end, count + 1)
+            if self._roads.driving_direction(key.road, key.lane) < 0:
+                s = s[::-1]
+            rows.append(np.full(len(s), tables.row_of(key)))
+            places.append(s)
+        poses = tables.lane_poses(np.concatenate(rows), np.concatenate(places), np.zeros(sum(map(len, places))))
+        points = np.column_stack([poses.x, poses.y])
+        step = np.hypot(*np.diff(points, axis=0).T)
+        apart = np.concatenate([[True], step > 0.05])
+        points, heights = points[apart], np.asarray(poses.z)[apart]
+        if len(points) < 2:
+            return None
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        first = chain[0]
+        section = self._roads.road(first.road).sections[first.section]
+        width = section.lanes[first.lane].width
+        half_width = max(width.value(0.0), width.value(section.length)) / 2.0
+        stops, passages = self._rules.stops_along(points, heights), self._rules.passages(points, heights)
+        return Course(points, along, half_width, stops, passages, heights)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,17 +12,87 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.bounds import (
-    FREE,
-    Bounds,
-    Course,
-    Limits,
-    WallsOverTime,
-    walls_over_time,
-)
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall
+from eidrive_scenario.driving.planning.behavior.proposals import Option, Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+
+FREE, LIMIT, WALL = -1, -2, -3
+"""Cause of the motion of a proposal in a step: nothing, a speed limit, or a wall (WALL - its index); an index from 0
+on is that of a leading hypothesis."""
+BEFORE = 1e9
+"""Length of the line before its first point, where the first limit holds [m]."""
+
+WallsOverTime = list[list[tuple[int, float]]]
+"""Causes and places of the walls at each time [m]."""
+
+
+class Course(msgspec.Struct, frozen=True):
+    """Limits of the motion along the line: speed limits (M,) [m/s] at distances along it (M,) [m]."""
+
+    along: Array
+    limits: Array
+    wanted: float
+    """Wanted speed [m/s]."""
+
+
+class Limits:
+    """Speed limits within reach of a vehicle, interpolated between the points of the line."""
+
+    def __init__(self, along: Array, limits: Array) -> None:
+        # The first and the last entry stand for what is before and beyond the points.
+        self._along: list[float] = [float(along[0]) - BEFORE, *along.tolist()]
+        self._limits: list[float] = [float(limits[0]), *limits.tolist()]
+        self._slopes: list[float] = [0.0, *(np.diff(limits) / np.diff(along)).tolist(), 0.0]
+
+    @classmethod
+    def ahead(cls, course: Course, s: float, reach: float) -> Limits | None:
+        """Return the limits from s to s + reach [m]; None if none is below the wanted speed."""
+        first = max(int(course.along.searchsorted(s, side="right")) - 1, 0)
+        last = int(course.along.searchsorted(s + reach)) + 1
+        limits = course.limits[first:last]
+        return cls(course.along[first:last], limits) if float(limits.min()) < course.wanted else None
+
+    def at(self, s: float) -> float:
+        """Return the limit at a distance along the line [m/s]."""
+        index = bisect_right(self._along, s) - 1
+        return self._slopes[index] * (s - self._along[index]) + self._limits[index]
+
+
+def walls_over_time(walls: Sequence[Wall], times: list[float]) -> WallsOverTime:
+    """Return the walls that exist at each time; without walls an empty list."""
+    if not walls:
+        return []
+    return [[(WALL - number, wall.s) for number, wall in enumerate(walls) if time < wall.until] for time in times]
+
+
+class Bounds:
+    """Speeds that the wanted speed, speed limits and walls allow to one proposal.
+
+    wanted  wanted speed [m/s];  gain  twice the deceleration before a wall [m/s²]
+    """
+
+    def __init__(self, wanted: float, limits: Limits | None, walls: WallsOverTime, gain: float) -> None:
+        self.wanted = wanted
+        self.are_free = wanted <= 0.0 or (limits is None and not walls)
+        """Whether the wanted speed is the only bound."""
+        self._limits = limits
+        self._walls = walls
+        self._gain = gain
+
+    def allow(self, s: float, step: int) -> tuple[float, int]:
+        """Return the speed at a distance along the line [m/s], and what determines it."""
+        speed, cause = self.wanted, FREE
+        if self._limits is not None:
+            limit = self._limits.at(s)
+            if limit < speed:
+                speed, cause = limit, LIMIT
+        if self._walls:
+            for number, place in self._walls[step]:
+                allowed = math.sqrt(self._gain * max(place - s, 0.0))
+                if allowed < speed:
+                    speed, cause = allowed, number
+        return speed, cause
+
 
 ROLLED = 6
 """Number of first steps whose causes are kept."""
@@ -74,33 +145,31 @@ class Roller:
 
     def roll(
         self,
-        proposals: list[Proposal],
+        options: Sequence[Option],
         course: Course,
         start: tuple[float, float],
         body: tuple[float, float],
         scene: Surroundings,
-        leads: Sequence[Bools],
-        walls: list[list[Wall]],
     ) -> Rollout:
-        """Return the motion of the proposals.
+        """Return the motion of the options.
 
         start  distance along the line [m] and speed [m/s]
         body   distances of the front and the center of the vehicle from the reference point [m]
-        leads  for each proposal whether a hypothesis leads it at a time (N, K); proposals may share an array
         """
         reach = (max(course.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
         limits = Limits.ahead(course, start[0], reach)
-        leaders = _Leaders(scene, leads, body)
+        leaders = _Leaders(scene, body)
         known: dict[object, _Motion] = {}
         stops: dict[object, WallsOverTime] = {}
         motions = []
-        for row, (proposal, places) in enumerate(zip(proposals, walls, strict=True)):
-            number, ahead = leaders.of(row)
-            ends = tuple([(wall.s, wall.until) for wall in places])
+        for option in options:
+            proposal = option.proposal
+            number, ahead = leaders.of(option.leads)
+            ends = tuple([(wall.s, wall.until) for wall in option.walls])
             key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends)
             if key not in known:
                 if ends not in stops:
-                    stops[ends] = walls_over_time(places, self._times)
+                    stops[ends] = walls_over_time(option.walls, self._times)
                 bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
                 known[key] = self._motion(proposal, bounds, start, ahead)
             motions.append(known[key])
@@ -158,19 +227,17 @@ class Roller:
 
 
 class _Leaders:
-    """Leaders of proposals over time; proposals with the same ones share them."""
+    """Leaders of options over time; options with the same ones share them."""
 
-    def __init__(self, scene: Surroundings, leads: Sequence[Bools], body: tuple[float, float]) -> None:
+    def __init__(self, scene: Surroundings, body: tuple[float, float]) -> None:
         front, center = body
-        self._leads = list(leads)
         self._known: dict[int, list[list[Leader]]] = {}
         self._rears: list[list[float]] = (scene.rear - scene.passing_gap[:, None] - front).tolist()
         self._centers: list[list[float]] = (scene.s - center).tolist()
         self._speeds: list[list[float]] = scene.speed.tolist()
 
-    def of(self, proposal: int) -> tuple[int, list[list[Leader]]]:
-        """Return a number of the leaders of a proposal, the same for shared ones, and the leaders at each time."""
-        leads = self._leads[proposal]
+    def of(self, leads: Bools) -> tuple[int, list[list[Leader]]]:
+        """Return a number of these leaders (N, K), the same for shared ones, and the leaders at each time."""
         number = id(leads)
         found = self._known.get(number)
         if found is None:

@@ -155,7 +155,9 @@ def surroundings(
         margin,
         prediction.objects,
         np.array([known.existence >= settings.min_existence for known in owners], dtype=bool),
-        np.array([settings.passing_gap if _may_be_passed(known) else 0.0 for known in owners]),
+        np.array(
+            [settings.passing_gap * (known.still_since is not None and known.kind not in ON_FOOT) for known in owners]
+        ),
         moving & (ahead < ACROSS),
         behind,
         _yields(prediction, gives_way),
@@ -175,10 +177,6 @@ def position_errors(objects: list[KnownObject], direction: Array) -> tuple[Array
         return alike, alike
     shift = half * np.cos(2.0 * direction) + of_both * np.sin(2.0 * direction)
     return error * np.sqrt(np.maximum(mean + shift, 0.0)), error * np.sqrt(np.maximum(mean - shift, 0.0))
-
-
-def _may_be_passed(known: KnownObject) -> bool:
-    return known.still_since is not None and known.kind not in ON_FOOT
 
 
 def _yields(prediction: Prediction, gives_way: Callable[[Passage], bool] | None) -> Bools:

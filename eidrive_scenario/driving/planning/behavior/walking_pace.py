@@ -8,12 +8,11 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.detections import VULNERABLE
-from eidrive_scenario.driving.planning.behavior.maneuvers import LEAST_CLEARANCE
+from eidrive_scenario.driving.planning.behavior.maneuvers import LEAST_CLEARANCE, Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
-from eidrive_scenario.driving.planning.behavior.options import Options
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
+from eidrive_scenario.driving.planning.behavior.scoring import Options
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 

@@ -16,14 +16,12 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
-from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.congestion import DccGate
-from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
-from eidrive_scenario.v2x.radio.sidelink.pscch import ControlChannel, Pdu
+from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
-from eidrive_scenario.v2x.radio.sidelink.sensing import SensingHistory
+from eidrive_scenario.v2x.radio.sidelink.sensing import ControlChannel, Pdu, SensingHistory
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
-from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS
+from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 
 SUBCARRIERS = 12
 """Number of subcarriers of one resource block."""
@@ -188,18 +186,17 @@ class Sidelink(MediumAccess):
             earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
             occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
             in_time = occasion * SUBFRAME <= ready + settings.latency + TIME_TOLERANCE
-            if in_time and not self._is_released(grant, now, occasion):
+            # A resource that was not used for some time, or for some occasions, is released.
+            interval, limit = settings.interval_subframes, settings.reselect_after
+            used = grant.subframe - interval if grant.used is None else grant.used
+            is_released = (now - used) * SUBFRAME > UNUSED or (
+                limit is not None and (occasion - used) // interval - 1 >= limit
+            )
+            if in_time and not is_released:
                 return occasion
         earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
         self._grants[row] = grant = self._select(row, now, earliest, width, length)
         return grant.subframe
-
-    def _is_released(self, grant: Grant, now: int, occasion: int) -> bool:
-        """Return True if a resource is released because it was not used."""
-        used = grant.subframe - self._settings.interval_subframes if grant.used is None else grant.used
-        unused = (occasion - used) // self._settings.interval_subframes - 1
-        limit = self._settings.reselect_after
-        return (now - used) * SUBFRAME > UNUSED or (limit is not None and unused >= limit)
 
     def _select(self, row: int, now: int, earliest: int, width: int, length: int) -> Grant:
         """Select a new resource among the candidates after sensing, and draw its reselection counter."""
@@ -272,12 +269,10 @@ class Sidelink(MediumAccess):
             before = pdu.transmission.control
             pdu.transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
         codes[power < self.sensing_dbm] = PROPAGATION
-        self._note_reservations(due, codes, power - 10.0 * np.log10(SUBCARRIERS * blocks))
-
-    def _note_reservations(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
-        reserving = [place for place, pdu in enumerate(pdus) if pdu.transmission.reserves]
+        rsrp = power - 10.0 * np.log10(SUBCARRIERS * blocks)
+        reserving = [place for place, pdu in enumerate(due) if pdu.transmission.reserves]
         if reserving:
-            self._history.reserve([pdus[place] for place in reserving], codes[reserving], rsrp[reserving])
+            self._history.reserve([due[place] for place in reserving], codes[reserving], rsrp[reserving])
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period

@@ -9,9 +9,8 @@ from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
-from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS
+from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 
 INTERVALS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Resource reservation intervals [s]."""

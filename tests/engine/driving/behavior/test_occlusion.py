@@ -14,11 +14,11 @@ from eidrive_scenario.api.run import RunResult, RunSettings, run_file
 from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.occlusion import CREEP, HiddenTraffic, Occluders, PossibleTraffic
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.library import from_library
 

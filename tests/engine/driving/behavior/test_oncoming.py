@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
-from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, OncomingTraffic, first_oncoming, meets_oncoming
-from eidrive_scenario.driving.planning.behavior.proposals import inside_way
+from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, inside_way
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
+from eidrive_scenario.driving.planning.behavior.scoring import PAUSE, OncomingTraffic, first_oncoming, meets_oncoming
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
 UNKNOWN = math.inf

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 
-from eidrive_scenario.driving.planning.behavior.lateral import change_length, passing
+from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
 
 
 @pytest.mark.parametrize("y", [LANE, LANE - 1.0])
@@ -45,7 +45,7 @@ def test_standing_motorbike_is_passed() -> None:
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("start", "speed"), [(2.0, 0.0), (2.0, 10.0), (2.05, 10.0), (3.0, 5.0)])
 def test_vehicle_at_the_offset_beside_a_standing_obstacle_continues(side: int, start: float, speed: float) -> None:
-    profile = passing("pass", side * 2.0, (80.0, 120.0), 100.0, side * start, 0.0, speed, 2.0, side, stands=True)
+    profile = passing("pass", side * 2.0, (80.0, 120.0), Start(100.0, side * start, 0.0, speed), 2.0, side, stands=True)
     assert profile is not None
     assert side * profile.offset_at(100.0) == pytest.approx(start)
     inside = min(100.0 + change_length(2.0 - start, speed, 2.0), 120.0)
@@ -55,4 +55,4 @@ def test_vehicle_at_the_offset_beside_a_standing_obstacle_continues(side: int, s
 
 
 def test_vehicle_not_aside_of_a_near_obstacle_does_not_pass_it() -> None:
-    assert passing("pass", 2.0, (80.0, 120.0), 100.0, 1.5, 0.0, 5.0, 2.0, 1, stands=True) is None
+    assert passing("pass", 2.0, (80.0, 120.0), Start(100.0, 1.5, 0.0, 5.0), 2.0, 1, stands=True) is None

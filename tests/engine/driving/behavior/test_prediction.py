@@ -11,9 +11,9 @@ from planned_drive import KnownBox, detections
 from signal_street import stop_sign
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.behavior.lane_courses import Course
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion, stopping_motion
+from eidrive_scenario.driving.planning.behavior.right_of_way import Course
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.library import library_path
 from eidrive_scenario.roads import RoadNetwork

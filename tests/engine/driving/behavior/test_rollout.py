@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.bounds import Course, Limits
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall, speed_limits
-from eidrive_scenario.driving.planning.behavior.rollout import Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Option, Proposal, Wall, speed_limits
+from eidrive_scenario.driving.planning.behavior.rollout import Course, Limits, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -36,8 +35,9 @@ def roll(
     proposal: Proposal, speed: float, scene: Surroundings, walls: list[Wall] | None = None, wanted: float = 15.0
 ) -> Rollout:
     course = Course(ALONG, np.full(len(ALONG), 50.0), wanted)
-    leads = [np.ones((len(scene), len(TIMES)), dtype=bool)]
-    return Roller(SETTINGS, TIMES).roll([proposal], course, (0.0, speed), (FRONT, CENTER), scene, leads, [walls or []])
+    leads = np.ones((len(scene), len(TIMES)), dtype=bool)
+    option = Option(proposal, LateralProfile("route", (0.0,), (0.0,)), leads, walls or [], leads)
+    return Roller(SETTINGS, TIMES).roll([option], course, (0.0, speed), (FRONT, CENTER), scene)
 
 
 FREE = Proposal(0, 1.0, "all", SETTINGS.hard_deceleration)

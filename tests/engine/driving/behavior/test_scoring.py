@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal, inside_way
+from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Option, Proposal, inside_way
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -41,20 +40,11 @@ def risk(arrival: float, *, yields: bool) -> float:
     rolled = Rollout((SPEED * TIMES)[None], np.full((1, len(TIMES)), SPEED), np.full((1, 4), -1))
     route, body = LateralProfile("route", (0.0,), (0.0,)), Body(3.8, 1.0, 2.85, 0.9)
     scene = crossing_car(3.0 * SPEED, arrival, yields=yields)
-    found = evaluate(
-        [Proposal(0, 1.0, "all", 4.0)],
-        [route],
-        [inside_way(scene, route, body.half_width)],
-        rolled,
-        scene,
-        TIMES,
-        body,
-        SETTINGS,
-        SPEED,
-        frozenset({"route"}),
-        np.inf,
-    )
-    return float(found.risk[0])
+    way = inside_way(scene, route, body.half_width)
+    options = [Option(Proposal(0, 1.0, "all", 4.0), route, way, [], way)]
+    kept = frozenset({"route"})
+    evaluation = evaluate(options, rolled, scene, TIMES, body, SETTINGS, wanted=SPEED, kept=kept, hidden=np.inf)
+    return float(evaluation.risk[0])
 
 
 @pytest.mark.parametrize(

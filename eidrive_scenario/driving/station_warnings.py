@@ -1,0 +1,154 @@
+"""Warnings about stations: areas off the roads, delays shorter than the time step, driving stations at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from eidrive_scenario.driving.planner_settings import Polygon
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.geometry import point_in_polygon
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.v2x.profile import ChannelProfile
+from eidrive_scenario.world.view import WorldView
+
+MARGIN = 2.0
+"""Maximum distance from the outermost lane that counts as on the road [m], for bays and verges."""
+_CELLS = 12
+"""Number of sample cells along each side of an area."""
+
+
+def areas_off_road(
+    scenario: Scenario, settings: Mapping[str, AgentSettings], roads: RoadNetwork | None
+) -> Iterator[Diagnostic]:
+    """Yield a warning for each area of a planner of which no part is on a road."""
+    if roads is None:
+        return
+    for name, station in settings.items():
+        planner = station.planner_settings
+        setting = planner.area_setting or ""
+        for number, area in enumerate(planner.areas, 1):
+            gap = distance_to_road(area, roads)
+            if gap > MARGIN:
+                what = setting.replace("_", " ")
+                which = f"the {what}" if len(planner.areas) == 1 else f"{what} {number}"
+                source, line = _place(scenario, name, setting)
+                yield Diagnostic(
+                    f"{which} of {name!r} never holds a vehicle on a road: it lies {gap:.0f} m off the nearest one",
+                    "give world coordinates [m] in the frame of the road network: [x0, x1, y0, y1]",
+                    source,
+                    line,
+                )
+
+
+def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
+    """Return a lower bound of the distance between an area and the outermost lanes [m]; 0 if they may overlap."""
+    low = [min(point[axis] for point in area) for axis in (0, 1)]
+    step = [(max(point[axis] for point in area) - low[axis]) / _CELLS for axis in (0, 1)]
+    centers = [
+        (low[0] + (i + 0.5) * step[0], low[1] + (j + 0.5) * step[1]) for i in range(_CELLS) for j in range(_CELLS)
+    ]
+    points = [*area, *(center for center in centers if point_in_polygon(*center, area))]
+    reach = math.hypot(*step) / 2.0
+    x, y = np.array(points, dtype=float).T
+    nearest = float(roads.locate(x, y, reach=np.inf).outside.min())
+    return max(0.0, nearest - reach)
+
+
+def _place(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
+    """Return file and line of the property with the areas of a station."""
+    for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
+        for entry in property_entries(controller):
+            if entry.name in (setting, "planner_settings"):
+                return controller.source, entry.line
+        return controller.source, controller.line
+    return "", 0
+
+
+def short_channel_delay(
+    profile: ChannelProfile | None, dt: float, source: str = "", line: int | None = None
+) -> Iterator[Diagnostic]:
+    """Yield a warning if most messages of a channel are delayed by less than one step `dt` [s], but by more than 0.
+
+    A message without delay arrives in the next tick by definition of the channel, which is no warning.
+    """
+    delay: Any = getattr(profile, "delay", None)
+    if profile is None or not hasattr(delay, "quantile"):
+        return
+    median = float(delay.quantile(0.5))
+    if 0.0 < median < dt - TIME_TOLERANCE:
+        what = "the median delay" if delay.random else "the delay"
+        yield Diagnostic(
+            f"most messages take one step of {dt:g} s: {what} of the channel {profile.name!r} is only {median:.3g} s",
+            "use a smaller step (--dt) to resolve it",
+            source,
+            line,
+        )
+
+
+def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -> Iterator[Diagnostic]:
+    """Yield a warning for each station whose detector takes less than one step `dt` [s], but more than 0."""
+    for name, station in settings.items():
+        if 0.0 < station.detector_latency < dt - TIME_TOLERANCE:
+            yield Diagnostic(
+                f"detections of {name!r} are known one step of {dt:g} s later: "
+                f"its detector_latency is only {station.detector_latency:g} s",
+                "use a smaller step (--dt) to resolve it",
+            )
+
+
+LEAST = 1.0
+"""Minimum distance from the start that a driving station is expected to reach [m]."""
+PATIENCE = 2.0
+"""Minimum driving time before a warning [s]: most stations start from rest."""
+
+
+class MotionlessStations:
+    """Observer of driving stations until they are `LEAST` [m] away from their start.
+
+    `watching` is False if no station is left, which saves the call in each tick.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._starts: dict[str, tuple[float, float] | None] = dict.fromkeys(names)
+        self._reached: dict[str, float] = {}
+        self._since: dict[str, float] = {}
+        self.watching = bool(self._starts)
+
+    def observe(self, view: WorldView, drivers: Collection[str]) -> None:
+        """Process a view; `drivers` are the stations that drive in this tick."""
+        for name, start in list(self._starts.items()):
+            row = view.rows.get(name)
+            if row is None:
+                continue
+            x, y = float(view.position[row, 0]), float(view.position[row, 1])
+            if start is None:
+                self._starts[name] = start = (x, y)
+            if name in drivers:
+                self._since.setdefault(name, view.time)
+                self._reached[name] = max(self._reached.get(name, 0.0), math.hypot(x - start[0], y - start[1]))
+            elif name not in self._reached:
+                self._starts[name] = None  # The start of a scripted station is where it begins to drive
+            if self._reached.get(name, 0.0) >= LEAST:
+                del self._starts[name]
+                self.watching = bool(self._starts)
+
+    def warnings(self, scenario: Scenario, time: float) -> Iterator[Diagnostic]:
+        """Yield a warning for each driving station that did not move until the end of the run at `time` [s]."""
+        entities = scenario.document.entities
+        lines = {one.name: one.line for one in entities.scenario_object} if entities is not None else {}
+        for name in self._starts:
+            if name in self._reached and time - self._since[name] >= PATIENCE:
+                yield Diagnostic(
+                    f"station {name!r} covered only {self._reached[name]:.2f} m in {time:.2f} s",
+                    "check its target speed, its route and what it brakes for",
+                    str(scenario.path or ""),
+                    lines.get(name),
+                )

@@ -1,1 +1,0 @@
-"""ONNX models of the networks `yolov5` and `ssd`, made from their weights without torch."""

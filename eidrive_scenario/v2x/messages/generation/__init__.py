@@ -1,1 +1,0 @@
-"""Message generation rules and message contents."""

@@ -1,1 +1,0 @@
-"""Path loss, shadowing and fading."""
