@@ -11,9 +11,9 @@ from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNE
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import Controller
-from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
-from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import is_built_in, registry
 from eidrive_scenario.sensing.sensor import sensor_class

@@ -22,9 +22,8 @@ from eidrive_scenario.evaluation.scenario_runner_criteria import CLASSES, INEXPR
 from eidrive_scenario.files.yaml_sources import flow_yaml
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import CRITERION_PREFIX, criteria_of, property_entries
 from eidrive_scenario.openscenario.model import Condition, Vehicle
-from eidrive_scenario.openscenario.properties import property_entries
-from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX, criteria_of
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.values.references import parameter_hints, resolve_references
 from eidrive_scenario.registry import construct, registry

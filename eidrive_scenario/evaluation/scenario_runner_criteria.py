@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from eidrive_scenario.openscenario.conventions import CRITERION_PREFIX
 from eidrive_scenario.openscenario.model import Condition
-from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX
 
 
 class Translation(NamedTuple):

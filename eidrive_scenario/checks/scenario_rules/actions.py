@@ -28,7 +28,7 @@ from eidrive_scenario.openscenario.model import (
     TransitionDynamics,
     Vehicle,
 )
-from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
+from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES, has_times
 from eidrive_scenario.tolerances import EPSILON
 
 _DOMAINS: Mapping[type[Element], str] = {

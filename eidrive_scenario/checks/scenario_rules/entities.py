@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario.model import (
     SynchronizeAction,
     Vehicle,
 )
-from eidrive_scenario.openscenario.validation.scenario_objects import scenario_objects
+from eidrive_scenario.openscenario.validation.names import scenario_objects
 
 
 def _objects(context: LintContext) -> Iterator[ScenarioObject]:

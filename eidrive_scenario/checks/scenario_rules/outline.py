@@ -36,7 +36,7 @@ from eidrive_scenario.openscenario.reading.document import VERSIONS
 from eidrive_scenario.openscenario.reading.parsing import open_document
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.scenario import Scenario
-from eidrive_scenario.openscenario.validation.storyboard_names import LEVELS, ReferenceMatch
+from eidrive_scenario.openscenario.validation.names import LEVELS, ReferenceMatch
 
 WORD = re.compile(r"\w+")
 """Pattern of words that may be names of parameters, variables or entities in the text of a command."""

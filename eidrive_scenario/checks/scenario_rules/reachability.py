@@ -30,8 +30,8 @@ from eidrive_scenario.checks.scenario_rules.truth_intervals import (
     TruthIntervals,
     truth_intervals,
 )
+from eidrive_scenario.openscenario.conventions import without_criteria
 from eidrive_scenario.openscenario.model import Act, Condition, ConditionEdge, ConditionGroup, Storyboard, Trigger
-from eidrive_scenario.openscenario.scenario_runner import without_criteria
 
 
 @dataclass(frozen=True)

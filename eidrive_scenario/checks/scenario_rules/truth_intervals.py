@@ -9,8 +9,8 @@ from typing import Any
 from eidrive_scenario.checks.scenario_rules.intervals import ALWAYS, NEVER, Intervals, times_that_satisfy
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.conventions import is_criterion
 from eidrive_scenario.openscenario.model import Element, Rule
-from eidrive_scenario.openscenario.scenario_runner import is_criterion
 
 IMPOSSIBLE_CONDITION = "impossible-condition"
 IMPOSSIBLE_STATE = "impossible-state"

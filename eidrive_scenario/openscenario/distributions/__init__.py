@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING
 from eidrive_scenario.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from eidrive_scenario.openscenario.distributions.concrete_run import ConcreteRun
     from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, ListedValues
-    from eidrive_scenario.openscenario.distributions.expansion import DistributionExpansion, load_distribution
+    from eidrive_scenario.openscenario.distributions.expansion import (
+        ConcreteRun,
+        DistributionExpansion,
+        load_distribution,
+    )
     from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
             "deterministic": "CartesianProduct ListedValues",
-            "concrete_run": "ConcreteRun",
-            "expansion": "DistributionExpansion load_distribution",
+            "expansion": "ConcreteRun DistributionExpansion load_distribution",
             "stochastic": "StochasticSampler",
         },
     )

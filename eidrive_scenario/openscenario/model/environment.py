@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.declarations import CatalogReference, File, ParameterDeclarations, Properties
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.entities import BoundingBox
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     CloudState,
     FractionalCloudCover,
     PrecipitationType,
     Wetness,
 )
-from eidrive_scenario.openscenario.model.properties import File, Properties
 
 
 @element_type

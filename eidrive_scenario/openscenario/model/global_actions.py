@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, child, element_type, text, visible_parameters
+from eidrive_scenario.openscenario.model.declarations import EntityName, MonitorName, ParameterName, VariableName
+from eidrive_scenario.openscenario.model.element import (
+    ALL,
+    Choice,
+    Element,
+    child,
+    element_type,
+    text,
+    visible_parameters,
+)
 from eidrive_scenario.openscenario.model.environment import EnvironmentAction
 from eidrive_scenario.openscenario.model.positions import Position
-from eidrive_scenario.openscenario.model.scalars import EntityName, MonitorName, ParameterName, VariableName
 from eidrive_scenario.openscenario.model.signals import InfrastructureAction
 from eidrive_scenario.openscenario.model.traffic import TrafficAction
 

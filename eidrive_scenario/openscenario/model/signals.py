@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.declarations import SignalControllerName
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.enumerations import TrafficSignalSemantics
-from eidrive_scenario.openscenario.model.scalars import SignalControllerName
 
 
 @element_type

@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 from eidrive_scenario.errors import quoted, shortened, suggestion
-from eidrive_scenario.openscenario.budget import MAX_TEXT, Budget, BudgetError
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.diagnostics import MAX_TEXT, Budget, BudgetError, DiagnosticCollector
 from eidrive_scenario.openscenario.model import Element, ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
-from eidrive_scenario.openscenario.model.scalars import Limits
+from eidrive_scenario.openscenario.model.declarations import Limits
 from eidrive_scenario.openscenario.values import expressions
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError, Value
 from eidrive_scenario.openscenario.values.scalars import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
-from eidrive_scenario.openscenario.validation.storyboard_names import is_suffix
+from eidrive_scenario.openscenario.validation.names import is_suffix
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.condition_text import describe_history
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange

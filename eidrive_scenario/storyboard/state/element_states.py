@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch
+from eidrive_scenario.openscenario.validation.names import ReferenceMatch
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 
 NOT_STARTED = ElementState.STANDBY

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, RegistryError, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
-from eidrive_scenario.openscenario.scenario_runner import without_criteria
+from eidrive_scenario.openscenario.conventions import without_criteria
 from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition

@@ -23,7 +23,7 @@ from storyboard_xml import (
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch, is_suffix
+from eidrive_scenario.openscenario.validation.names import ReferenceMatch, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.storyboard.state.states import ElementState
 from eidrive_scenario.storyboard.tree.events import EventElement

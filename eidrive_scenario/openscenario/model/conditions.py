@@ -1,21 +1,31 @@
-"""Conditions on entities."""
+"""Conditions on entities and values, and triggers: AND within a group of conditions, OR between groups."""
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from datetime import datetime
+
+from eidrive_scenario.openscenario.model.declarations import (
+    EntityName,
+    ParameterName,
+    StoryboardElementName,
+    VariableName,
+)
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entities import ByObjectType, EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     AngleType,
+    ConditionEdge,
     CoordinateSystem,
     DirectionalDimension,
     RelativeDistanceType,
     RoutingAlgorithm,
     Rule,
+    StoryboardElementState,
+    StoryboardElementType,
     TriggeringEntitiesRule,
 )
 from eidrive_scenario.openscenario.model.positions import Position
-from eidrive_scenario.openscenario.model.scalars import EntityName
+from eidrive_scenario.openscenario.model.signals import TrafficSignalCondition, TrafficSignalControllerCondition
 
 
 @element_type
@@ -230,3 +240,94 @@ class ByEntityCondition(Element, content=ALL):
 
     triggering_entities: TriggeringEntities
     entity_condition: EntityCondition
+
+
+@element_type
+class ParameterCondition(Element):
+    """Condition on the value of a parameter."""
+
+    parameter_ref: ParameterName
+    rule: Rule
+    value: str
+
+
+@element_type
+class VariableCondition(Element):
+    """Condition on the value of a variable."""
+
+    variable_ref: VariableName
+    rule: Rule
+    value: str
+
+
+@element_type
+class TimeOfDayCondition(Element):
+    """Condition on the simulated date and time."""
+
+    date_time: datetime
+    rule: Rule
+
+
+@element_type
+class SimulationTimeCondition(Element):
+    """Condition on the time since the start of the run [s]."""
+
+    rule: Rule
+    value: float
+
+
+@element_type
+class StoryboardElementStateCondition(Element):
+    """Condition on a state or transition of a storyboard element."""
+
+    storyboard_element_ref: StoryboardElementName
+    state: StoryboardElementState
+    storyboard_element_type: StoryboardElementType
+
+
+@element_type
+class UserDefinedValueCondition(Element):
+    """Condition on a value from outside the engine."""
+
+    name: str
+    rule: Rule
+    value: str
+
+
+@element_type
+class ByValueCondition(Element, content=Choice(empty_until="1.2")):
+    """Choice of one condition on a value."""
+
+    parameter_condition: ParameterCondition | None = None
+    time_of_day_condition: TimeOfDayCondition | None = None
+    simulation_time_condition: SimulationTimeCondition | None = None
+    storyboard_element_state_condition: StoryboardElementStateCondition | None = None
+    user_defined_value_condition: UserDefinedValueCondition | None = None
+    traffic_signal_condition: TrafficSignalCondition | None = None
+    traffic_signal_controller_condition: TrafficSignalControllerCondition | None = None
+    variable_condition: VariableCondition | None = child(since="1.2")
+
+
+@element_type
+class Condition(Element, content=Choice(empty_until="1.2")):
+    """Condition with its edge and delay [s]."""
+
+    condition_edge: ConditionEdge
+    delay: float
+    name: str
+    by_entity_condition: ByEntityCondition | None = None
+    by_value_condition: ByValueCondition | None = None
+
+
+@element_type
+class ConditionGroup(Element):
+    """Conditions that must hold at the same time."""
+
+    condition: tuple[Condition, ...]
+
+
+@element_type
+class Trigger(Element):
+    """Trigger, which is fulfilled if one of its groups holds; without groups it never is."""
+
+    condition_group: tuple[ConditionGroup, ...] = ()

@@ -1,10 +1,30 @@
-"""Criteria of ScenarioRunner: ParameterConditions named `criteria_…` in the stop trigger of the storyboard."""
+"""Conventions beyond the standard: properties that configure objects and controllers, and criteria of ScenarioRunner.
+
+Criteria of ScenarioRunner are ParameterConditions named `criteria_…` in the stop trigger of the storyboard.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from eidrive_scenario.openscenario.model import Condition, ConditionGroup, Storyboard, Trigger
+from eidrive_scenario.openscenario.model.controllers import Controller
+from eidrive_scenario.openscenario.model.declarations import Property
+from eidrive_scenario.openscenario.model.entities import MiscObject, Pedestrian, Vehicle
+
+MODULE = "eidrive"
+"""Value of the property `module` of a controller of this project."""
+
+
+def property_entries(holder: Controller | MiscObject | Pedestrian | Vehicle) -> tuple[Property, ...]:
+    """Return the properties of an object or controller in the order of the file."""
+    return () if holder.properties is None else holder.properties.property
+
+
+def is_agent_controller(controller: Controller) -> bool:
+    """Return True if a controller has the property `module=eidrive`."""
+    return any(entry.name == "module" and entry.value == MODULE for entry in property_entries(controller))
+
 
 CRITERION_PREFIX = "criteria_"
 """Prefix of the name of a condition that is a criterion; the class of the criterion follows."""
