@@ -6,8 +6,8 @@ Scenarios stay in the process, so that each run of a sweep does not read the sam
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 
 import msgspec
 
@@ -16,7 +16,6 @@ from eidrive_scenario.files.bounded import read_regular_file
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.distributions import ConcreteRun
 from eidrive_scenario.openscenario.reading.parsing import KeptFiles, Source
 from eidrive_scenario.openscenario.scenario import Scenario, find_road_file, load_scenario
 from eidrive_scenario.openscenario.values.parameters import Assignment, as_assignments
@@ -72,6 +71,28 @@ def _is_current(scenario: Scenario, path: Path) -> bool:
         return False
     library = CatalogLibrary(scenario.document.catalog_locations, folder, {}, collector)
     return scenario.catalog_files is not None and scenario.catalog_files.are_current(library.folders)
+
+
+@dataclass(frozen=True)
+class ConcreteRun:
+    """Scenario with a value for each parameter that its distribution varies.
+
+    number       number of the run in the distribution, from 0
+    assignments  values by parameter, each with its line in the file; an argument of `load_scenario`
+    """
+
+    scenario: Path
+    number: int
+    assignments: Mapping[str, Assignment]
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """Return the values by parameter."""
+        return {name: assignment.text for name, assignment in self.assignments.items()}
+
+    def __str__(self) -> str:
+        """Format the values as `Speed=10,Model=car`; of a path only the last part is shown."""
+        return ",".join(f"{name}={PurePosixPath(text).name or text}" for name, text in self.parameters.items())
 
 
 def load_for_seed(

@@ -7,7 +7,6 @@ from eidrive_scenario.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, ListedValues
     from eidrive_scenario.openscenario.distributions.expansion import (
-        ConcreteRun,
         DistributionExpansion,
         load_distribution,
     )
@@ -17,14 +16,13 @@ else:
         __name__,
         {
             "deterministic": "CartesianProduct ListedValues",
-            "expansion": "ConcreteRun DistributionExpansion load_distribution",
+            "expansion": "DistributionExpansion load_distribution",
             "stochastic": "StochasticSampler",
         },
     )
 
 __all__ = [
     "CartesianProduct",
-    "ConcreteRun",
     "DistributionExpansion",
     "ListedValues",
     "StochasticSampler",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import overload
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
@@ -15,33 +14,10 @@ from eidrive_scenario.library import from_library, resolve_path
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
+from eidrive_scenario.openscenario.loading import ConcreteRun
 from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
 from eidrive_scenario.openscenario.reading.document import read_root
 from eidrive_scenario.openscenario.reading.parsing import Source, open_document
-from eidrive_scenario.openscenario.values.parameters import Assignment
-
-
-@dataclass(frozen=True)
-class ConcreteRun:
-    """Scenario with a value for each parameter that its distribution varies.
-
-    number       number of the run in the distribution, from 0
-    assignments  values by parameter, each with its line in the file; an argument of `load_scenario`
-    """
-
-    scenario: Path
-    number: int
-    assignments: Mapping[str, Assignment]
-
-    @property
-    def parameters(self) -> dict[str, str]:
-        """Return the values by parameter."""
-        return {name: assignment.text for name, assignment in self.assignments.items()}
-
-    def __str__(self) -> str:
-        """Format the values as `Speed=10,Model=car`; of a path only the last part is shown."""
-        return ",".join(f"{name}={PurePosixPath(text).name or text}" for name, text in self.parameters.items())
-
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
