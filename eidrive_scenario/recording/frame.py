@@ -8,7 +8,7 @@ import msgspec
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.step import AgentStep
-from eidrive_scenario.storyboard.state.states import StateChange
+from eidrive_scenario.storyboard.state.element_states import StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment

@@ -16,7 +16,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation.command_execution import RunState
 from eidrive_scenario.simulation.run import RunResult
-from eidrive_scenario.storyboard.state.external_inputs import user_value_warnings
+from eidrive_scenario.storyboard.state.commands import user_value_warnings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 from eidrive_scenario.tolerances import TIME_TOLERANCE

@@ -40,8 +40,7 @@ from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.simulation.spawn_checks import check_spawns
 from eidrive_scenario.simulation.spawn_warnings import spawn_warnings
 from eidrive_scenario.simulation.tick_start import TickStart, check_action
-from eidrive_scenario.storyboard.state.commands import Commands
-from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
+from eidrive_scenario.storyboard.state.commands import Commands, ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time, raise_if_limit_reached
 from eidrive_scenario.world import World

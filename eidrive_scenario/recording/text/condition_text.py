@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.storyboard.context.condition import EntityCondition
-from eidrive_scenario.storyboard.tree.trigger_history import ConditionHistory, TrueIntervals
+from eidrive_scenario.storyboard.tree.trigger import ConditionHistory, TrueIntervals
 
 _CHANGES = {"rising": "became true", "falling": "became false", "risingOrFalling": "changed"}
 

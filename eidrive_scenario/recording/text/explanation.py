@@ -8,12 +8,11 @@ from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.validation.names import is_suffix
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.condition_text import describe_history
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.tree.events import EventElement
-from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
-from eidrive_scenario.storyboard.tree.trigger_history import GroupHistory, TriggerHistory
+from eidrive_scenario.storyboard.tree.trigger import GroupHistory, TriggerHistory, WaitForTrigger
 
 STORYBOARD = "storyboard"
 _SHOWN = 5

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.run_log import describe_change, describe_kind
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 
 _STORYBOARD = "storyboard"
 _SHOWN = 5

@@ -12,7 +12,7 @@ from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.decisions import Decisions
 from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_expired, describe_link
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 from eidrive_scenario.v2x.messages.message import LinkEvent
 

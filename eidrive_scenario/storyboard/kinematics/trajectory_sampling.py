@@ -12,8 +12,15 @@ import numpy as np
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.kinematics.clothoids import MAX_POINTS, SPACING, Course, clothoid, clothoid_spline
-from eidrive_scenario.storyboard.kinematics.nurbs import Nurbs, along_the_curve
+from eidrive_scenario.storyboard.kinematics.curves import (
+    MAX_POINTS,
+    SPACING,
+    Course,
+    Nurbs,
+    along_the_curve,
+    clothoid,
+    clothoid_spline,
+)
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, blend, fill_gaps
 
 ROUNDING = 2.0

@@ -9,8 +9,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, Route
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.positions.orientations import oriented
-from eidrive_scenario.storyboard.positions.position_errors import position_error, road_origin, roads_of
+from eidrive_scenario.storyboard.positions.world_positions import oriented, position_error, road_origin, roads_of
 
 
 def road_position(frame: model.RoadPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:

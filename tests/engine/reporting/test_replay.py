@@ -20,7 +20,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.settings_text import short_number
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 
 Play = Callable[..., list[Frame]]
 
