@@ -33,7 +33,6 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
-
 STOPPED = "stop trigger"
 COMPLETE = "storyboard complete"
 

@@ -8,8 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral
-from eidrive_scenario.roads.model.fresnel import fresnel
+from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral, fresnel
 from eidrive_scenario.roads.model.polynomials import spread
 
 EPSILON = float(np.finfo(np.float64).eps)
