@@ -30,4 +30,4 @@ def test_lazy_export_is_stored_in_its_package(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.delitem(vars(package), "Sink", raising=False)
     value = lazy_exports(package.__name__, {"spawning.sinks": "Sink Other"})("Sink")
     assert vars(package)["Sink"] is value
-    assert value.__module__ == "eidrive_scenario.traffic.spawning.sinks"
+    assert value.__module__ == "eidrive_scenario.traffic.spawning.generators"

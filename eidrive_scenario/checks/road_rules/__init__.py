@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.checks.road_rules import paths, positions, stations
-from eidrive_scenario.checks.road_rules.context import RoadLintContext
-from eidrive_scenario.checks.road_rules.road_file import ROAD_FILE_RULES, RoadFileContext
+from eidrive_scenario.checks.road_rules import paths, positions
+from eidrive_scenario.checks.road_rules.context import ROAD_FILE_RULES, RoadFileContext, RoadLintContext
 from eidrive_scenario.checks.rule import Level, Rule
 
 ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (
@@ -20,7 +19,9 @@ ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (
     Rule("unknown-signal", Level.WARNING, "a traffic signal that no road has", positions.unknown_signals),
     Rule("trajectory-off-road", Level.WARNING, "a trajectory that leaves the road", paths.trajectories_off_road),
     Rule("waypoint-off-road", Level.WARNING, "a waypoint or a destination outside the road", paths.waypoints_off_road),
-    Rule("conflict-area-off-road", Level.WARNING, "a conflict area outside the road", stations.conflict_areas_off_road),
+    Rule(
+        "conflict-area-off-road", Level.WARNING, "a conflict area outside the road", positions.conflict_areas_off_road
+    ),
 )
 """Rules that need a scenario and its road network."""
 

@@ -1,4 +1,4 @@
-"""Rules about positions, lanes and signals that the road network does not contain."""
+"""Rules about positions, lanes, signals and conflict areas that the road network does not contain."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
 from eidrive_scenario.checks.rule import at
-from eidrive_scenario.errors import Diagnostic, suggestion
+from eidrive_scenario.driving.planning.area_checks import areas_off_road
+from eidrive_scenario.driving.station_declarations import declared_settings
+from eidrive_scenario.errors import Diagnostic, InputError, suggestion
 from eidrive_scenario.openscenario.model import (
     LaneChangeAction,
     LanePosition,
@@ -70,3 +72,12 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
         if name not in known and _ADDRESS not in name:
             hint = suggestion(name, known) if known else "the road file defines none"
             yield at(element, f"traffic signal {name!r} does not exist in the road network", hint)
+
+
+def conflict_areas_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
+    """Yield conflict areas without a part on a road; invalid settings are reported by the run setup."""
+    try:
+        settings = declared_settings(context.scenario, None, None)
+    except InputError:
+        return
+    yield from areas_off_road(context.scenario, settings, context.roads)

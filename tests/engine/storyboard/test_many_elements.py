@@ -20,8 +20,8 @@ from storyboard_xml import (
     trigger_xml,
 )
 
+from eidrive_scenario.checks.scenario_rules.context import ReachabilityAnalysis
 from eidrive_scenario.checks.scenario_rules.outline import Outline
-from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.openscenario.validation.names import ReferenceMatch, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
