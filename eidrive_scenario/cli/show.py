@@ -59,7 +59,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
 
         lines = _columns([(rule.name, rule.level.value, rule.summary) for rule in ALL_RULES])
     elif what is Names.criteria:
-        from eidrive_scenario.evaluation.criteria_list import describe_criteria
+        from eidrive_scenario.evaluation.criterion import describe_criteria
 
         lines = _columns([(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()])
     else:

@@ -8,7 +8,7 @@ from typing import Any
 
 from eidrive_scenario.driving.settings import NAME_PROPERTIES
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.files.yaml_sources import YamlContent, flow_yaml, read_yaml_source
+from eidrive_scenario.files.yaml_text import YamlContent, flow_yaml, read_yaml_source
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import MODULE, is_agent_controller
 from eidrive_scenario.openscenario.model import (

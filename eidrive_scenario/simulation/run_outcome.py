@@ -9,7 +9,7 @@ import msgspec
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
-from eidrive_scenario.evaluation.false_tracks import FalseTracks
+from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.exit_codes import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.frame import Frame

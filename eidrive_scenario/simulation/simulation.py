@@ -15,10 +15,10 @@ from eidrive_scenario.driving.stack import StackFactory
 from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
-from eidrive_scenario.evaluation.false_tracks import FalseTracks
+from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.final_state import FinalState
+from eidrive_scenario.recording.text.run_log import FinalState
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose

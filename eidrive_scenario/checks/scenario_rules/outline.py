@@ -12,7 +12,7 @@ from pathlib import Path
 from lxml import etree
 
 from eidrive_scenario.files.bounded import MIB, read_regular_file
-from eidrive_scenario.files.yaml_sources import is_inline
+from eidrive_scenario.files.yaml_text import is_inline
 from eidrive_scenario.openscenario.model import (
     Act,
     Action,

@@ -14,8 +14,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, set_stamp
 from eidrive_scenario.files.atomic import partial_path
-from eidrive_scenario.files.bounded import is_regular_file, read_regular_file
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import is_regular_file, load_json, read_regular_file
 from eidrive_scenario.recording.camera_images import camera_file
 from eidrive_scenario.recording.run_files import IMAGES
 

@@ -10,16 +10,14 @@ import numpy as np
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.export.foxglove.boxes import ActorScene, box_scene
 from eidrive_scenario.export.foxglove.cameras import (
     CameraImages,
     add_camera_transforms,
     calibration_message,
     image_message,
 )
-from eidrive_scenario.export.foxglove.log_messages import RunMessages
-from eidrive_scenario.export.foxglove.map_scene import link_scene, map_scene, plan_scene
-from eidrive_scenario.export.foxglove.metrics import actor_numbers, station_numbers
+from eidrive_scenario.export.foxglove.log_messages import RunMessages, actor_numbers, station_numbers
+from eidrive_scenario.export.foxglove.scene import ActorScene, box_scene, link_scene, map_scene, plan_scene
 from eidrive_scenario.export.foxglove.schemas import (
     WORLD,
     Color,

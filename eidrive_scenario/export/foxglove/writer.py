@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from eidrive_scenario.export.foxglove.metrics import ACTOR, STATION, json_schema
+from eidrive_scenario.export.foxglove.log_messages import ACTOR, STATION, json_schema
 from eidrive_scenario.export.foxglove.schemas import Foxglove
 from eidrive_scenario.export.foxglove.topics import Entry, Topics
 from eidrive_scenario.export.recorded_run import RecordedRun

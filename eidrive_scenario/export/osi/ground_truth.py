@@ -7,11 +7,9 @@ from types import MappingProxyType
 from typing import Any
 
 from eidrive_scenario.export.osi.environment import set_environment
-from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.lanes import LaneMap
+from eidrive_scenario.export.osi.lanes import LaneMap, TrafficLights
 from eidrive_scenario.export.osi.moving_objects import ACTOR, VEHICLES, add_moving_objects
-from eidrive_scenario.export.osi.schemas import Osi
-from eidrive_scenario.export.osi.traffic_lights import TrafficLights
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE

@@ -10,7 +10,7 @@ import msgspec
 from lxml import etree
 
 from eidrive_scenario.errors import quoted, suggestion
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Action,

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import msgspec
 from lxml import etree
 
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.values.scalars import Version
 

@@ -10,8 +10,7 @@ from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
-from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import XmlLimits, line_of, parse_untrusted
 from eidrive_scenario.roads.model.map_warnings import (
     JUNCTION_CONNECTION,
     LANE_LAYER,

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, suggestion
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.roads.model import curves
 from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
 from eidrive_scenario.roads.model.map_warnings import GEOMETRY_GAP
