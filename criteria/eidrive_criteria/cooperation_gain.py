@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.recalled import GROUPS, Group, RecalledCriterion, RecalledSettings
+from eidrive_criteria.perceived import GROUPS, Group, RecalledCriterion, RecalledSettings
 from eidrive_scenario.api.criteria import Verdict
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from eidrive_criteria.perceived import PerceivedSettings
-from eidrive_criteria.recalled import GROUPS, RecalledCriterion, RecalledSettings
+from eidrive_criteria.perceived import GROUPS, PerceivedSettings, RecalledCriterion, RecalledSettings
 from eidrive_scenario.api.criteria import Verdict
 
 

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from eidrive_criteria.pair import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings
 from eidrive_scenario.api.common import WorldView, overlap
 from eidrive_scenario.api.criteria import Continuity, Frame
 
