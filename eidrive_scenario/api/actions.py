@@ -46,8 +46,8 @@ from eidrive_scenario.storyboard.positions.distances import (
     resolve_distance_type,
     same_way,
 )
+from eidrive_scenario.storyboard.positions.position_types import count_lanes, facing
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position, trajectory_of
-from eidrive_scenario.storyboard.positions.road_positions import count_lanes, facing
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.state.element_states import (
     Domain,

@@ -1,4 +1,4 @@
-"""Checks of scenarios, catalogs, distributions and road files without a run."""
+"""Checks of scenarios, catalogs, distributions and road files without a run, by all rules of `eidrive check`."""
 
 from __future__ import annotations
 
@@ -6,14 +6,22 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from eidrive_scenario.checks.registry import check_rule_names, run_road_file_rules, run_rules
-from eidrive_scenario.checks.rule import CheckReport, Level
-from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError
+from eidrive_scenario.checks.road_rules import ROAD_FILE_RULES, ROAD_RULES, RoadFileContext, RoadLintContext
+from eidrive_scenario.checks.rule import CheckReport, Level, Rule, S
+from eidrive_scenario.checks.scenario_rules import RULES
+from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError, suggestion
 from eidrive_scenario.evaluation.criteria_parser import unsupported_criteria
-from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, Source, load_distribution, load_scenario
+from eidrive_scenario.openscenario import (
+    ConcreteRun,
+    DistributionExpansion,
+    Scenario,
+    Source,
+    load_distribution,
+    load_scenario,
+)
 from eidrive_scenario.openscenario.catalogs import duplicate_entries
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.distributions import CartesianProduct, ListedValues
+from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, ListedValues
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.reading.parsing import open_document
@@ -24,6 +32,52 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run_outcome import HOW_TO_JUDGE, UNJUDGED
+
+ALL_RULES: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES, *ROAD_FILE_RULES)
+"""All rules; each name, level and summary is defined once."""
+
+
+def run_rules(
+    scenario: Scenario, ignored: Collection[str] = (), added: Iterable[str | Path] = ()
+) -> Iterator[tuple[Level, Diagnostic]]:
+    """Yield the diagnostics of all rules except `ignored`; if the road file is invalid, only of rules without roads.
+
+    added  criteria and driving stacks of the run, YAML texts or files, which may refer to parameters
+
+    Raise SettingError if `ignored` has an unknown name.
+    """
+    check_rule_names(ignored)
+    rules = ALL_RULES
+    roads = None
+    try:
+        roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+    except InputError:
+        rules = RULES
+    yield from _run(rules, RoadLintContext(scenario, roads, tuple(added)), ignored)
+
+
+def run_road_file_rules(roads: RoadNetwork, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:
+    """Yield the diagnostics of the rules about road files, except `ignored`.
+
+    Raise SettingError if `ignored` has an unknown name.
+    """
+    check_rule_names(ignored)
+    yield from _run(ROAD_FILE_RULES, RoadFileContext(roads), ignored)
+
+
+def check_rule_names(ignored: Collection[str]) -> None:
+    """Raise SettingError if `ignored` has an unknown name."""
+    known = {rule.name for rule in ALL_RULES}
+    for name in ignored:
+        if name not in known:
+            raise SettingError(Diagnostic(f"unknown rule {name!r}", suggestion(name, known)))
+
+
+def _run(rules: Iterable[Rule[S]], context: S, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
+    for rule in rules:
+        if rule.name not in ignored:
+            for diagnostic in rule.run(context):
+                yield rule.level, diagnostic
 
 
 def check_scenario(source: Source, ignored: Collection[str] = (), settings: RunSettings | None = None) -> CheckReport:

@@ -14,11 +14,9 @@ from eidrive_scenario.openscenario.model.element import Enumeration as Enumerati
 from eidrive_scenario.openscenario.model.entities import *
 from eidrive_scenario.openscenario.model.entity_enumerations import *
 from eidrive_scenario.openscenario.model.enumerations import *
-from eidrive_scenario.openscenario.model.environment import *
 from eidrive_scenario.openscenario.model.global_actions import *
 from eidrive_scenario.openscenario.model.positions import *
 from eidrive_scenario.openscenario.model.private_actions import *
 from eidrive_scenario.openscenario.model.routing import *
-from eidrive_scenario.openscenario.model.signals import *
 from eidrive_scenario.openscenario.model.storyboard import *
 from eidrive_scenario.openscenario.model.traffic import *

@@ -24,8 +24,8 @@ from eidrive_scenario.openscenario.model.enumerations import (
     StoryboardElementType,
     TriggeringEntitiesRule,
 )
+from eidrive_scenario.openscenario.model.global_actions import TrafficSignalCondition, TrafficSignalControllerCondition
 from eidrive_scenario.openscenario.model.positions import Position
-from eidrive_scenario.openscenario.model.signals import TrafficSignalCondition, TrafficSignalControllerCondition
 
 
 @element_type

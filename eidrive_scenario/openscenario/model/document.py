@@ -27,14 +27,14 @@ from eidrive_scenario.openscenario.model.element import (
     text,
 )
 from eidrive_scenario.openscenario.model.entities import Entities
+from eidrive_scenario.openscenario.model.global_actions import TrafficSignals
 from eidrive_scenario.openscenario.model.positions import Position
-from eidrive_scenario.openscenario.model.signals import TrafficSignals
 from eidrive_scenario.openscenario.model.storyboard import Storyboard
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.controllers import Controller
     from eidrive_scenario.openscenario.model.entities import MiscObject, Pedestrian, Sensor, Vehicle
-    from eidrive_scenario.openscenario.model.environment import Environment
+    from eidrive_scenario.openscenario.model.global_actions import Environment
     from eidrive_scenario.openscenario.model.routing import Route, Trajectory
     from eidrive_scenario.openscenario.model.storyboard import Maneuver
     from eidrive_scenario.openscenario.model.traffic import TrafficDistributionEntry

@@ -23,8 +23,7 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 if TYPE_CHECKING:
-    from eidrive_scenario.traffic.background import BackgroundTraffic
-    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+    from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
 
 
 E = TypeVar("E", bound=model.Element)

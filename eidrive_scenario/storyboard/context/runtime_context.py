@@ -30,8 +30,7 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 if TYPE_CHECKING:
-    from eidrive_scenario.traffic.background import BackgroundTraffic
-    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+    from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
     from eidrive_scenario.traffic.spawning.population import CentralObject
 
 
@@ -151,7 +150,7 @@ class RuntimeContext:
         """Build the background traffic. Raise SimulationError without a road network."""
         if self.roads is None:
             raise SimulationError("background traffic: the scenario has no road network")
-        from eidrive_scenario.traffic.background import BackgroundTraffic
+        from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic
         from eidrive_scenario.traffic.spawning.population import Population
 
         population = Population(

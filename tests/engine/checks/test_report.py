@@ -8,9 +8,9 @@ import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml, successor_xml
 from openscenario_xml import catalog_xml, road_file_xml, scenario_xml
 
-from eidrive_scenario.checks.registry import ALL_RULES
 from eidrive_scenario.checks.rule import CheckReport, Level
 from eidrive_scenario.checks.scenario_checks import (
+    ALL_RULES,
     DistributionCheckReport,
     check_catalog,
     check_road_file,

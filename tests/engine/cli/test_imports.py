@@ -17,7 +17,7 @@ HEAVY = (
 SHORT = (*HEAVY, "msgspec", "numpy", "py_trees", "pybullet", "rich", "simpleeval", "yaml")
 UNUSED = (
     "eidrive_scenario.experiments.judgement", "eidrive_scenario.openscenario.distributions.expansion",
-    "eidrive_scenario.recording.recording", "eidrive_scenario.traffic.background",
+    "eidrive_scenario.recording.recording", "eidrive_scenario.traffic.spawning.generators",
     "eidrive_scenario.world.render.renderer", "eidrive_scenario.world.scene.visuals",
 )  # fmt: skip
 """Modules for other runs: of distributions, with recording, background traffic or cameras."""
