@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,8 @@ from eidrive_scenario.api.criteria import (
     Verdict,
     actor_never_present,
 )
+
+TwoActors = TypeVar("TwoActors", bound=CriterionSettings)
 
 
 class BoundedSettings(CriterionSettings):
@@ -51,6 +53,14 @@ class BoundedSettings(CriterionSettings):
         if self.at_least is None or (value is not None and self.is_above(value)):
             return self.at_most
         return self.at_least
+
+
+def require_two_actors(settings: TwoActors) -> TwoActors:
+    """Return settings whose actors `of` and `to` differ (a validator of pydantic). Raise ValueError if they are equal."""
+    of, to = getattr(settings, "of", None), getattr(settings, "to", None)
+    if of == to:
+        raise ValueError(f"'of' and 'to' are equal (got {of!r}; expected two actors)")
+    return settings
 
 
 class Extreme:

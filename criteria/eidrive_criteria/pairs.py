@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import Extreme, conclude_extreme
+from eidrive_criteria.folds import Extreme, conclude_extreme, require_two_actors
 from eidrive_scenario.api.common import RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import (
     Criterion,
@@ -29,11 +29,7 @@ class PairSettings(CriterionSettings):
     to: str
     at_least: Annotated[float, Field(ge=0)] | None = None
 
-    @model_validator(mode="after")
-    def _two_actors(self) -> Self:
-        if self.of == self.to:
-            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
-        return self
+    _two_actors = model_validator(mode="after")(require_two_actors)
 
 
 class PairCriterion(Criterion):
@@ -100,11 +96,7 @@ class LeaderSettings(CriterionSettings):
     of: str
     to: str | None = None
 
-    @model_validator(mode="after")
-    def _two_actors(self) -> Self:
-        if self.of == self.to:
-            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
-        return self
+    _two_actors = model_validator(mode="after")(require_two_actors)
 
 
 class LeaderCriterion(Criterion):

@@ -17,6 +17,7 @@ from eidrive_scenario.api.criteria import (
     Frame,
     LinesOfSight,
     Source,
+    Verdict,
     actor_never_present,
     known_actors,
 )
@@ -145,10 +146,30 @@ class RecalledCriterion(PerceivedCriterion):
         """Return the share of the objects of a group that the station knows; None without such objects."""
         return self._known[source][group] / self.total[group] if self.total[group] else None
 
-    def no_objects(self) -> str:
-        """Return the reason of a verdict without objects in the evaluated group."""
-        what = GROUPS[self._recalled.objects].removeprefix("all ")
-        return f"there were no {what} within {self._recalled.range:g} m of {self.of}"
+    @abstractmethod
+    def value_of(self, group: Group) -> float | None:
+        """Return the value of the criterion for a group of objects; None without such objects."""
+
+    @abstractmethod
+    def describe(self, objects: str) -> str:
+        """Describe the value for the evaluated objects."""
+
+    def verdict(self) -> Verdict:
+        settings, value = self._recalled, self.value_of(self._recalled.objects)
+        group, reach = GROUPS[settings.objects], f"within {settings.range:g} m"
+        if not self.perceives:
+            reason = self.no_perception()
+        elif value is None:
+            reason = f"there were no {group.removeprefix('all ')} {reach} of {self.of}"
+        else:
+            reason = self.describe(f"{group} {reach}")
+        passed = self.perceives and (value is None or settings.allows(value))
+        return self.conclude(passed, reason, value=value, limit=settings.limit_of(value))
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the value for each group that had objects."""
+        values = {group: self.value_of(group) for group in GROUPS}
+        return {f"{self.name}.{self.of}.{group}": value for group, value in values.items() if value is not None}
 
     def _groups(self, frame: Frame) -> dict[Group, set[str]]:
         """Return the names of the true objects in range, by group."""

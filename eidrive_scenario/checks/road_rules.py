@@ -44,7 +44,7 @@ from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traf
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.storyboard.storyboard import empty_view
 
 
 class RoadLintContext(LintContext):
@@ -53,7 +53,7 @@ class RoadLintContext(LintContext):
     def __init__(self, scenario: Scenario, roads: RoadNetwork | None, added: tuple[str | Path, ...] = ()) -> None:
         super().__init__(scenario, added)
         self.roads = roads
-        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=_empty_view())
+        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=empty_view())
 
     def place(self, position: Position) -> ResolvedPosition | None:
         """Return the resolved position; None if it depends on an entity. Raise InputError if it does not exist."""
@@ -82,11 +82,6 @@ class RoadLintContext(LintContext):
         assert self.roads is not None
         distances: list[float] = self.roads.locate(x, y, reach=np.inf).outside.tolist()
         return distances
-
-
-def _empty_view() -> WorldView:
-    none, points = np.empty(0), np.empty((0, 3))
-    return WorldView(0.0, -1, (), (), points, none, none, none, points, points, none, none, points, points)
 
 
 class HasRoads(Protocol):

@@ -55,7 +55,7 @@ def check_road_map(
             yield from _broken(road, after, -1, before.lanes, f"the lane section before (s = {before.s:g} m)")
         for link, side in ((road.predecessor, -1), (road.successor, 1)):
             yield from _end(roads, road, link, side)
-        yield from _dead_ends(road, links)
+        yield from (warning for _, _, warning in _dead_lanes(road, links))
     yield from _gaps(roads, links)
     for junction in junctions.values():
         for connection in junction.connections:
@@ -216,11 +216,6 @@ def _lanes_away(road: Road, section: int, direction: int) -> Iterator[LaneKey]:
     if road.sections:
         chosen = road.sections[section]
         yield from (LaneKey(road.id, chosen.index, n) for n in chosen.lanes if n and road.directions[n] == direction)
-
-
-def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
-    """Yield warnings of lanes without a successor although their road continues."""
-    return (warning for _, _, warning in _dead_lanes(road, links))
 
 
 def _dead_lanes(road: Road, links: LaneLinks) -> Iterator[tuple[LaneKey, RoadLink | None, MapWarning]]:

@@ -97,7 +97,7 @@ class Storyboard:
     ) -> None:
         self.scenario = scenario
         self.dt = dt
-        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=_empty_view())
+        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=empty_view())
         builder = Builder(scenario, self.context, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
         self.extensions = frozenset(builder.extensions)
@@ -238,7 +238,8 @@ def _check_placements(placements: Mapping[str, Placement]) -> None:
             raise SimulationError(f"actor {name!r}: invalid placement (got {placement}; expected finite numbers)")
 
 
-def _empty_view() -> WorldView:
+def empty_view() -> WorldView:
+    """Return a view without actors, before the first tick."""
     none = np.empty(0)
     points = np.empty((0, 3))
     return WorldView(

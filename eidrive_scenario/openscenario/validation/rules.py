@@ -295,14 +295,6 @@ def _nurbs(curve: Nurbs) -> str:
     return _descending_times([point.time for point in curve.control_point])
 
 
-def _polyline(line: Polyline) -> str:
-    return _descending_times([vertex.time for vertex in line.vertex or ()])
-
-
-def _clothoid(curve: Clothoid) -> str:
-    return _descending_times([curve.start_time, curve.stop_time])
-
-
 def _clothoid_spline(curve: ClothoidSpline) -> str:
     return _descending_times([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
 
@@ -314,19 +306,12 @@ def _descending_times(times: Sequence[float | None]) -> str:
     return ""
 
 
-def _delay(condition: Condition) -> str:
-    return "Condition has a negative delay" if condition.delay is not None and condition.delay < 0 else ""
-
-
 def _transition(dynamics: TransitionDynamics) -> str:
     """Return the error of a negative duration or distance; the sign of a rate has no effect."""
     if dynamics.value is None or dynamics.value >= 0 or dynamics.dynamics_dimension is DynamicsDimension.RATE:
         return ""
-    return f"a transition cannot take {dynamics.value:g} {'s' if _takes_time(dynamics) else 'm'}"
-
-
-def _takes_time(dynamics: TransitionDynamics) -> bool:
-    return dynamics.dynamics_dimension is DynamicsDimension.TIME
+    unit = "s" if dynamics.dynamics_dimension is DynamicsDimension.TIME else "m"
+    return f"a transition cannot take {dynamics.value:g} {unit}"
 
 
 def _timing(timing: Timing) -> str:
@@ -336,13 +321,13 @@ def _timing(timing: Timing) -> str:
 
 _CHECKS: Mapping[type[Element], Callable[[Any], str]] = {
     AbsoluteTargetLane: _layer,
-    Clothoid: _clothoid,
+    Clothoid: lambda curve: _descending_times([curve.start_time, curve.stop_time]),
     ClothoidSpline: _clothoid_spline,
-    Condition: _delay,
+    Condition: lambda one: "Condition has a negative delay" if one.delay is not None and one.delay < 0 else "",
     LanePosition: _layer,
     LongitudinalDistanceAction: _distance,
     Nurbs: _nurbs,
-    Polyline: _polyline,
+    Polyline: lambda line: _descending_times([vertex.time for vertex in line.vertex or ()]),
     PreferredLaneLayerAction: _layer,
     RelativeLanePosition: _lane_position,
     RelativeTargetLane: _layer,

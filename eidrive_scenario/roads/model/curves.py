@@ -190,15 +190,6 @@ class Cubic(Curve):
     v: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     pace: float = 1.0
 
-    def bend(self, ds: float) -> tuple[float, float]:
-        p = ds * self.pace
-        _, u1, u2, u3 = self.u
-        _, v1, v2, v3 = self.v
-        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
-        ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
-        norm = math.hypot(du, dv)
-        return (du * ddv - dv * ddu) / norm**3 if norm > STANDSTILL else 0.0, norm * self.pace
-
     def at(self, ds: float) -> CurvePoint:
         p = ds * self.pace
         u0, u1, u2, u3 = self.u
