@@ -56,7 +56,7 @@ class BoundedSettings(CriterionSettings):
 
 
 def require_two_actors(settings: TwoActors) -> TwoActors:
-    """Return settings whose actors `of` and `to` differ (a validator of pydantic). Raise ValueError if they are equal."""
+    """Return settings whose actors `of` and `to` differ. It is a validator of pydantic: it raises ValueError."""
     of, to = getattr(settings, "of", None), getattr(settings, "to", None)
     if of == to:
         raise ValueError(f"'of' and 'to' are equal (got {of!r}; expected two actors)")

@@ -13,9 +13,9 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
@@ -29,7 +29,8 @@ from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 
-class Translation(NamedTuple):
+@dataclass(frozen=True)
+class Translation:
     """Criterion for a class of ScenarioRunner.
 
     fixed      settings that agree with ScenarioRunner
@@ -37,8 +38,8 @@ class Translation(NamedTuple):
     """
 
     kind: str
-    fixed: Mapping[str, Any] = {}
-    arguments: Mapping[str, str] = {}
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    arguments: Mapping[str, str] = field(default_factory=dict)
 
 
 CLASSES: Mapping[str, Translation] = {

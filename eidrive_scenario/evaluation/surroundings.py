@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,8 @@ SPACING = 1.0
 """Distance of the sample points of a lane along the reference line [m]."""
 
 
-class RoadOfChain(NamedTuple):
+@dataclass(frozen=True)
+class RoadOfChain:
     """Road of a chain of lanes.
 
     start      distance of its start from that of the first road, along the reference lines [m]
@@ -36,7 +38,8 @@ class RoadOfChain(NamedTuple):
         return self.start + (s if self.direction > 0 else self.length - s)
 
 
-class LaneChain(NamedTuple):
+@dataclass(frozen=True)
+class LaneChain:
     """Lanes ahead up to a fork, from the start of the first road on.
 
     roads      roads by number, in order

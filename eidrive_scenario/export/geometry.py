@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -64,7 +64,8 @@ Line = list[list[float]]
 """Points x, y, z [m]."""
 
 
-class LaneEdge(NamedTuple):
+@dataclass(frozen=True)
+class LaneEdge:
     """Outer edge of a lane with one road mark, from one s to another [m]; types are those of OSI lane boundaries."""
 
     start: float

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lateral_axis
@@ -268,7 +268,8 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
             yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", message, "make their ends meet", lane.line)
 
 
-class EndCrossSection(NamedTuple):
+@dataclass(frozen=True)
+class EndCrossSection:
     """Cross section at an end of a road: point of the reference line [m], change of x and y per meter of t, and lane
     offset [m].
     """

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +77,8 @@ class SurfaceMesh:
         return KINDS[self.kind]
 
 
-class _Part(NamedTuple):
+@dataclass(frozen=True)
+class _Part:
     kind: str
     vertices: Array
     faces: Integers
@@ -271,7 +271,8 @@ CURVED = 0.01
 """Minimum curvature at which a dash is drawn bent [1/m]."""
 
 
-class Strip(NamedTuple):
+@dataclass(frozen=True)
+class Strip:
     """Paint along a road: `s` and `t` (K, P) of K pieces with P points each, and `width` [m]."""
 
     kind: str

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -25,7 +26,8 @@ _LARGEST_DESCRIPTION = 2**16
 """Maximum size of the description of a camera [bytes]."""
 
 
-class Camera(NamedTuple):
+@dataclass(frozen=True)
+class Camera:
     """Camera of a station: image size and intrinsics [px], distortion, and pose (4, 4) camera to station."""
 
     station: str
@@ -37,7 +39,8 @@ class Camera(NamedTuple):
     pose: Array
 
 
-class Picture(NamedTuple):
+@dataclass(frozen=True)
+class Picture:
     """Image file of a camera."""
 
     station: str

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -47,7 +48,8 @@ _RECEIVED: Color = (0.95, 0.6, 0.15, 0.35)
 _FUSED: Color = (0.6, 0.9, 0.3, 0.35)
 
 
-class Entry(NamedTuple):
+@dataclass(frozen=True)
+class Entry:
     """Message on a topic: of protobuf, or the text of a JSON object."""
 
     topic: str

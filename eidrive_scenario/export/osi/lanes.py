@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -125,7 +126,8 @@ class LaneMap:
         return self._ids.of("lane", road.id, section.index, number)
 
 
-class _Ways(NamedTuple):
+@dataclass(frozen=True)
+class _Ways:
     """Lanes after and before each lane in driving direction."""
 
     after: Mapping[LaneKey, list[LaneKey]]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 
 
-class _Origin(NamedTuple):
+@dataclass(frozen=True)
+class _Origin:
     """Vehicle frame of a station: position (3,) [m], rotation (3, 3), velocity (3,) [m/s], yaw rate [rad/s]."""
 
     position: Array

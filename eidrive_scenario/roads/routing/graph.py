@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -56,7 +57,8 @@ class RouteError(InputError):
     """No route over the lanes from one location to another exists."""
 
 
-class LaneWays(NamedTuple):
+@dataclass(frozen=True)
+class LaneWays:
     """Lanes and the edges between them as dictionaries, for the search of routes.
 
     nodes       `length` of each lane [m], its `end` (x, y) and `drivable`

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model.road_map import Connection, Contact, Junction, LaneSection, Road, RoadLink, RoadMap
@@ -17,14 +17,16 @@ FAR = 200
 """Maximum number of lanes in the search for the continuation of a lane."""
 
 
-class LaneEnd(NamedTuple):
+@dataclass(frozen=True)
+class LaneEnd:
     """End of a lane of a lane section; side +1 is its end in s, -1 its start."""
 
     lane: LaneKey
     side: int
 
 
-class RoadEnd(NamedTuple):
+@dataclass(frozen=True)
+class RoadEnd:
     """End of a road; side +1 is its end in s, -1 its start."""
 
     road: str

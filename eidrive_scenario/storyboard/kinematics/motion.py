@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
@@ -300,7 +301,8 @@ MIN_LANE_CHANGE_LENGTH = 1.0
 """Minimum length of a lane change [m]."""
 
 
-class LaneChange(NamedTuple):
+@dataclass(frozen=True)
+class LaneChange:
     """Lane change within one lane section.
 
     s       start [m]

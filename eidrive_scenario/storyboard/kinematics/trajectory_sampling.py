@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -225,7 +225,8 @@ def _curve_of(course: Course, closed: bool) -> TrajectoryCurve:
     return TrajectoryCurve(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
 
 
-class PolylineVertex(NamedTuple):
+@dataclass(frozen=True)
+class PolylineVertex:
     """Vertex of a polyline: pose, and the heading and pitch that the file specifies [rad]; None without one.
 
     `is_oriented` is true if the file specifies any angle.

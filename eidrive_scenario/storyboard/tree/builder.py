@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -121,7 +121,8 @@ WRAPPERS = (
 ElementPath = tuple[str, ...]
 
 
-class ActorBindings(NamedTuple):
+@dataclass(frozen=True)
+class ActorBindings:
     """Actors of a maneuver group, its entity selections, and the triggering entities of its act."""
 
     actors: Sequence[str]
