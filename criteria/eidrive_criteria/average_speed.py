@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from eidrive_criteria.bounds import BoundedSettings
+from eidrive_criteria.folds import BoundedSettings
 from eidrive_scenario.api.criteria import Criterion, Frame, Verdict, actor_never_present
 
 

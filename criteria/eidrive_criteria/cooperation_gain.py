@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.recalled import GROUPS, Group, RecalledCriterion, RecalledSettings
-from eidrive_scenario.api.criteria import Verdict
+from eidrive_criteria.perceived import Group, RecalledCriterion, RecalledSettings
 
 
 class CooperationGainSettings(RecalledSettings):
@@ -31,28 +29,10 @@ class CooperationGain(RecalledCriterion):
         super().__init__(settings)
         self._settings = settings
 
-    def _gain(self, group: Group) -> float | None:
+    def value_of(self, group: Group) -> float | None:
         fused, own = self.recall("fused", group), self.recall("own", group)
         return None if fused is None or own is None else fused - own
 
-    def verdict(self) -> Verdict:
-        settings, group = self._settings, self._settings.objects
-        value, fused, own = self._gain(group), self.recall("fused", group), self.recall("own", group)
-        if not self.perceives:
-            reason = self.no_perception()
-        elif fused is None or own is None:
-            reason = self.no_objects()
-        else:
-            of = f"{GROUPS[group]} within {settings.range:g} m"
-            reason = f"{self.of} knew {100 * fused:.1f} % of {of}, with its own sensors {100 * own:.1f} %"
-        return self.conclude(
-            self.perceives and (value is None or settings.allows(value)),
-            reason,
-            value=value,
-            limit=settings.limit_of(value),
-        )
-
-    def metrics(self) -> Mapping[str, float]:
-        """Return the gain of each group that had objects."""
-        gains = {group: self._gain(group) for group in GROUPS}
-        return {f"{self.name}.{self.of}.{group}": value for group, value in gains.items() if value is not None}
+    def describe(self, objects: str) -> str:
+        fused, own = (100 * (self.recall(source, self._settings.objects) or 0.0) for source in ("fused", "own"))
+        return f"{self.of} knew {fused:.1f} % of {objects}, with its own sensors {own:.1f} %"

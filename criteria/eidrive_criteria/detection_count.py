@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from eidrive_criteria.bounds import BoundedSettings
+from eidrive_criteria.folds import BoundedSettings
 from eidrive_criteria.perceived import VEHICLES, ActorClass, PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Frame, Verdict

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from eidrive_criteria.perceived import PerceivedSettings
-from eidrive_criteria.recalled import GROUPS, RecalledCriterion, RecalledSettings
-from eidrive_scenario.api.criteria import Verdict
+from eidrive_criteria.perceived import Group, PerceivedSettings, RecalledCriterion, RecalledSettings
 
 
 class DetectionRecallSettings(RecalledSettings, PerceivedSettings):
@@ -23,24 +19,9 @@ class DetectionRecall(RecalledCriterion):
         super().__init__(settings)
         self._settings = settings
 
-    def verdict(self) -> Verdict:
-        settings = self._settings
-        value = self.recall(settings.source, settings.objects)
-        if not self.perceives:
-            reason = self.no_perception()
-        elif value is None:
-            reason = self.no_objects()
-        else:
-            of = f"{GROUPS[settings.objects]} within {settings.range:g} m"
-            reason = f"{self.of} knew {100 * value:.1f} % of {of} ({settings.source} objects)"
-        return self.conclude(
-            self.perceives and (value is None or settings.allows(value)),
-            reason,
-            value=value,
-            limit=settings.limit_of(value),
-        )
+    def value_of(self, group: Group) -> float | None:
+        return self.recall(self._settings.source, group)
 
-    def metrics(self) -> Mapping[str, float]:
-        """Return the recall of each group that had objects."""
-        recalls = {group: self.recall(self._settings.source, group) for group in GROUPS}
-        return {f"{self.name}.{self.of}.{group}": value for group, value in recalls.items() if value is not None}
+    def describe(self, objects: str) -> str:
+        share = self.value_of(self._settings.objects) or 0.0
+        return f"{self.of} knew {100 * share:.1f} % of {objects} ({self._settings.source} objects)"

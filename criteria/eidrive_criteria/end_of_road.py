@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.summed import SummedCriterion, SummedSettings
+from eidrive_criteria.folds import SummedCriterion, SummedSettings
 from eidrive_scenario.api.common import WorldView
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from eidrive_criteria.folds import require_two_actors
 from eidrive_criteria.perceived import PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Frame, Verdict, actor_never_present
@@ -19,11 +20,7 @@ class FirstDetectionSettings(PerceivedSettings):
     to: str
     by: Annotated[float, Field(ge=0)] | None = None
 
-    @model_validator(mode="after")
-    def _two_actors(self) -> Self:
-        if self.of == self.to:
-            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
-        return self
+    _two_actors = model_validator(mode="after")(require_two_actors)
 
 
 class FirstDetection(PerceivedCriterion):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.extreme import Extreme
+from eidrive_criteria.folds import Extreme
 from eidrive_criteria.routed import RouteCriterion, RouteSettings
 from eidrive_scenario.api.criteria import Place, Verdict
 

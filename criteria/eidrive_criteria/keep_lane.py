@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_criteria.summed import SummedCriterion, SummedSettings
+from eidrive_criteria.folds import SummedCriterion, SummedSettings
 from eidrive_scenario.api.common import LaneLocation, WorldView
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.extreme import Extreme, conclude_extreme
+from eidrive_criteria.folds import Extreme, conclude_extreme
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from eidrive_criteria.pair import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings
 from eidrive_scenario.api.common import WorldView, box_distance
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.followed import FollowedCriterion
+from eidrive_criteria.folds import FollowedCriterion
 from eidrive_criteria.off_road import ALLOWED
 from eidrive_criteria.wrong_lane import STILL, drives_against_lane
 from eidrive_scenario.api.common import RoadNetwork, WorldView

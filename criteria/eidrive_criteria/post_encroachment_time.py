@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from eidrive_criteria.pair import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings
 from eidrive_scenario.api.common import WorldView, overlap
 from eidrive_scenario.api.criteria import Continuity, Frame
 
@@ -23,7 +23,8 @@ class PostEncroachmentTimeSettings(PairSettings):
     """Settings: `{of: Ego, to: Crossing, at_least: 1.5}` [s]. Without `at_least` it only measures and passes."""
 
 
-class Trace(NamedTuple):
+@dataclass(frozen=True)
+class Trace:
     """Body of an actor in a frame; `moved` is False if it was absent or elsewhere in the frame before."""
 
     time: float

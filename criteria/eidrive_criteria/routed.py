@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.followed import FollowedCriterion
+from eidrive_criteria.folds import FollowedCriterion
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import (
     CriterionSettings,

@@ -8,6 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from eidrive_criteria.folds import require_two_actors
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import (
     Criterion,
@@ -46,10 +47,10 @@ class RssViolationSettings(CriterionSettings):
     lateral_braking: Positive = 0.8
     lateral_margin: Annotated[float, Field(ge=0)] = 0.1
 
+    _two_actors = model_validator(mode="after")(require_two_actors)
+
     @model_validator(mode="after")
-    def _valid(self) -> Self:
-        if self.of == self.to:
-            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
+    def _braking(self) -> Self:
         if self.max_braking < self.min_braking:
             raise ValueError(f"'max_braking' is less than 'min_braking' (got {self.max_braking} < {self.min_braking})")
         return self

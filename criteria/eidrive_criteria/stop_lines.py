@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
-from eidrive_criteria.followed import FollowedCriterion
+from eidrive_criteria.folds import FollowedCriterion
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import (
     CriterionSettings,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.leading import LeaderCriterion, LeaderSettings
+from eidrive_criteria.pairs import LeaderCriterion, LeaderSettings
 from eidrive_scenario.api.common import EPSILON
 from eidrive_scenario.api.criteria import Relation
 

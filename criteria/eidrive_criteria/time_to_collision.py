@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from eidrive_criteria.accelerated_contact import accelerated_contact, course
-from eidrive_criteria.pair import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings
 from eidrive_scenario.api.common import WorldView
 from eidrive_scenario.api.criteria import time_to_contact
 

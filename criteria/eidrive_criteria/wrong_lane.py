@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_criteria.summed import SummedCriterion, SummedSettings
+from eidrive_criteria.folds import SummedCriterion, SummedSettings
 from eidrive_scenario.api.common import WorldView
 from eidrive_scenario.api.criteria import LaneTracker
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from eidrive_criteria.folds import require_two_actors
 from eidrive_scenario.api.common import TIME_TOLERANCE, RoadNetwork
 from eidrive_scenario.api.criteria import (
     Criterion,
@@ -30,11 +31,7 @@ class YieldToEmergencyVehicleSettings(CriterionSettings):
     within: Annotated[float, Field(gt=0, le=200)] = 50.0
     at_most: Annotated[float, Field(gt=0)] | None = None
 
-    @model_validator(mode="after")
-    def _two_actors(self) -> Self:
-        if self.of == self.to:
-            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
-        return self
+    _two_actors = model_validator(mode="after")(require_two_actors)
 
 
 class YieldToEmergencyVehicle(Criterion):

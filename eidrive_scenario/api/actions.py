@@ -6,8 +6,8 @@ Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, th
 
 from eidrive_scenario import traffic
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
-from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
+from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
+from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES, has_times
 from eidrive_scenario.requests import LONGEST_WAY, Goal, Override
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import (
@@ -29,26 +29,35 @@ from eidrive_scenario.storyboard.context.protocols import (
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep, Motion
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.random_routes import random_route, uniform_branch_selector
-from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic
+from eidrive_scenario.storyboard.kinematics.route import (
+    build_route,
+    faces_traffic,
+    random_route,
+    uniform_branch_selector,
+)
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile
 from eidrive_scenario.storyboard.positions.distances import (
     closing_speed,
     distance,
+    entity_box,
     resolve_coordinate_system,
     resolve_distance_type,
     same_way,
 )
-from eidrive_scenario.storyboard.positions.free_space import entity_box
+from eidrive_scenario.storyboard.positions.position_types import count_lanes, facing
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position, trajectory_of
-from eidrive_scenario.storyboard.positions.road_positions import count_lanes, facing
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
-from eidrive_scenario.storyboard.state.domains import Domain
-from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
+from eidrive_scenario.storyboard.state.element_states import (
+    Domain,
+    ElementState,
+    ElementStateObserver,
+    ElementStates,
+    ElementTransition,
+    StateChange,
+)
 from eidrive_scenario.storyboard.state.environments import merge_environment
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.physics.dynamics import turning_wheelbase

@@ -18,7 +18,7 @@ from eidrive_scenario.errors import (
     suggestion,
 )
 from eidrive_scenario.files.atomic import exclusive, write_atomically
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.geometry import (
     box_distance,

@@ -3,7 +3,7 @@
 Stable: all names.
 """
 
-from eidrive_scenario.evaluation.continuity import Continuity, Step
+from eidrive_scenario.evaluation.actor_tracking import SIDEWALKS, Continuity, LaneTracker, Step, corners
 from eidrive_scenario.evaluation.criterion import (
     Criterion,
     CriterionSettings,
@@ -11,16 +11,14 @@ from eidrive_scenario.evaluation.criterion import (
     actor_never_present,
     evaluate_criteria,
 )
-from eidrive_scenario.evaluation.false_tracks import Brakings, FalseTracks
 from eidrive_scenario.evaluation.fault import Impact, judge_impact
-from eidrive_scenario.evaluation.known_actors import Source, known_actors
-from eidrive_scenario.evaluation.lane_tracking import SIDEWALKS, LaneTracker, corners
+from eidrive_scenario.evaluation.known_actors import Brakings, FalseTracks, Source, known_actors
 from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
+from eidrive_scenario.evaluation.nearest_actor import half_projection, separating_axes, time_to_contact
 from eidrive_scenario.evaluation.route_progress import Place, RouteProgress, route_through
 from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
 from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCrossings, along, beside
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
-from eidrive_scenario.evaluation.swept_boxes import half_projection, separating_axes, time_to_contact
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads.model.signal_states import lamp_colors, shows_red
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics

@@ -3,7 +3,7 @@
 Stable: all names.
 """
 
-from eidrive_scenario.checks.report import CheckReport
+from eidrive_scenario.checks.rule import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, NOT_JUDGED, PASSED

@@ -1,13 +1,13 @@
-"""Rules of `eidrive check`: name, level, summary and the function that finds violations."""
+"""Rules of `eidrive check`, and its report on one file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import Diagnostic, limit_diagnostics, sort_diagnostics
 from eidrive_scenario.openscenario.model import Element
 
 S = TypeVar("S", contravariant=True)
@@ -44,3 +44,31 @@ class Rule(Generic[S]):
 def at(element: Element, message: str, hint: str = "") -> Diagnostic:
     """Return a diagnostic with the location of an element."""
     return Diagnostic(message, hint, element.source, element.line)
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """Diagnostics of one file.
+
+    errors    prevent a run of the file
+    warnings  are probably mistakes
+    notes     may be intended
+    """
+
+    errors: tuple[Diagnostic, ...]
+    warnings: tuple[Diagnostic, ...] = ()
+    notes: tuple[Diagnostic, ...] = field(default=(), kw_only=True)
+
+    @classmethod
+    def collect(cls, found: Iterable[tuple[Level, Diagnostic]], **fields: Any) -> Self:
+        """Build the report from the diagnostics of a check; `fields` are the further fields of a subclass.
+
+        Every level lists each diagnostic once, in the order of the file, up to MAX_DIAGNOSTICS.
+        """
+        by_level: dict[Level, list[Diagnostic]] = {level: [] for level in Level}
+        for level, diagnostic in found:
+            by_level[level].append(diagnostic)
+        errors, warnings, notes = (
+            tuple(limit_diagnostics(sort_diagnostics(diagnostics))) for diagnostics in by_level.values()
+        )
+        return cls(errors, warnings, notes=notes, **fields)

@@ -22,7 +22,7 @@ from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
-    from eidrive_scenario.checks.report import CheckReport
+    from eidrive_scenario.checks.rule import CheckReport
     from eidrive_scenario.simulation import RunSettings
 
 
@@ -49,7 +49,7 @@ def check(
 
     A diagnostic of a rule ends with the name of the rule; `eidrive list rules` lists all rules.
     """
-    from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
+    from eidrive_scenario.checks.scenario_checks import DistributionCheckReport
     from eidrive_scenario.simulation import RunSettings
     from eidrive_scenario.simulation.added_settings import parse_drive
 
@@ -101,9 +101,12 @@ def _check_file(path: Path, ignored: tuple[str, ...], settings: RunSettings, wal
 
     settings  of the runs of scenarios: driving stacks, planner and criteria
     """
-    from eidrive_scenario.checks.catalog_checks import check_catalog
-    from eidrive_scenario.checks.distribution_checks import check_distribution
-    from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
+    from eidrive_scenario.checks.scenario_checks import (
+        check_catalog,
+        check_distribution,
+        check_road_file,
+        check_scenario,
+    )
     from eidrive_scenario.library import ROADS_SUFFIX, definition
     from eidrive_scenario.simulation.attribution import report_extension
 

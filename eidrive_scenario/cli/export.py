@@ -52,7 +52,7 @@ def export(
     from eidrive_scenario.export.foxglove.writer import write_foxglove
     from eidrive_scenario.export.osi.trace import write_osi
     from eidrive_scenario.export.recorded_run import open_run
-    from eidrive_scenario.export.table_files import write_csv, write_parquet
+    from eidrive_scenario.export.tables import write_csv, write_parquet
     from eidrive_scenario.export.tool_topics import write_with_topics
 
     writers: dict[str, tuple[Path | None, Callable[..., None]]] = {

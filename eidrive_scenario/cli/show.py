@@ -55,11 +55,11 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     elif what is Names.catalogs:
         lines = _catalog_lines()
     elif what is Names.rules:
-        from eidrive_scenario.checks.registry import ALL_RULES
+        from eidrive_scenario.checks.scenario_checks import ALL_RULES
 
         lines = _columns([(rule.name, rule.level.value, rule.summary) for rule in ALL_RULES])
     elif what is Names.criteria:
-        from eidrive_scenario.evaluation.criteria_list import describe_criteria
+        from eidrive_scenario.evaluation.criterion import describe_criteria
 
         lines = _columns([(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()])
     else:

@@ -16,9 +16,9 @@ from eidrive_scenario.driving.planner_settings import (
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
+from eidrive_scenario.openscenario.conventions import property_entries
 from eidrive_scenario.openscenario.model.controllers import Controller
-from eidrive_scenario.openscenario.properties import property_entries
-from eidrive_scenario.openscenario.values.references import parameter_hints, resolve_references
+from eidrive_scenario.openscenario.values.parameters import parameter_hints, resolve_references
 from eidrive_scenario.perception.faults import MAX_FALSE_OBJECTS, FalseObject, PoseError
 from eidrive_scenario.perception.localization import PoseNoise
 from eidrive_scenario.perception.tracking.method import TrackerKind, tracker_setting

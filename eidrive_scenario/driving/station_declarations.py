@@ -14,9 +14,9 @@ from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.extension_settings import optional_settings_type
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import Controller
-from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
-from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import distributions, registry
 from eidrive_scenario.sensing.sensor import sensor_class

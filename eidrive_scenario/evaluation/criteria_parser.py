@@ -12,24 +12,90 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
-from eidrive_scenario.evaluation.scenario_runner_criteria import CLASSES, INEXPRESSIBLE, translation
-from eidrive_scenario.files.yaml_sources import flow_yaml
-from eidrive_scenario.files.yaml_text import key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import flow_yaml, key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import CRITERION_PREFIX, criteria_of, property_entries
 from eidrive_scenario.openscenario.model import Condition, Vehicle
-from eidrive_scenario.openscenario.properties import property_entries
-from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX, criteria_of
-from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.openscenario.values.references import parameter_hints, resolve_references
+from eidrive_scenario.openscenario.values.parameters import Scope, parameter_hints, resolve_references
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.storyboard.state.commands import CustomCommand
+
+
+@dataclass(frozen=True)
+class Translation:
+    """Criterion for a class of ScenarioRunner.
+
+    fixed      settings that agree with ScenarioRunner
+    arguments  settings by argument of the class; the first one is that of a condition without a known argument
+    """
+
+    kind: str
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    arguments: Mapping[str, str] = field(default_factory=dict)
+
+
+CLASSES: Mapping[str, Translation] = {
+    "ActorBlockedTest": Translation("actor_blocked", arguments={"max_time": "at_most", "min_speed": "below"}),
+    "AverageVelocityTest": Translation("average_speed", arguments={"velocity": "at_least"}),
+    "CollisionTest": Translation("collision"),
+    "DrivenDistanceTest": Translation("driven_distance", arguments={"distance": "at_least"}),
+    "EndofRoadTest": Translation("end_of_road", arguments={"duration": "at_most"}),
+    "InRouteTest": Translation("in_route", arguments={"offroad_max": "at_most", "offroad_min": "beyond"}),
+    "KeepLaneTest": Translation("keep_lane"),
+    "MaxVelocityTest": Translation("max_speed", arguments={"max_velocity": "at_most"}),
+    "OffRoadTest": Translation("off_road", arguments={"duration": "at_most"}),
+    "OnSidewalkTest": Translation("on_sidewalk", arguments={"duration": "at_most"}),
+    "OutsideRouteLanesTest": Translation("outside_route_lanes"),
+    "RouteCompletionTest": Translation("route_completion", fixed={"within": 10.0}),
+    "RunningRedLightTest": Translation("running_red_light", fixed={"part": "rear"}),
+    "RunningStopTest": Translation("running_stop_sign"),
+    "WrongLaneTest": Translation("wrong_lane"),
+    "YieldToEmergencyVehicleTest": Translation("yield_to_emergency_vehicle", arguments={"ev": "to"}),
+}
+"""Criteria by class of ScenarioRunner; SI units on both sides."""
+
+INEXPRESSIBLE: Mapping[str, str] = {
+    "InRadiusRegionTest": "reach_position: {of: Ego, x: 100, y: 20, within: 5}",
+    "MinimumSpeedRouteTest": "average_speed: {of: Ego, at_least: 5}",
+    "ReachedRegionTest": "reached_region: {of: Ego, region: [[100, 15], [110, 25]]}",
+    "ScenarioTimeoutTest": "time_limit: {within: 60}",
+}
+"""Criteria to declare instead of classes whose arguments are not one number, all that such a condition can state."""
+
+REQUIRED = ("DrivenDistanceTest", "MaxVelocityTest", "AverageVelocityTest", "YieldToEmergencyVehicleTest")
+"""Classes that require a value; an empty one is an error."""
+
+
+def translation(condition: Condition) -> tuple[str, dict[str, Any]] | None:
+    """Return the name of the criterion and its settings; None for a class that is not supported."""
+    name = condition.name.removeprefix(CRITERION_PREFIX)
+    found = CLASSES.get(name)
+    if found is None:
+        return None
+    settings = dict(found.fixed)
+    by_value = condition.by_value_condition
+    parameter = by_value.parameter_condition if by_value is not None else None
+    value = parameter.value if parameter is not None else ""
+    if found.arguments and (value or name in REQUIRED):
+        argument = parameter.parameter_ref if parameter is not None else ""
+        settings[found.arguments.get(argument, next(iter(found.arguments.values())))] = _number(value)
+    return found.kind, settings
+
+
+def _number(value: str) -> Any:
+    try:
+        return float(value)
+    except ValueError:
+        return value
+
 
 EXITS = {"exitSuccess": True, "exitFailure": False}
 """Verdict of each exit command of scenario_simulator_v2: True for passed."""
@@ -319,3 +385,24 @@ def _ego(scenario: Scenario, condition: Condition) -> str:
             condition.line,
         )
     )
+
+
+def progress_warnings(
+    scenario: Scenario, criteria: Iterable[Criterion], drivers: AbstractSet[str]
+) -> tuple[Diagnostic, ...]:
+    """Return a warning if no criterion demands progress of a vehicle that drives itself.
+
+    criteria  all criteria of a run, including those that later events declare
+    drivers   vehicles that a driving stack drives
+
+    Without criteria, without drivers, and with an exit command of the scenario there is none.
+    """
+    declared = list(criteria)
+    has_exit = any(command.type in EXITS for command in scenario.custom_commands)
+    demanded = any(one.demands_progress and not drivers.isdisjoint(one.subjects) for one in declared)
+    if not declared or not drivers or has_exit or demanded:
+        return ()
+    names = " or ".join(sorted(drivers))
+    message = f"no criterion demands that {names} drives on: a vehicle that stands still passes"
+    hint = f"add one such as driven_distance: {{of: {min(drivers)}, at_least: 50}}, reached_region or route_completion"
+    return (Diagnostic(message, hint, str(scenario.path or "")),)

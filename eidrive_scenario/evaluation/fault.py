@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from eidrive_scenario.evaluation.lane_tracking import LaneTracker, corners
+from eidrive_scenario.evaluation.actor_tracking import LaneTracker, corners
 from eidrive_scenario.world.view import ActorState, WorldView
 
 STOPPED = 0.05

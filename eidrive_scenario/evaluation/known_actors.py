@@ -1,9 +1,11 @@
-"""Actors that a station knows: its objects matched with the ground truth by distance."""
+"""Actors that a station knows, and its false tracks: its objects matched with the ground truth by distance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.world.view import WorldView
 
 Source = Literal["own", "fused"]
 """Objects of a station: those that it perceives itself, or the result of fusion, which its planner gets."""
@@ -62,3 +65,122 @@ def known_actors(
     others = [row for row, name in enumerate(view.names) if name != station]
     pairs = nearest_pairs(boxes, view.boxes[others].reshape(-1, 7), within)
     return {view.names[others[place]]: distance for _, place, distance in pairs}
+
+
+Point = tuple[float, float]
+
+GATE = 2.0
+"""Maximum horizontal distance of the center of a true object from the body of another actor [m]."""
+SAME = 4.0
+"""Maximum distance of false objects of successive ticks that form one false track [m]; 80 m/s at a step of 0.05 s."""
+
+
+class Brakings(NamedTuple):
+    """Number of brakings of a station, and of those without a cause."""
+
+    number: int
+    without_cause: int
+
+
+@dataclass
+class _Station:
+    """Counters of one station."""
+
+    false: list[Point] = field(default_factory=list)
+    """Positions of the false tracks in the last tick [m]."""
+    tracks: int = 0
+    braking: bool = False
+    """Whether the station braked in the last tick."""
+    brakings: int = 0
+    without_cause: int = 0
+
+
+class FalseTracks:
+    """Counter of false tracks and of brakings without a cause, for every station with a planner.
+
+    false track      maximal series of ticks in which the planner receives an object without a true actor within GATE.
+                     Its probability of existence is at least `min_existence` of the station. Objects of successive
+                     ticks within SAME of each other continue one track. The ego body is not a true object.
+    braking          maximal series of ticks in which `Plan.braking` is set, or the deceleration of the plan exceeds
+                     `harder_than` [m/s²]
+    without a cause  all objects that the planner states as reason (`Plan.objects`) in the first tick of the braking
+                     are false. A braking without stated objects has a cause.
+
+    Ground truth is used only here and in criteria, never by a planner.
+    """
+
+    def __init__(self, harder_than: float = math.inf) -> None:
+        self._harder_than = harder_than
+        self._stations: dict[str, _Station] = {}
+        self._start = self._end = math.nan
+
+    def observe(self, frame: Frame, min_existence: Mapping[str, float]) -> None:
+        """Process one frame. `min_existence` maps stations with a planner to their probability threshold."""
+        view = frame.view
+        if self._start != self._start:
+            self._start = view.time
+        self._end = view.time
+        for name, limit in min_existence.items():
+            step = frame.steps.get(name)
+            if step is None or step.plan is None:
+                continue
+            station = self._stations.get(name)
+            if station is None:
+                station = self._stations[name] = _Station()
+            boxes = step.fused.boxes.tolist()
+            rows = _unmatched(boxes, view, view.rows.get(name, -1)) if boxes else ()
+            if rows:
+                existence = step.fused.confidence.tolist()
+                rows = [row for row in rows if existence[row] >= limit]
+            if rows or station.false:
+                points = [(boxes[row][0], boxes[row][1]) for row in rows]
+                station.tracks += sum(
+                    all(math.dist(point, before) > SAME for before in station.false) for point in points
+                )
+                station.false = points
+            braking = step.plan.braking is not None or -step.plan.acceleration > self._harder_than
+            if braking and not station.braking:
+                station.brakings += 1
+                reasons = step.plan.objects
+                station.without_cause += bool(reasons) and all(row in rows for row in reasons)
+            station.braking = braking
+
+    def brakings(self, station: str) -> Brakings:
+        """Return the brakings of a station."""
+        known = self._stations.get(station)
+        return Brakings(0, 0) if known is None else Brakings(known.brakings, known.without_cause)
+
+    def metrics(self) -> dict[str, float]:
+        """Return `false_tracks.NAME.per_minute`, `.brakings` and `.brakings_without_cause` of each station."""
+        found: dict[str, float] = {}
+        minutes = (self._end - self._start) / 60.0
+        for name, station in self._stations.items():
+            found[f"false_tracks.{name}.per_minute"] = station.tracks / minutes if minutes > 0.0 else 0.0
+            found[f"false_tracks.{name}.brakings"] = station.brakings
+            found[f"false_tracks.{name}.brakings_without_cause"] = station.without_cause
+        return found
+
+
+def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> Sequence[int]:
+    """Return the rows of objects without a true actor within GATE."""
+    bodies = view.plain_boxes
+    found = []
+    for row, box in enumerate(boxes):
+        x, y = box[0], box[1]
+        for index, body in enumerate(bodies):
+            dx, dy = x - body[0], y - body[1]
+            if dx * dx + dy * dy <= GATE * GATE and index != own:
+                break
+        else:
+            if not any(index != own and _beside(x, y, body) for index, body in enumerate(bodies)):
+                found.append(row)
+    return found
+
+
+def _beside(x: float, y: float, body: Sequence[float]) -> bool:
+    """True if a point is inside the outline of a body (7,) or at most GATE outside it."""
+    cos, sin = math.cos(body[6]), math.sin(body[6])
+    dx, dy = x - body[0], y - body[1]
+    ahead = max(abs(cos * dx + sin * dy) - body[3] / 2.0, 0.0)
+    aside = max(abs(cos * dy - sin * dx) - body[4] / 2.0, 0.0)
+    return ahead * ahead + aside * aside <= GATE * GATE

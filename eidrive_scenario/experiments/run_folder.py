@@ -11,8 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from eidrive_scenario.errors import Diagnostic, InputError, OutputError
-from eidrive_scenario.files.atomic import partial_path, write_atomically
-from eidrive_scenario.files.lock import FileLock
+from eidrive_scenario.files.atomic import FileLock, partial_path, write_atomically
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, read_result
 from eidrive_scenario.resolved_settings import ResolvedSettings
 

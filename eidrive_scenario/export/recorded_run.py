@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in

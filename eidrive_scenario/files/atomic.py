@@ -1,7 +1,12 @@
-"""Atomic writing of output files."""
+"""Atomic writing of output files, and locks between processes.
+
+The kernel releases a lock with its process, so a killed process never blocks another one.
+"""
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import hashlib
 import io
 import os
@@ -9,13 +14,76 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, Self
 
 from eidrive_scenario.errors import Diagnostic, InputError, OutputError
-from eidrive_scenario.files.lock import FileLock
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
+
+
+_BUSY = frozenset({errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN})
+
+
+class FileLock:
+    """Exclusive lock on a separate file, which exists as long as the lock is held.
+
+    The lock file of a killed process has no effect: only the lock of a running process does. On a file system without
+    locks, the process that creates the file holds the lock.
+    """
+
+    def __init__(self, path: Path, descriptor: int) -> None:
+        self.path = path
+        self._descriptor = descriptor
+
+    @classmethod
+    def acquire(cls, path: Path) -> FileLock | None:
+        """Return the lock, or None if it is held elsewhere. Raise OSError if the file cannot be created."""
+        while True:
+            created = not path.exists()
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0), 0o644)
+            try:
+                if not _lock(descriptor, created):
+                    os.close(descriptor)
+                    return None
+                # The former holder may have removed the file between the open and the lock.
+                if os.path.samestat(os.fstat(descriptor), os.stat(path)):
+                    return cls(path, descriptor)
+            except FileNotFoundError:
+                pass
+            except BaseException:
+                os.close(descriptor)
+                raise
+            os.close(descriptor)
+
+    def release(self) -> None:
+        """Remove the file and release the lock; a second call has no effect."""
+        if self._descriptor < 0:
+            return
+        try:
+            self.path.unlink(missing_ok=True)
+        except OSError:
+            pass  # a file without a lock does not block other processes
+        finally:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def _lock(descriptor: int, created: bool) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in _BUSY:
+            return False
+        return created
+    return True
+
 
 PARTIAL = ".partial"
 """Part of the name of a file before its suffix, during its run and after an aborted one."""

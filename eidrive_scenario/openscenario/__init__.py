@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from eidrive_scenario.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from eidrive_scenario.openscenario.distributions import ConcreteRun, DistributionExpansion, load_distribution
+    from eidrive_scenario.openscenario.distributions.expansion import DistributionExpansion, load_distribution
+    from eidrive_scenario.openscenario.loading import ConcreteRun
     from eidrive_scenario.openscenario.reading.document import read_document
     from eidrive_scenario.openscenario.reading.parsing import Source, text_of
     from eidrive_scenario.openscenario.scenario import EntityObject, Scenario, load_scenario
@@ -13,7 +14,8 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "distributions": "ConcreteRun DistributionExpansion load_distribution",
+            "distributions.expansion": "DistributionExpansion load_distribution",
+            "loading": "ConcreteRun",
             "reading.document": "read_document",
             "reading.parsing": "Source text_of",
             "scenario": "EntityObject Scenario load_scenario",

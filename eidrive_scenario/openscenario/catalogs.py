@@ -10,20 +10,59 @@ import msgspec
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
-from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
-from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
-from eidrive_scenario.openscenario.catalog_files import CatalogFiles, Listing, listing_of
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
+from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector
+from eidrive_scenario.openscenario.model import (
+    Catalog,
+    CatalogLocation,
+    CatalogLocations,
+    CatalogReference,
+    Element,
+)
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
-from eidrive_scenario.openscenario.reading.parsing import Document, open_document
+from eidrive_scenario.openscenario.reading.parsing import LIMITS, Document, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope
 from eidrive_scenario.openscenario.values.scalars import Version
+from eidrive_scenario.resolved_settings import sha256_of
+
+Listing = tuple[str, ...] | bool
+"""Sorted names in a folder; whether anything is at a path that is no folder."""
+
+
+class CatalogFiles(msgspec.Struct, frozen=True):
+    """Files and folders that were read to find the catalog entries of a scenario.
+
+    folders  locations of catalogs with their listings, when reading began
+    digests  SHA-256 of each file that was read, as hexadecimal digits
+    """
+
+    folders: Mapping[Path, Listing]
+    digests: Mapping[Path, str]
+
+    def are_current(self, folders: Mapping[Path, Listing]) -> bool:
+        """Return whether the folders have these listings and all files their content."""
+        return self.folders == folders and all(_digest(path) == digest for path, digest in self.digests.items())
+
+
+def listing_of(place: Path) -> Listing:
+    """Return what is at the location of catalogs."""
+    try:
+        return tuple(sorted(os.listdir(place)))
+    except OSError:
+        return os.path.lexists(place)
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file; an empty text if it cannot be read."""
+    try:
+        return sha256_of(read_regular_file(path, LIMITS.max_bytes))
+    except OSError:
+        return ""
 
 
 class CatalogFile(msgspec.Struct, frozen=True):
@@ -54,11 +93,16 @@ class CatalogLibrary:
         self._parameters = parameters
         self._collector = collector
         self._places: dict[str, Path] = {}
-        for location in locations.children() if locations else ():
-            directory = getattr(location, "directory", None)
-            if directory is not None and isinstance(directory.path, str):
-                kind = type(location).__name__.removesuffix("CatalogLocation")
-                self._places[kind] = resolve_path(directory.path, folder)
+        for name, location in vars(locations).items() if locations else ():
+            if (
+                isinstance(location, CatalogLocation)
+                and location.directory
+                and isinstance(location.directory.path, str)
+            ):
+                kind = "".join(
+                    word.capitalize() for word in name.removesuffix("_catalog").split("_")
+                )  # As `MiscObject`
+                self._places[kind] = resolve_path(location.directory.path, folder)
         self.folders: dict[Path, Listing] = {place: listing_of(place) for place in self._places.values()}
         """Locations of catalogs with their listings, before any file in them is read."""
         self._is_complete = True

@@ -1,17 +1,18 @@
-"""Scenario that was read and validated: the input of all higher layers."""
+"""Scenario that was read and validated, its road file and its entity selections: the input of all higher layers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
-from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.library import from_library
-from eidrive_scenario.openscenario.catalog_files import CatalogFiles
-from eidrive_scenario.openscenario.catalogs import CatalogLibrary
+from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened, suggestion
+from eidrive_scenario.files.bounded import is_folder, is_regular_file
+from eidrive_scenario.library import ROADS_SUFFIX, from_library, resolve_path
+from eidrive_scenario.openscenario.catalogs import CatalogFiles, CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     BoundingBox,
@@ -21,13 +22,16 @@ from eidrive_scenario.openscenario.model import (
     CustomCommandAction,
     Dimensions,
     Element,
+    EntitySelection,
     ExternalObjectReference,
+    File,
     MiscObject,
     MiscObjectCategory,
     ObjectType,
     OpenScenario,
     ParameterDeclarations,
     Pedestrian,
+    RoadNetwork,
     ScenarioObject,
     Storyboard,
     VariableDeclarations,
@@ -35,10 +39,60 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.openscenario.reading.document import read_root
 from eidrive_scenario.openscenario.reading.parsing import Source, open_document
-from eidrive_scenario.openscenario.roadfile import find_road_file
+from eidrive_scenario.openscenario.validation.names import scenario_objects
 from eidrive_scenario.openscenario.validation.rules import check_rules
-from eidrive_scenario.openscenario.validation.scenario_objects import scenario_objects
 from eidrive_scenario.openscenario.values.parameters import Assignment, Scope, as_assignments
+
+MAPS = "EIDRIVE_MAPS"
+"""Environment variable with the folders in which a road file is searched by its name."""
+
+
+def find_road_file(network: RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
+    """Return the road file of a scenario; None if it has none.
+
+    The file is searched relative to the scenario, then by its name in the folders of EIDRIVE_MAPS. A name without a
+    suffix, such as Town01, is completed to Town01.xodr.
+    """
+    logic = network.logic_file if network else None
+    if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
+        return None
+    for candidate in _candidates(logic, folder):
+        if is_regular_file(candidate):
+            return candidate
+    collector.error(
+        f"road file '{shortened(logic.filepath, 300)}' is neither {_location(folder)} nor in the folders of {MAPS}",
+        _hint(logic, folder),
+        source=logic.source,
+        line=logic.line,
+    )
+    return None
+
+
+def _location(folder: Path) -> str:
+    """Describe the base of relative paths; for a scenario without a file it is the current folder."""
+    return "in the current folder" if folder == Path() else "in the folder of the scenario"
+
+
+def _candidates(logic: File, folder: Path) -> Iterator[Path]:
+    named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
+    for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
+        yield resolve_path(str(name), folder)
+        for maps in _map_folders():
+            yield maps / name.name
+
+
+def _map_folders() -> list[Path]:
+    return [Path(entry) for entry in os.environ.get(MAPS, "").split(os.pathsep) if entry]
+
+
+def _hint(logic: File, folder: Path) -> str:
+    named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
+    places = [(folder / named).parent, *_map_folders()]
+    known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{ROADS_SUFFIX}")}
+    if known:
+        return suggestion(named.name.removesuffix(ROADS_SUFFIX), known)
+    return f"check LogicFile, or set {MAPS} to the folders of the maps"
+
 
 EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
 
@@ -214,3 +268,35 @@ def _other_kind(root: OpenScenario, name: str) -> Diagnostic:
         name,
         distribution.line,
     )
+
+
+class EntitySelections:
+    """Entity selections of one scenario.
+
+    declared  selections by name; an entity precedes a selection of the same name
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._entities_by_type = scenario.entities_by_type
+        entities = scenario.document.entities
+        declarations = entities.entity_selection if entities is not None else ()
+        self.declared: Mapping[str, EntitySelection] = {
+            one.name: one for one in declarations if one.name not in scenario.entities
+        }
+
+    def members(self, name: str) -> list[str]:
+        """Return the entity of this name, or the members of the selection. Raise ScenarioError for a cycle."""
+        return list(dict.fromkeys(self._members(name, ())))
+
+    def _members(self, name: str, parents: tuple[str, ...]) -> Iterator[str]:
+        group = self.declared.get(name)
+        if group is None:
+            yield name
+            return
+        if name in parents:
+            text = f"selection {name!r} is a member of itself"
+            raise ScenarioError(Diagnostic(text, "remove it from its members", group.source, group.line))
+        for ref in group.members.entity_ref:
+            yield from self._members(ref.entity_ref, (*parents, name))
+        for entry in group.members.by_type:
+            yield from self._entities_by_type.get(entry.object_type, ())

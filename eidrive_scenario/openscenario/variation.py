@@ -20,7 +20,7 @@ from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, qu
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
-from eidrive_scenario.openscenario.values.references import hide_parameters, parameter_hints, resolve_references
+from eidrive_scenario.openscenario.values.parameters import hide_parameters, parameter_hints, resolve_references
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.settings import Settings, parse_settings
 

@@ -58,7 +58,7 @@ def _check_extension(group: str) -> Callable[[str, str, Path], None]:
 
 
 def _check_drive(place: str, value: list[str], folder: Path) -> None:
-    from eidrive_scenario.files.yaml_sources import read_yaml_source
+    from eidrive_scenario.files.yaml_text import read_yaml_source
     from eidrive_scenario.simulation.added_settings import parse_drive
 
     for stack in parse_drive(place, value).values():
@@ -69,7 +69,7 @@ def _check_drive(place: str, value: list[str], folder: Path) -> None:
 def _check_criteria(place: str, value: list[str], folder: Path) -> None:
     from eidrive_scenario.errors import quoted
     from eidrive_scenario.evaluation.criteria_parser import declare_criteria
-    from eidrive_scenario.files.yaml_sources import read_yaml_source
+    from eidrive_scenario.files.yaml_text import read_yaml_source
 
     for text in value:
         content = read_yaml_source(path_beside(text, folder), option=place)

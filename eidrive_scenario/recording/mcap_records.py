@@ -18,7 +18,7 @@ import zstandard
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.similar_paths import file_suggestion
-from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.recording.integrity import DamageReport
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT, STATISTICS, METADATA, DATA_END = 2, 3, 4, 5, 6, 9, 11, 12, 15

@@ -11,9 +11,9 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.integrity import NAME as SEAL
+from eidrive_scenario.recording.integrity import Seal
 from eidrive_scenario.recording.json_text import JsonText
-from eidrive_scenario.recording.seal import NAME as SEAL
-from eidrive_scenario.recording.seal import Seal
 from eidrive_scenario.resolved_settings import package_versions
 
 if TYPE_CHECKING:

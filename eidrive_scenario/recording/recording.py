@@ -11,16 +11,14 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files.bounded_json import check_values
+from eidrive_scenario.files.bounded import check_values
 from eidrive_scenario.recording import mcap_records as mcap
-from eidrive_scenario.recording.damage import DamageReport
-from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.frame_check import check_frame
+from eidrive_scenario.recording.frame import Frame, check_frame
+from eidrive_scenario.recording.integrity import NAME as SEAL
+from eidrive_scenario.recording.integrity import DamageReport, Seal
 from eidrive_scenario.recording.json_text import JsonText
 from eidrive_scenario.recording.recorder import FORMAT, FRAMES, READABLE, RUN, TRACE_METADATA
 from eidrive_scenario.recording.run_files import recording_in
-from eidrive_scenario.recording.seal import NAME as SEAL
-from eidrive_scenario.recording.seal import Seal
 
 MAX_FRAMES = 1_000_000
 """Maximum number of frames that are read."""

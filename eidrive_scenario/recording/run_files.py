@@ -9,8 +9,7 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files.atomic import PARTIAL, partial_path
-from eidrive_scenario.files.bounded import read_regular_file
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import load_json, read_regular_file
 
 RECORDING, RESULT, IMAGES = "recording.mcap", "result.json", "images"
 """Names of the files in the folder of a run."""

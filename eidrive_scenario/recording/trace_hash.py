@@ -30,8 +30,6 @@ _OUTCOME = struct.Struct("<3Q4d")
 arrival [s] (infinity for a lost message), and size [bytes]."""
 _TIME = struct.Struct("<d")
 _FLOAT = np.dtype("<f8")
-_FEW = 16
-"""Maximum number of outcomes that are hashed individually, which is faster than by columns."""
 
 
 class TraceHash:
@@ -85,10 +83,7 @@ class TraceHash:
 
     def _add_outcomes(self, links: Sequence[LinkEvent]) -> None:
         """Add outcomes; objects and columns of equal events give equal bytes."""
-        if not isinstance(links, LinkEvents) or len(links) <= _FEW:
-            self._sha.update(self._rows(links))
-            return
-        for part in links.parts:
+        for part in links.parts if isinstance(links, LinkEvents) else (links,):
             self._sha.update(self._columns(part) if isinstance(part, OutcomeBlock) else self._rows(part))
 
     def _rows(self, links: Sequence[LinkEvent]) -> bytes:

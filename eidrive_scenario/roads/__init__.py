@@ -6,17 +6,15 @@ from eidrive_scenario.roads.model.road_map import (
     Lane,
     LaneSection,
     Road,
+    RoadObject,
     Signal,
     SignalController,
     SignalPlace,
 )
-from eidrive_scenario.roads.model.road_objects import RoadObject
-from eidrive_scenario.roads.network import RoadNetwork
+from eidrive_scenario.roads.network import RoadNetwork, fastest, fewest_junctions, random_costs
 from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
-from eidrive_scenario.roads.route_costs import fastest, fewest_junctions, random_costs
-from eidrive_scenario.roads.routing.costs import Cost
 from eidrive_scenario.roads.routing.distance import Chain
-from eidrive_scenario.roads.routing.graph import RouteError
+from eidrive_scenario.roads.routing.graph import Cost, RouteError
 from eidrive_scenario.roads.routing.movement import Branch, BranchSelector
 from eidrive_scenario.roads.routing.route import Route
 from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes

@@ -13,12 +13,12 @@ from eidrive_scenario.roads.model.road_map import (
     Junction,
     Road,
     RoadMap,
+    RoadObject,
     Signal,
     SignalController,
     SignalPlace,
 )
-from eidrive_scenario.roads.model.road_objects import RoadObject
-from eidrive_scenario.roads.routing.costs import assumed_speed
+from eidrive_scenario.roads.routing.graph import assumed_speed
 from eidrive_scenario.roads.routing.movement import driving_direction
 
 

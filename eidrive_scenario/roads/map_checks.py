@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lateral_axis
@@ -55,7 +55,7 @@ def check_road_map(
             yield from _broken(road, after, -1, before.lanes, f"the lane section before (s = {before.s:g} m)")
         for link, side in ((road.predecessor, -1), (road.successor, 1)):
             yield from _end(roads, road, link, side)
-        yield from _dead_ends(road, links)
+        yield from (warning for _, _, warning in _dead_lanes(road, links))
     yield from _gaps(roads, links)
     for junction in junctions.values():
         for connection in junction.connections:
@@ -218,11 +218,6 @@ def _lanes_away(road: Road, section: int, direction: int) -> Iterator[LaneKey]:
         yield from (LaneKey(road.id, chosen.index, n) for n in chosen.lanes if n and road.directions[n] == direction)
 
 
-def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
-    """Yield warnings of lanes without a successor although their road continues."""
-    return (warning for _, _, warning in _dead_lanes(road, links))
-
-
 def _dead_lanes(road: Road, links: LaneLinks) -> Iterator[tuple[LaneKey, RoadLink | None, MapWarning]]:
     """Yield lanes without a successor, with the link by which their road continues, None within it, and the warning.
 
@@ -273,7 +268,8 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
             yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", message, "make their ends meet", lane.line)
 
 
-class EndCrossSection(NamedTuple):
+@dataclass(frozen=True)
+class EndCrossSection:
     """Cross section at an end of a road: point of the reference line [m], change of x and y per meter of t, and lane
     offset [m].
     """

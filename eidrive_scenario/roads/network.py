@@ -1,14 +1,17 @@
-"""Road network: interface to the roads of one OpenDRIVE file."""
+"""Road network: interface to the roads of one OpenDRIVE file.
+
+Routes have the length as cost, or one of the costs here: travel time, junctions, random factors.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,17 +28,24 @@ from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, LaneLoc
 from eidrive_scenario.roads.model.map_warnings import group_map_warnings
 from eidrive_scenario.roads.model.road_map import RoadMap
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
-from eidrive_scenario.roads.routing.costs import Cost, assumed_speed
-from eidrive_scenario.roads.routing.distance import Chain, RoadDistances
-from eidrive_scenario.roads.routing.graph import LaneWays, RouteError, build_ways, find_lanes, lane_key
-from eidrive_scenario.roads.routing.lane_count import lanes_between
-from eidrive_scenario.roads.routing.links import LaneLinks
+from eidrive_scenario.roads.routing.distance import Chain, RoadDistances, locate_near
+from eidrive_scenario.roads.routing.graph import (
+    JUNCTION_COST,
+    Cost,
+    LaneWays,
+    RouteError,
+    assumed_speed,
+    build_ways,
+    find_lanes,
+    lane_key,
+)
+from eidrive_scenario.roads.routing.links import LaneLinks, lanes_between
 from eidrive_scenario.roads.routing.movement import BranchSelector, Movement, driving_direction
-from eidrive_scenario.roads.routing.nearby import locate_near
 from eidrive_scenario.roads.routing.route import Route, concatenate_routes
 
 if TYPE_CHECKING:
     from eidrive_scenario.roads.routing.graph import LaneGraph
+
 
 KEPT = 2
 """Maximum number of road networks that are kept for the next run."""
@@ -336,3 +346,46 @@ class RoadNetwork(RoadAttributes):
 @lru_cache(maxsize=KEPT)
 def _loaded(text: bytes, source: str) -> RoadNetwork:
     return RoadNetwork(parse_road_map(text, source))
+
+
+MAX_FACTOR = 10.0
+"""Maximum factor by which a random cost exceeds the length."""
+
+
+def fastest(network: RoadNetwork) -> Cost:
+    """Return the travel time at the speed limits [s] as cost."""
+    known: dict[LaneKey, float] = {}
+
+    def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
+        key = LaneKey(*one[:3])
+        if key not in known:
+            known[key] = network.usual_speed(key)
+        return float(data["weight"]) / known[key]
+
+    return cost
+
+
+def fewest_junctions(network: RoadNetwork) -> Cost:
+    """Return a cost by which a junction counts more than any length.
+
+    Routes with equally many junctions are ordered by length.
+    """
+
+    def cost(one: LaneKey, other: LaneKey, data: Mapping[str, Any]) -> float:
+        before, after = network.road(one.road).junction_id, network.road(other.road).junction_id
+        return float(data["weight"]) + (JUNCTION_COST if after is not None and after != before else 0.0)
+
+    return cost
+
+
+def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
+    """Return the length times a random factor of each road as cost [m], so that different draws select different
+    routes.
+    """
+    draws = generator.uniform(0.0, math.log(MAX_FACTOR), len(network.roads)).tolist()
+    factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
+
+    def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
+        return float(data["weight"]) * factors[one.road]
+
+    return cost

@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads.model.location import Pose
-from eidrive_scenario.roads.model.road_objects import Corner, RoadObject
+from eidrive_scenario.roads.model.road_map import Corner, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.tolerances import EPSILON
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.files.yaml_sources import flow_yaml
+from eidrive_scenario.files.yaml_text import flow_yaml
 
 YamlSource: TypeAlias = str | Path
 """YAML text, or path of a YAML file."""

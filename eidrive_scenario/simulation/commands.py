@@ -18,7 +18,7 @@ from eidrive_scenario.evaluation.criteria_parser import (
     declare_criteria,
     parse_criteria,
 )
-from eidrive_scenario.files.yaml_sources import read_yaml_source
+from eidrive_scenario.files.yaml_text import read_yaml_source
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import (

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import (
     CatalogReference,
     Element,
@@ -14,8 +15,7 @@ from eidrive_scenario.openscenario.model import (
     PrivateAction,
     TeleportAction,
 )
-from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
-from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.registry import registry
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.world.view import WorldView

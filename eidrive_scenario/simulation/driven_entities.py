@@ -8,8 +8,9 @@ from typing import Any
 
 from eidrive_scenario.driving.settings import NAME_PROPERTIES
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.files.yaml_sources import YamlContent, flow_yaml, read_yaml_source
+from eidrive_scenario.files.yaml_text import YamlContent, flow_yaml, read_yaml_source
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import MODULE, is_agent_controller
 from eidrive_scenario.openscenario.model import (
     Controller,
     Pedestrian,
@@ -18,7 +19,6 @@ from eidrive_scenario.openscenario.model import (
     Vehicle,
     VehicleCategory,
 )
-from eidrive_scenario.openscenario.properties import MODULE, is_agent_controller
 from eidrive_scenario.simulation.added_settings import YamlSource
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.world.specs import actor_spec

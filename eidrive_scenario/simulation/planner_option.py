@@ -8,8 +8,8 @@ from eidrive_scenario.driving.planner_settings import NO_PLANNER
 from eidrive_scenario.driving.settings import agent_settings
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import Controller, Properties, Property
-from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.registry import registry
 from eidrive_scenario.world.specs import actor_spec
 

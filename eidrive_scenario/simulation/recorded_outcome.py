@@ -10,7 +10,7 @@ from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criterion import Verdict
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Axle, Vehicle
 from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory

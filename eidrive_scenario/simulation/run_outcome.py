@@ -9,14 +9,14 @@ import msgspec
 from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
-from eidrive_scenario.evaluation.false_tracks import FalseTracks
+from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.exit_codes import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation.command_execution import RunState
 from eidrive_scenario.simulation.run import RunResult
-from eidrive_scenario.storyboard.state.external_inputs import user_value_warnings
+from eidrive_scenario.storyboard.state.commands import user_value_warnings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 from eidrive_scenario.tolerances import TIME_TOLERANCE

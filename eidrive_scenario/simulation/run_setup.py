@@ -12,10 +12,10 @@ from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.evaluation.criteria_parser import (
     EXITS,
     CriterionDeclaration,
+    progress_warnings,
     stop_trigger_declarations,
     unsupported_criteria,
 )
-from eidrive_scenario.evaluation.progress_demand import progress_warnings
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.rendering import picture_maker

@@ -15,10 +15,10 @@ from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
-from eidrive_scenario.evaluation.false_tracks import FalseTracks
+from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.final_state import FinalState
+from eidrive_scenario.recording.text.run_log import FinalState
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose
@@ -40,8 +40,7 @@ from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.simulation.spawn_checks import check_spawns
 from eidrive_scenario.simulation.spawn_warnings import spawn_warnings
 from eidrive_scenario.simulation.tick_start import TickStart, check_action
-from eidrive_scenario.storyboard.state.commands import Commands
-from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
+from eidrive_scenario.storyboard.state.commands import Commands, ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time, raise_if_limit_reached
 from eidrive_scenario.world import World

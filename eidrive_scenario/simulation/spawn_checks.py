@@ -12,7 +12,7 @@ from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, q
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Element
-from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.world import World

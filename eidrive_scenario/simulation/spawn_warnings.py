@@ -14,7 +14,7 @@ from eidrive_scenario.driving.station_warnings import MARGIN
 from eidrive_scenario.errors import Diagnostic, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import FollowTrajectoryAction, Vehicle
-from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.spawn_checks import overlapping_spawns, start_diagnostic
 from eidrive_scenario.world import World

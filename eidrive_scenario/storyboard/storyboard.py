@@ -1,23 +1,24 @@
-"""Storyboard of one run: it ticks the tree, moves scripted actors and returns commands."""
+"""Scenario as a tree of behaviours, its external objects and requested routes: the storyboard of one run."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
 
+import msgspec
 import numpy as np
-from msgspec.structs import replace
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import PlacedObject, RoadNetwork, Route, placed_objects
 from eidrive_scenario.storyboard.context.controller_model import build_controller_models, unassigned_controller_warnings
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.requested_routes import RequestedRoutes
 from eidrive_scenario.storyboard.kinematics.trailers import (
     check_acyclic,
     declared_trailer,
@@ -25,15 +26,56 @@ from eidrive_scenario.storyboard.kinematics.trailers import (
     pairs,
     pose_behind,
 )
-from eidrive_scenario.storyboard.state.commands import Commands
-from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.builder import Builder
-from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
 STOPPED = "stop trigger"
 COMPLETE = "storyboard complete"
+
+
+class ExternalObjects:
+    """External objects of one scenario."""
+
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
+        self._scenario = scenario
+        self._objects: Mapping[str, PlacedObject | None] = {
+            name: _find(reference.name, roads) for name, reference in scenario.external.items()
+        }
+        self.warnings = tuple(
+            Diagnostic(
+                f"entity {name!r} is represented by a box of 0.5 m: the external object "
+                f"{scenario.external[name].name!r} is unknown",
+                "define a Vehicle, Pedestrian or MiscObject",
+                scenario.external[name].source,
+                scenario.external[name].line,
+            )
+            for name, found in self._objects.items()
+            if found is None
+        )
+
+    def in_road_network(self) -> Mapping[str, PlacedObject]:
+        """Return the external objects that are objects of the road network, by entity."""
+        return {name: found for name, found in self._objects.items() if found is not None}
+
+    def body(self, name: str) -> ActorSpec | None:
+        """Return the body of an entity that is an object of the road network; None for other entities."""
+        found = self._objects.get(name)
+        if found is None:
+            return None
+        default = actor_spec(name, self._scenario.entities[name])
+        size = (found.length or default.size[0], found.width or default.size[1], found.height or default.size[2])
+        return replace(default, size=size, offset=(0.0, 0.0, size[2] / 2.0))
+
+
+def _find(name: str, roads: RoadNetwork | None) -> PlacedObject | None:
+    if roads is None:
+        return None
+    placed = list(placed_objects(roads)) if name else []
+    return next((one for key in ("id", "name") for one in placed if getattr(one.object, key) == name), None)
 
 
 class Storyboard:
@@ -55,7 +97,7 @@ class Storyboard:
     ) -> None:
         self.scenario = scenario
         self.dt = dt
-        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=_empty_view())
+        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=empty_view())
         builder = Builder(scenario, self.context, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
         self.extensions = frozenset(builder.extensions)
@@ -141,7 +183,9 @@ class Storyboard:
                 displacement = next_displacement(front, view, self.dt)
                 pose = pose_behind(front, back, displacement, straight=front.motion.teleported)
                 back.motion.set_towed_state(pose, front.motion)
-                commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.teleported)
+                commands.placements[back.name] = msgspec.structs.replace(
+                    back.motion.placement(), teleport=front.motion.teleported
+                )
         if self.context.traffic.started:
             appearances = self.context.appearances.items()
             invisible = [name for name, appearance in appearances if not appearance.visibility.traffic]
@@ -194,7 +238,8 @@ def _check_placements(placements: Mapping[str, Placement]) -> None:
             raise SimulationError(f"actor {name!r}: invalid placement (got {placement}; expected finite numbers)")
 
 
-def _empty_view() -> WorldView:
+def empty_view() -> WorldView:
+    """Return a view without actors, before the first tick."""
     none = np.empty(0)
     points = np.empty((0, 3))
     return WorldView(
@@ -213,3 +258,40 @@ def _empty_view() -> WorldView:
         size=points,
         offset=points,
     )
+
+
+POINTS_APART = 2.0
+"""Maximum spacing of the points of a route [m]."""
+NO_ROUTES: Mapping[str, Array] = MappingProxyType({})
+
+
+class RequestedRoutes:
+    """Routes by AssignRouteAction and AcquirePositionAction: over lanes, or through waypoints without roads."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, object] = {}
+        """Last route, or waypoints, of each actor."""
+
+    def changes(self, actors: Mapping[str, Actor]) -> Mapping[str, Array]:
+        """Return the points (M, 3) of the routes that were requested since the last call, by actor [m].
+
+        The lap that follows a closed route is no new route.
+        """
+        found: dict[str, Array] = {}
+        for name, actor in actors.items():
+            request: object = actor.motion.route
+            if request is None:
+                goal = actor.goal
+                if goal is None or goal.waypoints is None:
+                    continue
+                request = goal.waypoints
+            last = self._last.get(name)
+            if request is last:
+                continue
+            self._last[name] = request
+            if isinstance(request, Route):
+                if not isinstance(last, Route) or last.lap is not request:
+                    found[name] = request.polyline(POINTS_APART)
+            else:
+                found[name] = np.concatenate([np.array([actor.motion.pose[:3]]), request])
+        return found or NO_ROUTES

@@ -6,28 +6,37 @@ from eidrive_scenario.car_following import IntelligentDriver
 from eidrive_scenario.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from eidrive_scenario.traffic.background import BackgroundTraffic
     from eidrive_scenario.traffic.fleet import Fleet
-    from eidrive_scenario.traffic.mobil import LaneChanger
-    from eidrive_scenario.traffic.spawning.areas import Cursor, Stretch, polygon, road_range, stretches_cover
+    from eidrive_scenario.traffic.lane_changes import LaneChanger
     from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
-    from eidrive_scenario.traffic.spawning.generators import Area, Source, Swarm, TrafficGenerator
+    from eidrive_scenario.traffic.spawning.generators import (
+        Area,
+        BackgroundTraffic,
+        Sink,
+        Source,
+        Swarm,
+        TrafficGenerator,
+    )
     from eidrive_scenario.traffic.spawning.population import Changes, Population
-    from eidrive_scenario.traffic.spawning.sinks import Sink
-    from eidrive_scenario.traffic.spawning.sites import SpawnSites, sites_within_radius
+    from eidrive_scenario.traffic.spawning.sites import (
+        Cursor,
+        SpawnSites,
+        Stretch,
+        polygon,
+        road_range,
+        sites_within_radius,
+        stretches_cover,
+    )
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "background": "BackgroundTraffic",
             "fleet": "Fleet",
-            "mobil": "LaneChanger",
-            "spawning.areas": "Cursor Stretch polygon road_range stretches_cover",
+            "lane_changes": "LaneChanger",
             "spawning.bodies": "Participant TrafficMix",
-            "spawning.generators": "Area Source Swarm TrafficGenerator",
+            "spawning.generators": "Area BackgroundTraffic Sink Source Swarm TrafficGenerator",
             "spawning.population": "Changes Population",
-            "spawning.sinks": "Sink",
-            "spawning.sites": "SpawnSites sites_within_radius",
+            "spawning.sites": "Cursor SpawnSites Stretch polygon road_range sites_within_radius stretches_cover",
         },
     )
 

@@ -1,22 +1,100 @@
-"""Occupants of the lanes of a fleet: its cars, other actors, and the ends of lanes."""
+"""Occupants of the lanes of a fleet: its cars, other actors on every lane that they overlap, and the ends of lanes."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.lane_changes import LaneChanges
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import (
     FIXED,
+    FOREIGN,
+    LOOK_AHEAD,
     Leaders,
     Occupants,
     concatenate_occupants,
     find_leaders,
+    no_occupants,
 )
-from eidrive_scenario.traffic.obstacles import Obstacles
 from eidrive_scenario.world.view import WorldView
+
+STANDING = 0.5
+"""Maximum speed of a standing actor [m/s]."""
+OUTLINE = np.array(
+    [(0.5, 0.5), (0.5, 0.0), (0.5, -0.5), (0.0, 0.5), (0.0, -0.5), (-0.5, 0.5), (-0.5, 0.0), (-0.5, -0.5)]
+)
+
+
+class Obstacles:
+    """Outlines of the actors outside a fleet on the lanes. Actors that stay in place are located once.
+
+    moving  lanes that moving actors overlap
+    """
+
+    def __init__(self, lanes: TrafficLanes) -> None:
+        self._lanes = lanes
+        self.occupants = no_occupants()
+        self.moving = set[int]()
+        self._before: dict[str, bytes] = {}
+        self._resting: tuple[str, ...] = ()
+        """Actors that stayed in place since `_at_rest` and `_moving_at_rest` were determined."""
+        self._at_rest, self._moving_at_rest = no_occupants(), set[int]()
+
+    def observe(self, view: WorldView, own: frozenset[str], near: Array | None = None) -> None:
+        """Observe all actors not in `own`. In a junction with overlapping roads an actor occupies all lanes below it.
+
+        near  (K, 2) positions [m]; actors beyond the range of sight from all of them are ignored
+        """
+        rows = _considered(view, own, near)
+        state = np.column_stack([view.boxes[rows], view.position[rows, 2], view.velocity[rows, :2]])
+        before, self._before = self._before, {}
+        resting: list[int] = []
+        others: list[int] = []
+        for row, values in zip(rows.tolist(), state, strict=True):
+            name, packed = view.names[row], values.tobytes()
+            (resting if before.get(name) == packed else others).append(row)
+            self._before[name] = packed
+        names = tuple(view.names[row] for row in resting)
+        if names != self._resting:
+            self._resting = names
+            self._at_rest, self._moving_at_rest = _outlines(self._lanes, view, resting)
+        occupants, moving = _outlines(self._lanes, view, others)
+        self.moving = moving | self._moving_at_rest
+        self.occupants = concatenate_occupants(occupants, self._at_rest) if names else occupants
+
+
+def _considered(view: WorldView, own: frozenset[str], near: Array | None) -> Integers:
+    """Return the rows of the actors not in `own`, with positions `near` only those within the range of sight."""
+    rows = np.array([row for row, name in enumerate(view.names) if name not in own], dtype=np.int64)
+    if near is None or not rows.size:
+        return rows
+    if not len(near):
+        return rows[:0]
+    reach = LOOK_AHEAD + np.hypot(view.size[rows, 0], view.size[rows, 1])
+    dx, dy = (view.position[rows, axis, None] - near[:, axis] for axis in (0, 1))
+    return np.asarray(rows[np.any(dx * dx + dy * dy < reach[:, None] ** 2, axis=1)])
+
+
+def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Occupants, set[int]]:
+    """Return the outlines of actors on every lane that they overlap, and the lanes of moving ones."""
+    if not rows:
+        return no_occupants(), set()
+    boxes = view.boxes[rows]
+    corners = OUTLINE[None] * boxes[:, None, 3:5]
+    cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
+    x = (boxes[:, 0, None] + cos * corners[..., 0] - sin * corners[..., 1]).ravel()
+    y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
+    z = view.position[rows, 2].repeat(len(OUTLINE))
+    row, s, point = lanes.roads.overlapped_lanes(x, y, z)
+    progress = lanes.progress(row, s)
+    heading = lanes.tables.curves.heading(lanes.road[row], s)
+    vx, vy = view.velocity[rows, :2].T.take(point // len(OUTLINE), axis=1)
+    speed = np.maximum((vx * np.cos(heading) + vy * np.sin(heading)) * lanes.direction[row], 0.0)
+    moving = np.hypot(vx, vy) > STANDING
+    found = Occupants(row, progress, progress, progress, speed, np.full(len(row), FOREIGN))
+    return found, set(row[moving].tolist())
 
 
 class Occupancy:

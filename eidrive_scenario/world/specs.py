@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
+from eidrive_scenario.openscenario.conventions import property_entries
 from eidrive_scenario.openscenario.model import MiscObject, Pedestrian, Vehicle
-from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 
 SHAPE_PROPERTY = "eidrive.shape"

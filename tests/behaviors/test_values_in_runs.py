@@ -11,7 +11,7 @@ from whole_run import Run
 
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.state.states import ElementTransition
+from eidrive_scenario.storyboard.state.element_states import ElementTransition
 
 
 @pytest.mark.element("EnvironmentAction")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from corpora import needs_corpora, scenario_files
 
-from eidrive_scenario.checks.distribution_checks import check_distribution
+from eidrive_scenario.checks.scenario_checks import check_distribution
 from eidrive_scenario.errors import ConstraintError
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario

@@ -10,7 +10,7 @@ from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionS
 from msgspec.structs import replace
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
-from eidrive_scenario.evaluation.swept_boxes import time_to_contact
+from eidrive_scenario.evaluation.nearest_actor import time_to_contact
 from eidrive_scenario.geometry import overlap
 
 

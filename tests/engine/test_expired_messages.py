@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from eidrive_scenario.cli import app
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.recorded_run import open_run
-from eidrive_scenario.export.table_files import write_csv
+from eidrive_scenario.export.tables import write_csv
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.text.run_log import RunLog
 from eidrive_scenario.reporting.replay.page import make_replay

@@ -93,9 +93,7 @@ def test_report_of_a_run_that_cannot_be_described_names_the_limit(monkeypatch: p
     assert "after 5 s of wall time" in str(describe_hung_run(Limit(5.0), sys._getframe()))
 
 
-@pytest.mark.parametrize(
-    "module", ["simulation/simulation.py", "checks/scenario_checks.py", "checks/catalog_checks.py"]
-)
+@pytest.mark.parametrize("module", ["simulation/simulation.py", "checks/scenario_checks.py"])
 def test_dump_of_hung_run_or_check_names_line_of_its_thread(module: str) -> None:
     """The thread of the watchdog comes first, as faulthandler lists the newest thread first."""
     engine = Path(eidrive_scenario.__file__).parent

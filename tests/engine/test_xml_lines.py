@@ -7,7 +7,7 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.errors import RoadError, ScenarioError
-from eidrive_scenario.files.xml_lines import parse_numbered
+from eidrive_scenario.files.untrusted_xml import parse_numbered
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.roads import RoadNetwork
 

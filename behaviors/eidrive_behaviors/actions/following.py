@@ -3,14 +3,54 @@
 `position` realizes a request exactly, regardless of the vehicle. With `follow` a vehicle respects its Performance and
 the maximum angle of its front wheels. If the request is within these limits, both modes are equal. Pedestrians and
 objects have no such limits and always realize the request.
+
+Other requirements of actions are checked here, too: reference entities, and effects on driven vehicles.
 """
 
 from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api.actions import ActionBehaviour, TrajectoryCurve, model, turning_wheelbase
+from eidrive_scenario.api.actions import ActionBehaviour, EntityAbsentError, TrajectoryCurve, model, turning_wheelbase
 from eidrive_scenario.api.common import Pose, wrap_angle
+
+
+def warn_without_effect(behaviour: ActionBehaviour) -> None:
+    """Add a warning to the result: the driving stack of the actor has no goal for the action."""
+    what = f"no effect on {behaviour.actor.name!r}, which a driving stack drives"
+    behaviour.context.warn(*behaviour.error(what, "command its speed, route, lane or trajectory").diagnostics)
+
+
+def warn_of_reverse(behaviour: ActionBehaviour, speed: float) -> None:
+    """Add a warning to the result if a target speed is negative [m/s]: driving stacks plan forward motion only."""
+    if speed < 0.0:
+        what = f"{behaviour.actor.name!r} stops instead of reversing: a driving stack drives forwards only"
+        hint = "drive it in reverse by the storyboard, without a driving stack"
+        behaviour.context.warn(*behaviour.error(what, hint).diagnostics)
+
+
+def warn_of_missed_end(behaviour: ActionBehaviour) -> None:
+    """Add a warning to the result: the actor has passed the end of its trajectory at a distance."""
+    what = f"the action does not end: {behaviour.actor.name!r} passes the end of the trajectory at a distance"
+    hint = "start before the trajectory, as driving stacks do not turn around"
+    behaviour.context.warn(*behaviour.error(what, hint).diagnostics)
+
+
+def check_other_entity(behaviour: ActionBehaviour, name: str) -> None:
+    """Raise ScenarioError if the reference entity of an action is its own actor."""
+    if name == behaviour.actor_name:
+        raise behaviour.error(f"the reference entity is the actor itself (got {name!r}; expected another entity)")
+
+
+def check_presence(behaviour: ActionBehaviour, name: str) -> None:
+    """Raise EntityAbsentError if the reference entity of an action is absent during the run.
+
+    In Init it may have a speed before it has a position.
+    """
+    context = behaviour.context
+    if context.dt > 0.0 and not context.actors[name].present and name not in context.view:
+        raise EntityAbsentError(name)
+
 
 TINY = 1e-9
 ON_PATH = 1e-3

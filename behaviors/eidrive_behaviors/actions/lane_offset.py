@@ -6,7 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
+from eidrive_behaviors.actions.following import warn_without_effect
 from eidrive_behaviors.actions.lane_change import SHIFTED, STANDING, off_road_error
 from eidrive_scenario.api.actions import (
     STEEPEST,

@@ -6,10 +6,9 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
+from eidrive_behaviors.actions.following import check_other_entity, check_presence, warn_without_effect
 from eidrive_behaviors.actions.lane_change import STANDING
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
-from eidrive_behaviors.actions.reference_entities import check_other_entity, check_presence
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,

@@ -6,8 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
-from eidrive_behaviors.actions.reference_entities import check_other_entity, check_presence
+from eidrive_behaviors.actions.following import check_other_entity, check_presence, warn_without_effect
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4

@@ -7,9 +7,14 @@ import math
 from msgspec.structs import replace
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
-from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, is_follow_mode, speed_limiter
-from eidrive_behaviors.actions.reference_entities import check_presence
+from eidrive_behaviors.actions.following import (
+    DelayWarning,
+    RateLimitedValue,
+    check_presence,
+    is_follow_mode,
+    speed_limiter,
+    warn_of_reverse,
+)
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
 

@@ -10,9 +10,7 @@ from itertools import pairwise
 from msgspec.structs import replace
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
-from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue
-from eidrive_behaviors.actions.reference_entities import check_presence
+from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, check_presence, warn_of_reverse
 from eidrive_behaviors.actions.speed import describe_slope_limit, slope_limit
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, model
 from eidrive_scenario.api.common import EPSILON

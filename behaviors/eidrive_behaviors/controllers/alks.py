@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_behaviors.controllers.adaptive_cruise import SPEED_CHANGE
-from eidrive_behaviors.controllers.properties import choice, flag, number
+from eidrive_behaviors.controllers.adaptive_cruise import SPEED_CHANGE, choice, flag, number
 from eidrive_behaviors.controllers.reference_driver import ReferenceDriver, ReferenceDriverSettings
 from eidrive_behaviors.controllers.road_ahead import LeadObject, RoadAhead
 from eidrive_behaviors.controllers.safety_models import EgoKinematics, Fsm, Regulation, Rss, SafetyModel

@@ -6,7 +6,7 @@ docs/checks.md describes each rule with an example that violates it and the corr
 from __future__ import annotations
 
 from eidrive_scenario.checks.rule import Level, Rule
-from eidrive_scenario.checks.scenario_rules import actions, counterparts, declarations, entities, triggers
+from eidrive_scenario.checks.scenario_rules import actions, declarations, entities, triggers
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.truth_intervals import (
     IMPOSSIBLE_CONDITION,
@@ -49,8 +49,8 @@ RULES: tuple[Rule[LintContext], ...] = (
     Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.speeds_above_max),
     Rule("zero-rate-transition", Level.NOTE, "a transition with the rate 0", actions.zero_rate_transitions),
     Rule("untimed-trajectory", Level.WARNING, "a trajectory with missing or equal times", actions.untimed_trajectories),
-    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that no action starts", counterparts.unknown_traffic),
-    Rule("unconnected-trailer", Level.WARNING, "a trailer without hitch or coupler", counterparts.unconnected_trailers),
+    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that no action starts", entities.unknown_traffic),
+    Rule("unconnected-trailer", Level.WARNING, "a trailer without hitch or coupler", entities.unconnected_trailers),
     Rule(
         "ineffective-parameter-action",
         Level.WARNING,

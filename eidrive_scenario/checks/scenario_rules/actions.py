@@ -7,7 +7,7 @@ from itertools import combinations
 
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
-from eidrive_scenario.checks.scenario_rules.termination import has_zero_rate, is_immediate
+from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, is_immediate
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import (
     AbsoluteSpeed,
@@ -28,7 +28,7 @@ from eidrive_scenario.openscenario.model import (
     TransitionDynamics,
     Vehicle,
 )
-from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
+from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES, has_times
 from eidrive_scenario.tolerances import EPSILON
 
 _DOMAINS: Mapping[type[Element], str] = {

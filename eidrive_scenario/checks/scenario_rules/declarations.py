@@ -14,8 +14,9 @@ from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.outline import WORD
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.files.bounded import absolute
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.library import resolve_path
+from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import (
     EntitySelection,
     MonitorDeclaration,
@@ -23,7 +24,6 @@ from eidrive_scenario.openscenario.model import (
     ParameterCondition,
     VariableDeclaration,
 )
-from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.values.expressions import REFERENCE
 from eidrive_scenario.simulation.commands import profile_files
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from lxml import etree
 
 from eidrive_scenario.files.bounded import MIB, read_regular_file
-from eidrive_scenario.files.yaml_sources import is_inline
+from eidrive_scenario.files.yaml_text import is_inline
 from eidrive_scenario.openscenario.model import (
     Act,
     Action,
@@ -36,7 +36,7 @@ from eidrive_scenario.openscenario.reading.document import VERSIONS
 from eidrive_scenario.openscenario.reading.parsing import open_document
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.scenario import Scenario
-from eidrive_scenario.openscenario.validation.storyboard_names import LEVELS, ReferenceMatch
+from eidrive_scenario.openscenario.validation.names import LEVELS, ReferenceMatch
 
 WORD = re.compile(r"\w+")
 """Pattern of words that may be names of parameters, variables or entities in the text of a command."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from eidrive_scenario.checks.scenario_rules.intervals import ALWAYS
 from eidrive_scenario.checks.scenario_rules.outline import Node, Outline
-from eidrive_scenario.checks.scenario_rules.termination import never_ends
 from eidrive_scenario.checks.scenario_rules.truth_intervals import (
+    ALWAYS,
     IMPOSSIBLE_STATE,
     OPEN,
     UNREACHABLE,
@@ -18,11 +17,18 @@ from eidrive_scenario.checks.scenario_rules.truth_intervals import (
 from eidrive_scenario.openscenario.model import (
     Action,
     Condition,
+    DynamicsDimension,
+    DynamicsShape,
     Event,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    LongitudinalDistanceAction,
     Priority,
+    RelativeTargetSpeed,
     StoryboardElementState,
     StoryboardElementStateCondition,
     StoryboardElementType,
+    TransitionDynamics,
 )
 
 _OVERRIDING = (Priority.OVERWRITE, Priority.OVERRIDE)
@@ -195,3 +201,28 @@ def _overriding_events(node: Node) -> Iterator[Node]:
     for one in node.parent.children:
         if one is not node and isinstance(one.element, Event) and one.element.priority in _OVERRIDING:
             yield one
+
+
+_CONTINUOUS = (LaneOffsetAction, LateralDistanceAction, LongitudinalDistanceAction, RelativeTargetSpeed)
+
+
+def never_ends(action: Action) -> str:
+    """Return why an action does not end by itself; "" if it may."""
+    for element in action.walk():
+        if isinstance(element, _CONTINUOUS) and element.continuous:
+            return f"{type(element).__name__} is continuous"
+        if isinstance(element, TransitionDynamics) and has_zero_rate(element):
+            return f"its rate is {element.value:g}"
+    return ""
+
+
+def has_zero_rate(dynamics: TransitionDynamics) -> bool:
+    """Whether a transition never reaches its target because its rate is 0."""
+    by_rate = dynamics.dynamics_dimension is DynamicsDimension.RATE and dynamics.value == 0.0
+    return by_rate and dynamics.dynamics_shape is not DynamicsShape.STEP
+
+
+def is_immediate(dynamics: TransitionDynamics) -> bool:
+    """Whether a transition ends at its start."""
+    is_zero = dynamics.dynamics_dimension is not DynamicsDimension.RATE and dynamics.value == 0.0
+    return dynamics.dynamics_shape is DynamicsShape.STEP or is_zero

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from eidrive_scenario.checks.rule import at
-from eidrive_scenario.checks.scenario_rules.context import LintContext
-from eidrive_scenario.checks.scenario_rules.intervals import format_intervals
-from eidrive_scenario.checks.scenario_rules.reachability import ConditionAnalysis, TriggerAnalysis
+from eidrive_scenario.checks.scenario_rules.context import ConditionAnalysis, LintContext, TriggerAnalysis
 from eidrive_scenario.checks.scenario_rules.truth_intervals import (
     IMPOSSIBLE_CONDITION,
     IMPOSSIBLE_STATE,
     UNOBSERVED_EDGE,
     UNREACHABLE,
+    format_intervals,
 )
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import Condition, ConditionEdge, Rule, SimulationTimeCondition

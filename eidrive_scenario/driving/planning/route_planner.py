@@ -20,7 +20,7 @@ from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.requests import LONGEST_WAY, Goal
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, RouteError
-from eidrive_scenario.roads.routing.costs import assumed_speed
+from eidrive_scenario.roads.routing.graph import assumed_speed
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.world.actor import ActorSpec

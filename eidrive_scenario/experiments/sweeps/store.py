@@ -17,8 +17,7 @@ import msgspec
 
 from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError, quoted
 from eidrive_scenario.files.atomic import exclusive
-from eidrive_scenario.files.bounded import is_regular_file
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import is_regular_file, load_json
 from eidrive_scenario.files.encodable import encodable
 from eidrive_scenario.files.similar_paths import file_suggestion
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -14,8 +15,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, set_stamp
 from eidrive_scenario.files.atomic import partial_path
-from eidrive_scenario.files.bounded import is_regular_file, read_regular_file
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import is_regular_file, load_json, read_regular_file
 from eidrive_scenario.recording.camera_images import camera_file
 from eidrive_scenario.recording.run_files import IMAGES
 
@@ -26,7 +26,8 @@ _LARGEST_DESCRIPTION = 2**16
 """Maximum size of the description of a camera [bytes]."""
 
 
-class Camera(NamedTuple):
+@dataclass(frozen=True)
+class Camera:
     """Camera of a station: image size and intrinsics [px], distortion, and pose (4, 4) camera to station."""
 
     station: str
@@ -38,7 +39,8 @@ class Camera(NamedTuple):
     pose: Array
 
 
-class Picture(NamedTuple):
+@dataclass(frozen=True)
+class Picture:
     """Image file of a camera."""
 
     station: str

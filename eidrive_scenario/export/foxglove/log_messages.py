@@ -1,18 +1,26 @@
-"""Log messages: storyboard transitions, decisions of planners, contacts, commands, verdicts, and message outcomes."""
+"""Log messages, and numbers of actors and stations for plots as JSON messages."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.export.foxglove.schemas import Foxglove, set_stamp
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.decisions import Decisions
-from eidrive_scenario.recording.text.link_text import describe_expired, describe_link
-from eidrive_scenario.recording.text.run_log import describe_change, describe_kind
+from eidrive_scenario.recording.text.run_log import (
+    Decisions,
+    describe_change,
+    describe_expired,
+    describe_kind,
+    describe_link,
+)
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.world.view import WorldView
 
 
 class RunMessages:
@@ -67,3 +75,62 @@ class RunMessages:
         message = self._foxglove.log(level=self._foxglove.log.Level.Value(level), name=name, message=text)
         set_stamp(message.timestamp, time)
         return message
+
+
+_NUMBER = {"type": "number"}
+ACTOR: Mapping[str, str] = {
+    "x": "x of the reference point [m]",
+    "y": "y of the reference point [m]",
+    "z": "z of the reference point [m]",
+    "yaw": "heading [rad]",
+    "speed": "speed along the heading [m/s]",
+    "acceleration": "acceleration along the heading [m/s²]",
+    "yaw_rate": "yaw rate [rad/s]",
+}
+STATION: Mapping[str, str] = {
+    "detections": "own detections",
+    "fused": "objects after fusion",
+    "received": "messages that arrived in this step",
+    "sent": "messages that were sent in this step",
+    "planned_speed": "speed at the start of the plan [m/s]",
+    "braking": "deceleration that the planner demands [m/s²], 0 without a demand",
+    "throttle": "throttle in [0, 1]",
+    "brake": "brake in [0, 1]",
+    "steering": "steering angle [rad]",
+}
+
+
+def json_schema(title: str, fields: Mapping[str, str]) -> bytes:
+    """Return the JSON schema of a message with these numbers; those that are unknown are missing."""
+    properties = {name: {**_NUMBER, "description": text} for name, text in fields.items()}
+    return json.dumps({"title": title, "type": "object", "properties": properties}, ensure_ascii=False).encode()
+
+
+def actor_numbers(view: WorldView, row: int) -> bytes:
+    """Return the numbers of an actor."""
+    state = view.states[row]
+    ahead = state.acceleration_x * math.cos(state.yaw) + state.acceleration_y * math.sin(state.yaw)
+    values = (state.x, state.y, state.z, state.yaw, state.speed, ahead, state.yaw_rate)
+    return _text(dict(zip(ACTOR, values, strict=True)))
+
+
+def station_numbers(step: AgentStep) -> bytes:
+    """Return the numbers of a station."""
+    values: dict[str, float] = {
+        "detections": len(step.detections),
+        "fused": len(step.fused),
+        "received": len(step.inbox),
+        "sent": len(step.outbox),
+    }
+    if step.plan is not None and len(step.plan.speeds):
+        values["planned_speed"] = float(step.plan.speeds[0])
+        values["braking"] = step.plan.braking or 0.0
+    if step.control is not None:
+        for name in ("throttle", "brake", "steering"):
+            values[name] = getattr(step.control, name)
+    return _text(values)
+
+
+def _text(values: Mapping[str, float]) -> bytes:
+    finite = {name: value for name, value in values.items() if math.isfinite(value)}
+    return json.dumps(finite, separators=(",", ":")).encode()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
 
-from eidrive_scenario.export.bodies import quaternion
+from eidrive_scenario.export.geometry import quaternion
 from eidrive_scenario.optional_imports import optional_import
 
 WORLD = "map"

@@ -1,23 +1,132 @@
-"""GroundTruth messages from frames."""
+"""GroundTruth messages from frames, with their environment."""
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from eidrive_scenario.export.osi.environment import set_environment
-from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.lanes import LaneMap
+from eidrive_scenario.export.osi.lanes import LaneMap, TrafficLights
 from eidrive_scenario.export.osi.moving_objects import ACTOR, VEHICLES, add_moving_objects
-from eidrive_scenario.export.osi.schemas import Osi
-from eidrive_scenario.export.osi.traffic_lights import TrafficLights
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
+from eidrive_scenario.rendering.daylight import daylight
+from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.recorded_outcome import AxleCenters
+from eidrive_scenario.world.environment import Environment, weather_from_environment
 from eidrive_scenario.world.weather import Weather
+
+_RAIN = (0.1, 0.5, 1.9, 8.1, 34.0, 149.0)
+"""Limits of the classes of precipitation [mm/h]."""
+_RAINS = ("NONE", "VERY_LIGHT", "LIGHT", "MODERATE", "HEAVY", "VERY_HEAVY", "EXTREME")
+_RANGE = (50.0, 200.0, 1000.0, 2000.0, 4000.0, 10_000.0, 40_000.0)
+"""Limits of the classes of fog by visual range [m]."""
+_FOGS = (
+    *("DENSE", "THICK", "LIGHT", "MIST", "POOR_VISIBILITY", "MODERATE_VISIBILITY", "GOOD_VISIBILITY"),
+    "EXCELLENT_VISIBILITY",
+)
+_LIGHT = (0.01, 1.0, 3.0, 10.0, 20.0, 400.0, 1000.0, 10_000.0)
+"""Limits of the classes of ambient illumination [lx]."""
+_EIGHTHS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT")
+_OBSCURED = "nineOktas"
+"""Value of the standard for a sky that cannot be seen."""
+_NO_SKY = "skyOff"
+"""Value of files up to version 1.1 for a sky that is not drawn, whose clouds are unknown."""
+
+
+def set_environment(
+    osi: Osi, conditions: Any, environment: Environment | None, time: float, fixed: Weather | None = None
+) -> None:
+    """Set the values that the scenario or an option of the run specifies, at `time` [s] of the run.
+
+    fixed  weather that overrides that of the scenario
+    """
+    if fixed is not None:
+        _set_weather(osi, conditions, fixed)
+    if environment is None:
+        return
+    if fixed is None:
+        _set_environment_weather(osi, conditions, environment, time)
+    if environment.temperature is not None:
+        conditions.temperature = environment.temperature
+    if environment.pressure is not None:
+        conditions.atmospheric_pressure = environment.pressure
+    clock = environment.clock(time)
+    if clock is not None:
+        conditions.time_of_day.seconds_since_midnight = clock.hour * 3600 + clock.minute * 60 + clock.second
+        if clock.tzinfo is not None:
+            conditions.unix_timestamp = int(clock.timestamp())
+
+
+def _set_weather(osi: Osi, conditions: Any, weather: Weather) -> None:
+    conditions.precipitation = _precipitation(osi, weather)
+    conditions.fog = _fog(osi, weather.visual_range)
+    conditions.ambient_illumination = _illumination(osi, weather)
+    conditions.clouds.fractional_cloud_cover = _clouds(osi, weather.cloud_cover)
+    _set_wind(conditions, weather.wind_direction, weather.wind_speed)
+    _set_sun(conditions, weather)
+
+
+def _set_environment_weather(osi: Osi, conditions: Any, environment: Environment, time: float) -> None:
+    """Set the values of the weather that the environment contains."""
+    weather = weather_from_environment(environment, time)
+    given = environment.precipitation_intensity, environment.precipitation_share
+    if environment.precipitation == "dry" or given != (None, None):
+        conditions.precipitation = _precipitation(osi, weather)
+    if environment.fog_range is not None:
+        conditions.fog = _fog(osi, environment.fog_range)
+    if environment.clouds not in (None, _NO_SKY):
+        conditions.clouds.fractional_cloud_cover = _clouds(osi, weather.cloud_cover, environment.clouds == _OBSCURED)
+    if environment.wind_speed is not None:
+        _set_wind(conditions, weather.wind_direction, environment.wind_speed)
+    if (environment.sun_elevation, environment.date_time) != (None, None):
+        conditions.ambient_illumination = _illumination(osi, weather)
+        _set_sun(conditions, weather)
+
+
+def _precipitation(osi: Osi, weather: Weather) -> int:
+    name = _RAINS[bisect_right(_RAIN, weather.precipitation_intensity)]
+    return int(osi.environment.Precipitation.Value(f"PRECIPITATION_{name}"))
+
+
+def _fog(osi: Osi, visual_range: float) -> int:
+    return int(osi.environment.Fog.Value(f"FOG_{_FOGS[bisect_right(_RANGE, visual_range)]}"))
+
+
+def _illumination(osi: Osi, weather: Weather) -> int:
+    """Return the class of the light on level ground in camera images, by sun, sky and street lamps."""
+    lamps = weather.street_lighting if weather.lamps_on else 0.0
+    level = bisect_right(_LIGHT, float(daylight(weather).ground @ LUMA) + lamps) + 1
+    return int(osi.environment.AmbientIllumination.Value(f"AMBIENT_ILLUMINATION_LEVEL{level}"))
+
+
+def _clouds(osi: Osi, cover: float, obscured: bool = False) -> int:
+    """Return the class of a share of the sky in eighths; only a sky without a cloud and a full one are 0 and 8."""
+    eighths = min(max(round(8.0 * cover), 1), 7) if 0.0 < cover < 1.0 else round(8.0 * cover)
+    name = "SKY_OBSCURED" if obscured else f"{_EIGHTHS[eighths]}_OKTAS"
+    return int(osi.environment.CloudLayer.FractionalCloudCover.Value(f"FRACTIONAL_CLOUD_COVER_{name}"))
+
+
+def _set_wind(conditions: Any, direction: float, speed: float) -> None:
+    """Set the direction of origin [rad], counterclockwise from north, of a wind to `direction` [degrees] from x over y.
+
+    North is y.
+    """
+    conditions.wind.origin_direction = math.radians((direction + 90.0) % 360.0)
+    conditions.wind.speed = speed
+
+
+def _set_sun(conditions: Any, weather: Weather) -> None:
+    """Set azimuth, counterclockwise from north, elevation [rad] and illuminance without clouds [lx] of the sun."""
+    conditions.sun.azimuth = math.radians(-weather.sun_azimuth % 360.0)
+    conditions.sun.elevation = math.radians(weather.sun_elevation)
+    conditions.sun.intensity = float(daylight(weather.model_copy(update={"cloud_cover": 0.0})).sun @ LUMA)
+
 
 _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
 

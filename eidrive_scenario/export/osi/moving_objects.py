@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.export.bodies import rotations
-from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_vector
+from eidrive_scenario.export.geometry import rotations
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_vector
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 from eidrive_scenario.world.appearance import Appearance

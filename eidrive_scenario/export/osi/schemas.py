@@ -1,4 +1,4 @@
-"""Modules of osi-python, imported once."""
+"""Modules of osi-python, imported once, and identifiers: one number per entity, unique and stable over the run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,18 @@ import math
 from typing import Any
 
 from eidrive_scenario.optional_imports import optional_import
+
+
+class Identifiers:
+    """Numbers by kind and name, in the order of first use, from `first` on."""
+
+    def __init__(self, first: int = 1) -> None:
+        self._first = first
+        self._numbers: dict[tuple[object, ...], int] = {}
+
+    def of(self, *key: object) -> int:
+        """Return the number of an entity, for example `of("actor", "Ego")`."""
+        return self._numbers.setdefault(key, self._first + len(self._numbers))
 
 
 class Osi:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.export.bodies import angles, rotations
-from eidrive_scenario.export.osi.identifiers import Identifiers
+from eidrive_scenario.export.geometry import angles, rotations
 from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type, rear_axle
-from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_time, set_vector
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_time, set_vector
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 
 
-class _Origin(NamedTuple):
+@dataclass(frozen=True)
+class _Origin:
     """Vehicle frame of a station: position (3,) [m], rotation (3, 3), velocity (3,) [m/s], yaw rate [rad/s]."""
 
     position: Array

@@ -10,8 +10,7 @@ from urllib.parse import quote
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder, host_vehicle
-from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.schemas import Osi, nanoseconds
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi, nanoseconds
 from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create

@@ -12,9 +12,9 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestio
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
 from eidrive_scenario.library import from_library, resolve_path
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.distributions.concrete_run import ConcreteRun
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
+from eidrive_scenario.openscenario.loading import ConcreteRun
 from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
 from eidrive_scenario.openscenario.reading.document import read_root
 from eidrive_scenario.openscenario.reading.parsing import Source, open_document

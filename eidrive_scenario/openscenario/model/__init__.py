@@ -4,31 +4,19 @@ Attributes and children of an element are fields in snake_case; `element` descri
 """
 
 from eidrive_scenario.openscenario.model.appearance import *
-from eidrive_scenario.openscenario.model.bounding_box import *
-from eidrive_scenario.openscenario.model.catalogs import *
+from eidrive_scenario.openscenario.model.conditions import *
 from eidrive_scenario.openscenario.model.controllers import *
 from eidrive_scenario.openscenario.model.declarations import *
 from eidrive_scenario.openscenario.model.distributions import *
 from eidrive_scenario.openscenario.model.document import *
 from eidrive_scenario.openscenario.model.element import Element as Element
+from eidrive_scenario.openscenario.model.element import Enumeration as Enumeration
 from eidrive_scenario.openscenario.model.entities import *
-from eidrive_scenario.openscenario.model.entity_conditions import *
 from eidrive_scenario.openscenario.model.entity_enumerations import *
-from eidrive_scenario.openscenario.model.enumeration import Enumeration as Enumeration
 from eidrive_scenario.openscenario.model.enumerations import *
-from eidrive_scenario.openscenario.model.environment import *
 from eidrive_scenario.openscenario.model.global_actions import *
-from eidrive_scenario.openscenario.model.lateral import *
-from eidrive_scenario.openscenario.model.longitudinal import *
 from eidrive_scenario.openscenario.model.positions import *
 from eidrive_scenario.openscenario.model.private_actions import *
-from eidrive_scenario.openscenario.model.properties import *
 from eidrive_scenario.openscenario.model.routing import *
-from eidrive_scenario.openscenario.model.scalars import *
-from eidrive_scenario.openscenario.model.sensors import *
-from eidrive_scenario.openscenario.model.signals import *
 from eidrive_scenario.openscenario.model.storyboard import *
 from eidrive_scenario.openscenario.model.traffic import *
-from eidrive_scenario.openscenario.model.triggers import *
-from eidrive_scenario.openscenario.model.value_conditions import *
-from eidrive_scenario.openscenario.model.vehicles import *

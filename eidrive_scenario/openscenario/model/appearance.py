@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.content import CHOICE, SEQUENCE, Changed
-from eidrive_scenario.openscenario.model.element import Element, element_type
+from eidrive_scenario.openscenario.model.declarations import File
+from eidrive_scenario.openscenario.model.element import CHOICE, SEQUENCE, Changed, Element, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     ColorType,
     LightMode,
@@ -12,7 +12,6 @@ from eidrive_scenario.openscenario.model.entity_enumerations import (
     VehicleComponentType,
     VehicleLightType,
 )
-from eidrive_scenario.openscenario.model.properties import File
 
 
 @element_type

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Changed, Choice
-from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.declarations import (
+    CatalogReference,
+    ControllerName,
+    ParameterDeclarations,
+    Properties,
+)
+from eidrive_scenario.openscenario.model.element import (
+    ALL,
+    CHOICE,
+    Changed,
+    Choice,
+    Element,
+    attribute,
+    child,
+    element_type,
+)
 from eidrive_scenario.openscenario.model.entity_enumerations import ControllerType
 from eidrive_scenario.openscenario.model.enumerations import AutomaticGearType
-from eidrive_scenario.openscenario.model.properties import Properties
-from eidrive_scenario.openscenario.model.scalars import ControllerName
 
 
 @element_type

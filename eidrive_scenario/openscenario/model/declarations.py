@@ -1,10 +1,80 @@
-"""Declarations, assignments and constraints of parameters, variables and monitors."""
+"""Types of attributes, declarations of parameters, variables and monitors, and free-form properties."""
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.element import Element, children, element_type
+from typing import Annotated, Any
+
+import msgspec
+
+from eidrive_scenario.openscenario.model.element import Element, children, element_type, text, visible_parameters
 from eidrive_scenario.openscenario.model.enumerations import ParameterType, Rule
-from eidrive_scenario.openscenario.model.scalars import ParameterName
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """Minimum and maximum value of an integer type."""
+
+    lowest: int
+    highest: int
+
+
+class NameOf(msgspec.Struct, frozen=True):
+    """Kind of the referenced element: entity, parameter, variable, monitor, controller, sensor and others."""
+
+    kind: str
+
+
+INT = Limits(-(2**31), 2**31 - 1)
+
+UnsignedInt = Annotated[int, Limits(0, 2**32 - 1)]
+UnsignedShort = Annotated[int, Limits(0, 2**16 - 1)]
+
+EntityName = Annotated[str, NameOf("entity")]
+ParameterName = Annotated[str, NameOf("parameter")]
+VariableName = Annotated[str, NameOf("variable")]
+MonitorName = Annotated[str, NameOf("monitor")]
+ControllerName = Annotated[str, NameOf("controller")]
+SensorName = Annotated[str, NameOf("sensor")]
+SignalControllerName = Annotated[str, NameOf("signal controller")]
+StoryboardElementName = Annotated[str, NameOf("storyboard element")]
+
+
+@element_type
+class Property(Element):
+    """Name and value of a property."""
+
+    name: str
+    value: str
+    scope: Any = visible_parameters()
+
+
+@element_type
+class File(Element):
+    """File by its path."""
+
+    filepath: str
+
+
+@element_type
+class Directory(Element):
+    """Folder by its path."""
+
+    path: str
+
+
+@element_type
+class CustomContent(Element):
+    """Free text for specific tools."""
+
+    content: str = text()
+
+
+@element_type
+class Properties(Element):
+    """Properties of an object beyond the standard."""
+
+    property: tuple[Property, ...] = ()
+    file: tuple[File, ...] = ()
+    custom_content: tuple[CustomContent, ...] = children(since="1.2")
 
 
 @element_type
@@ -83,3 +153,12 @@ class MonitorDeclarations(Element):
     """Monitors of a scenario."""
 
     monitor_declaration: tuple[MonitorDeclaration, ...] = ()
+
+
+@element_type
+class CatalogReference(Element):
+    """Reference to a catalog entry, with values of its parameters."""
+
+    catalog_name: str
+    entry_name: str
+    parameter_assignments: ParameterAssignments | None = None

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice, choice, sequence
-from eidrive_scenario.openscenario.model.declarations import ParameterAssignment
-from eidrive_scenario.openscenario.model.element import Element, child, element_type, sibling_index, text
-from eidrive_scenario.openscenario.model.properties import File
-from eidrive_scenario.openscenario.model.scalars import UnsignedInt
+from eidrive_scenario.openscenario.model.declarations import File, ParameterAssignment, UnsignedInt
+from eidrive_scenario.openscenario.model.element import (
+    ALL,
+    CHOICE,
+    Choice,
+    Element,
+    child,
+    choice,
+    element_type,
+    sequence,
+    sibling_index,
+    text,
+)
 
 
 @element_type

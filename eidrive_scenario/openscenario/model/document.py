@@ -1,24 +1,83 @@
-"""Root of a file: its header and one of the three kinds of documents."""
+"""Root of a file: its header and one of the three kinds of documents; catalogs and their locations."""
 
 from __future__ import annotations
 
 from datetime import datetime
+from typing import TYPE_CHECKING
 
-from eidrive_scenario.openscenario.model.catalogs import Catalog, CatalogLocations
-from eidrive_scenario.openscenario.model.content import choice, sequence
 from eidrive_scenario.openscenario.model.declarations import (
+    Directory,
+    File,
     MonitorDeclarations,
     ParameterDeclarations,
+    Properties,
+    UnsignedShort,
     VariableDeclarations,
 )
 from eidrive_scenario.openscenario.model.distributions import ParameterValueDistribution
-from eidrive_scenario.openscenario.model.element import Element, child, children, element_type, text
+from eidrive_scenario.openscenario.model.element import (
+    ALL,
+    Element,
+    attribute,
+    child,
+    children,
+    choice,
+    element_type,
+    sequence,
+    text,
+)
 from eidrive_scenario.openscenario.model.entities import Entities
+from eidrive_scenario.openscenario.model.global_actions import TrafficSignals
 from eidrive_scenario.openscenario.model.positions import Position
-from eidrive_scenario.openscenario.model.properties import File, Properties
-from eidrive_scenario.openscenario.model.scalars import UnsignedShort
-from eidrive_scenario.openscenario.model.signals import TrafficSignals
 from eidrive_scenario.openscenario.model.storyboard import Storyboard
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario.model.controllers import Controller
+    from eidrive_scenario.openscenario.model.entities import MiscObject, Pedestrian, Sensor, Vehicle
+    from eidrive_scenario.openscenario.model.global_actions import Environment
+    from eidrive_scenario.openscenario.model.routing import Route, Trajectory
+    from eidrive_scenario.openscenario.model.storyboard import Maneuver
+    from eidrive_scenario.openscenario.model.traffic import TrafficDistributionEntry
+
+
+@element_type
+class CatalogLocation(Element, content=ALL):
+    """Location of the catalogs of one kind; the schema has a type of the same content for each kind."""
+
+    directory: Directory
+
+
+@element_type
+class CatalogLocations(Element, content=ALL):
+    """Locations of the catalogs of a scenario, by kind."""
+
+    vehicle_catalog: CatalogLocation | None = None
+    controller_catalog: CatalogLocation | None = None
+    pedestrian_catalog: CatalogLocation | None = None
+    misc_object_catalog: CatalogLocation | None = None
+    environment_catalog: CatalogLocation | None = None
+    maneuver_catalog: CatalogLocation | None = None
+    trajectory_catalog: CatalogLocation | None = None
+    route_catalog: CatalogLocation | None = None
+    sensor_catalog: CatalogLocation | None = child(since="1.2", until="1.2", deprecated="1.2")
+    traffic_distribution_entry_catalog: CatalogLocation | None = child(since="1.4")
+
+
+@element_type
+class Catalog(Element):
+    """Entries that scenarios share."""
+
+    name: str | None = attribute(required_since="1.3")
+    vehicle: tuple[Vehicle, ...] = ()
+    controller: tuple[Controller, ...] = ()
+    pedestrian: tuple[Pedestrian, ...] = ()
+    misc_object: tuple[MiscObject, ...] = ()
+    environment: tuple[Environment, ...] = ()
+    maneuver: tuple[Maneuver, ...] = ()
+    trajectory: tuple[Trajectory, ...] = ()
+    route: tuple[Route, ...] = ()
+    sensor: tuple[Sensor, ...] = children(since="1.2", until="1.2")
+    traffic_distribution_entry: tuple[TrafficDistributionEntry, ...] = children(since="1.4")
 
 
 @element_type

@@ -1,20 +1,74 @@
-"""Base class of the model, and field definitions with the versions of the standard.
+"""Base classes of the model: elements, their content models, enumerations, and the versions of the standard.
 
 The type of a field determines its XML form: numbers, texts and enumerations are attributes, other elements are
 children, tuples are repeated children. A field without a default is required; one with the default None or () is
 optional. `attribute`, `child` and `children` define differences between versions of the standard.
+
+A content model is the order and number of the children of an element. A model without arguments applies to all child
+fields of its class. Otherwise it lists fields or nested models. Versions are written as in the file header: "1.2" is
+revMajor 1, revMinor 2.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, FrozenInstanceError, dataclass, field, fields
+from enum import Enum
 from reprlib import recursive_repr
-from typing import Any, ClassVar, TypeVar, dataclass_transform
+from typing import Any, ClassVar, TypeAlias, TypeVar, dataclass_transform
 
 import msgspec
 
-from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choice, Content, Sequence
+Part: TypeAlias = "str | Sequence | Choice"
+
+
+class Sequence(msgspec.Struct, frozen=True):
+    """Sequence of the parts in their order."""
+
+    parts: tuple[Part, ...] = ()
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """Choice of one of the parts.
+
+    minimum, maximum  number of repetitions; None for no limit
+    empty_until       last version in which the schema allows an empty choice
+    """
+
+    parts: tuple[Part, ...] = ()
+    minimum: int = 1
+    maximum: int | None = 1
+    empty_until: str = ""
+
+
+class All(msgspec.Struct, frozen=True):
+    """All children in any order, each at most once."""
+
+
+class Changed(msgspec.Struct, frozen=True):
+    """Content model that changes in a version."""
+
+    before: Sequence | All
+    since: str
+    after: Choice
+
+
+Content: TypeAlias = Sequence | Choice | All | Changed
+
+SEQUENCE = Sequence()
+ALL = All()
+CHOICE = Choice()
+
+
+def sequence(*parts: Part) -> Sequence:
+    """Return a sequence of parts."""
+    return Sequence(parts)
+
+
+def choice(*parts: Part, empty_until: str = "") -> Choice:
+    """Return a choice of parts."""
+    return Choice(parts, empty_until=empty_until)
+
 
 USAGE = "usage"
 
@@ -244,3 +298,34 @@ _FIELD_NAMES: dict[type[Element], tuple[str, ...]] = {}
 _DEFAULTS: dict[type[Element], dict[str, Any]] = {}
 _INCOMPLETE: dict[type[Element], dict[str, Any]] = {}
 _COMPARED: dict[type[Element], tuple[str, ...]] = {}
+
+
+class Enumeration(Enum):
+    """Enumeration of the standard; the value is the literal in the file."""
+
+    _value_: str
+    usage: Usage
+
+    def __new__(cls, literal: str, usage: Usage = Usage()) -> Enumeration:  # noqa: B008
+        member = object.__new__(cls)
+        member._value_ = literal
+        member.usage = usage
+        return member
+
+    def __str__(self) -> str:
+        return self._value_
+
+
+def since(version: str) -> Usage:
+    """Return the usage of a literal that exists since a version."""
+    return Usage(since=version)
+
+
+def only(version: str) -> Usage:
+    """Return the usage of a literal that exists in one version only."""
+    return Usage(since=version, until=version)
+
+
+def deprecated(version: str) -> Usage:
+    """Return the usage of a literal that is deprecated since a version."""
+    return Usage(deprecated=version)

@@ -4,24 +4,180 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import ALL, Choice, choice, sequence
-from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
+from eidrive_scenario.openscenario.model.declarations import (
+    CatalogReference,
+    EntityName,
+    ParameterDeclarations,
+    Properties,
+    SensorName,
+)
+from eidrive_scenario.openscenario.model.element import (
+    ALL,
+    CHOICE,
+    Choice,
+    Element,
+    attribute,
+    child,
+    children,
+    choice,
+    element_type,
+    sequence,
+)
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     MiscObjectCategory,
     ObjectType,
     PedestrianCategory,
     Role,
+    SensorCategory,
+    VehicleCategory,
 )
-from eidrive_scenario.openscenario.model.properties import Properties
-from eidrive_scenario.openscenario.model.scalars import EntityName
-from eidrive_scenario.openscenario.model.sensors import Sensor
-from eidrive_scenario.openscenario.model.vehicles import Vehicle
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.controllers import ObjectController
+    from eidrive_scenario.openscenario.model.positions import RelativeObjectPosition
+
+
+@element_type
+class Center(Element):
+    """Center of the box in the frame of the object [m]."""
+
+    x: float
+    y: float
+    z: float
+
+
+@element_type
+class Dimensions(Element):
+    """Dimensions of the box [m]."""
+
+    height: float
+    length: float
+    width: float
+
+
+@element_type
+class BoundingBox(Element, content=ALL):
+    """Bounding box, parallel to the axes of the object frame."""
+
+    center: Center
+    dimensions: Dimensions
+
+
+@element_type
+class Sensor(Element):
+    """Sensor and its field of view [rad]."""
+
+    sensor_category: SensorCategory
+    name: str
+    horizontal_fov: float = attribute(name="horizontalFOV", required=True)
+    vertical_fov: float = attribute(name="verticalFOV", required=True)
+    parameter_declarations: ParameterDeclarations | None = None
+    properties: Properties
+
+
+@element_type
+class SensorAttachment(Element):
+    """Mounting position of a sensor on the vehicle."""
+
+    sensor_ref: SensorName
+    mounting_position: RelativeObjectPosition
+
+
+@element_type
+class SensorAttachments(Element):
+    """Sensors of a vehicle."""
+
+    sensor_attachment: tuple[SensorAttachment, ...] = ()
+
+
+@element_type
+class SensorReference(Element):
+    """Reference to a sensor by its name."""
+
+    name: str
+
+
+@element_type
+class SensorReferenceSet(Element):
+    """References to sensors by their names."""
+
+    sensor_reference: tuple[SensorReference, ...]
+
+
+@element_type
+class Axle(Element):
+    """Axle: maximum steering angle [rad], position, track width and wheel diameter [m]."""
+
+    max_steering: float
+    position_x: float
+    position_z: float
+    track_width: float
+    wheel_diameter: float
+
+
+@element_type
+class Axles(Element):
+    """Axles of a vehicle."""
+
+    front_axle: Axle | None = child(required_until="1.2")
+    rear_axle: Axle
+    additional_axle: tuple[Axle, ...] = ()
+
+
+@element_type
+class Performance(Element):
+    """Limits of a vehicle: speed [m/s], acceleration and deceleration [m/s²], their rates [m/s³]."""
+
+    max_acceleration: float
+    max_deceleration: float
+    max_speed: float
+    max_acceleration_rate: float | None = attribute(since="1.2")
+    max_deceleration_rate: float | None = attribute(since="1.2")
+
+
+@element_type
+class TrailerHitch(Element):
+    """Position of the trailer hitch relative to the reference point [m]."""
+
+    dx: float
+    dz: float | None = None
+
+
+@element_type
+class TrailerCoupler(Element):
+    """Position of the trailer coupler relative to the reference point [m]."""
+
+    dx: float
+    dz: float | None = None
+
+
+@element_type
+class Trailer(Element, content=CHOICE):
+    """Trailer of a vehicle."""
+
+    trailer: ScenarioObject | None = None
+    trailer_ref: EntityRef | None = None
+
+
+@element_type
+class Vehicle(Element, content=ALL):
+    """Vehicle with bounding box, limits and axles. Mass [kg]."""
+
+    name: str
+    vehicle_category: VehicleCategory
+    mass: float | None = attribute(since="1.1")
+    model3d: str | None = attribute(since="1.1")
+    role: Role | None = attribute(since="1.2")
+    vehicle_role: Role | None = attribute(since="1.2", until="1.2", deprecated="1.2")
+    parameter_declarations: ParameterDeclarations | None = None
+    bounding_box: BoundingBox
+    performance: Performance
+    axles: Axles
+    properties: Properties | None = child(required_until="1.2")
+    sensor_attachments: SensorAttachments | None = child(since="1.2", until="1.2", deprecated="1.2")
+    trailer_hitch: TrailerHitch | None = child(since="1.3")
+    trailer_coupler: TrailerCoupler | None = child(since="1.3")
+    trailer: Trailer | None = child(since="1.3")
 
 
 @element_type

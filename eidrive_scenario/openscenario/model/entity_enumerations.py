@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.enumeration import Enumeration, deprecated, only, since
+from eidrive_scenario.openscenario.model.element import Enumeration, deprecated, only, since
 
 
 class CloudState(Enumeration):

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.declarations import CatalogReference, EntityName
+from eidrive_scenario.openscenario.model.element import ALL, CHOICE, Choice, Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.enumerations import LaneLayerType, ReferenceContext
-from eidrive_scenario.openscenario.model.scalars import EntityName
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.routing import Route, Trajectory

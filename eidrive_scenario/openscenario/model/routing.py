@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
+from collections.abc import Mapping, Sequence
+
+from eidrive_scenario.openscenario.model.declarations import CatalogReference, ParameterDeclarations, UnsignedInt
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, children, element_type
 from eidrive_scenario.openscenario.model.enumerations import (
     FollowingMode,
     LaneLayerType,
@@ -13,7 +13,6 @@ from eidrive_scenario.openscenario.model.enumerations import (
     RouteStrategy,
 )
 from eidrive_scenario.openscenario.model.positions import Position, TrajectoryRef
-from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
 
 @element_type
@@ -223,3 +222,31 @@ class RoutingAction(Element, content=Choice(empty_until="1.2")):
     acquire_position_action: AcquirePositionAction | None = None
     random_route_action: RandomRouteAction | None = child(since="1.3")
     preferred_lane_layer_action: PreferredLaneLayerAction | None = child(since="1.4")
+
+
+TIME_ATTRIBUTES: Mapping[type[Element], str] = {
+    Polyline: "the time of each vertex",
+    Clothoid: "startTime and stopTime",
+    ClothoidSpline: "timeEnd",
+    Nurbs: "the time of each control point",
+}
+"""Attributes of a shape that specify its times."""
+
+
+def has_times(shape: Element) -> bool:
+    """Return True if a shape has all times that a Timing scales, and they are not all equal."""
+    if isinstance(shape, Polyline):
+        return _ascend([vertex.time for vertex in shape.vertex])
+    if isinstance(shape, Nurbs):
+        return _ascend([point.time for point in shape.control_point])
+    if isinstance(shape, Clothoid):
+        return _ascend([shape.start_time, shape.stop_time])
+    if isinstance(shape, ClothoidSpline):
+        first = shape.clothoid_spline_segment[0].time_start if shape.clothoid_spline_segment else None
+        return _ascend([first or 0.0, shape.time_end])
+    return False
+
+
+def _ascend(times: Sequence[float | None]) -> bool:
+    known = [time for time in times if time is not None]
+    return len(known) == len(times) and len(known) > 1 and known[-1] > known[0]

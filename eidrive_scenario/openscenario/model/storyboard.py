@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import Choice
-from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, child, children, element_type
+from eidrive_scenario.openscenario.model.conditions import Trigger
+from eidrive_scenario.openscenario.model.declarations import (
+    CatalogReference,
+    EntityName,
+    ParameterDeclarations,
+    UnsignedInt,
+)
+from eidrive_scenario.openscenario.model.element import Choice, Element, child, children, element_type
 from eidrive_scenario.openscenario.model.entities import EntityRef
 from eidrive_scenario.openscenario.model.enumerations import Priority
 from eidrive_scenario.openscenario.model.global_actions import GlobalAction, UserDefinedAction
 from eidrive_scenario.openscenario.model.private_actions import PrivateAction
-from eidrive_scenario.openscenario.model.scalars import EntityName, UnsignedInt
-from eidrive_scenario.openscenario.model.triggers import Trigger
 
 
 @element_type

@@ -4,16 +4,31 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.openscenario.model.catalogs import CatalogReference
-from eidrive_scenario.openscenario.model.content import ALL, CHOICE, SEQUENCE, Changed, Choice, choice, sequence
 from eidrive_scenario.openscenario.model.controllers import ControllerDistribution
-from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
+from eidrive_scenario.openscenario.model.declarations import (
+    CatalogReference,
+    EntityName,
+    ParameterDeclarations,
+    Properties,
+    UnsignedInt,
+)
+from eidrive_scenario.openscenario.model.element import (
+    ALL,
+    CHOICE,
+    SEQUENCE,
+    Changed,
+    Choice,
+    Element,
+    attribute,
+    child,
+    children,
+    choice,
+    element_type,
+    sequence,
+)
 from eidrive_scenario.openscenario.model.entities import ScenarioObjectTemplate
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
 from eidrive_scenario.openscenario.model.positions import Position
-from eidrive_scenario.openscenario.model.properties import Properties
-from eidrive_scenario.openscenario.model.scalars import EntityName, UnsignedInt
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.distributions import Range

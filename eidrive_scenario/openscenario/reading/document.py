@@ -8,7 +8,7 @@ from typing import cast
 import msgspec
 from lxml import etree
 
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.reading.parsing import Document, Source, open_document

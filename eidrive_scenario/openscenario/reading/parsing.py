@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+from collections import OrderedDict
+from collections.abc import Hashable
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 from xml.etree import ElementTree
 
 import msgspec
@@ -14,8 +16,35 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
 from eidrive_scenario.library import scenario_suggestion
-from eidrive_scenario.openscenario.kept_files import KeptFiles
 from eidrive_scenario.resolved_settings import sha256_of
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
+
+
+class KeptFiles(Generic[K, V]):
+    """Values by key, up to a maximum size of their files in all [byte]."""
+
+    def __init__(self, max_size: int) -> None:
+        self._max_size = max_size
+        self._kept: OrderedDict[K, tuple[V, int]] = OrderedDict()
+
+    def get(self, key: K) -> V | None:
+        """Return the value of a key, or None."""
+        found = self._kept.get(key)
+        if found is None:
+            return None
+        self._kept.move_to_end(key)
+        return found[0]
+
+    def put(self, key: K, value: V, size: int) -> None:
+        """Store the value of a file of this size [byte]. Larger files than the maximum are not kept."""
+        if size > self._max_size:
+            return
+        self._kept[key] = value, size
+        self._kept.move_to_end(key)
+        while sum(each for _, each in self._kept.values()) > self._max_size:
+            self._kept.popitem(last=False)
 
 
 class SupportsGetElement(Protocol):

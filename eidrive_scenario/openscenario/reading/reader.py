@@ -10,7 +10,7 @@ import msgspec
 from lxml import etree
 
 from eidrive_scenario.errors import quoted, suggestion
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Action,
@@ -25,8 +25,7 @@ from eidrive_scenario.openscenario.model import (
     Property,
 )
 from eidrive_scenario.openscenario.model.element import field_defaults, incomplete_element
-from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
-from eidrive_scenario.openscenario.reading.structure import check_children
+from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, check_children, rules
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
 from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope, declare
 from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version, availability

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import msgspec
 from lxml import etree
 
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.values.scalars import Version
 
@@ -53,29 +53,9 @@ def apply_workarounds(
     return repaired
 
 
-def _light_type_second(node: etree._Element) -> bool:
-    return [child.tag for child in node.iterchildren(etree.Element)] == ["LightState", "LightType"]
-
-
-def _light_type_first(node: etree._Element) -> None:
-    node.append(node[node.index(next(node.iterchildren("LightState")))])
-
-
-def _old_group_state(node: etree._Element) -> bool:
-    return node.find("TrafficeSignalGroupState") is not None
-
-
 def _new_group_state(node: etree._Element) -> None:
     for child in node.iterchildren("TrafficeSignalGroupState"):
         child.tag = "TrafficSignalGroupState"
-
-
-def _illuminance_alone(node: etree._Element) -> bool:
-    return "illuminance" in node.attrib and "intensity" not in node.attrib
-
-
-def _intensity(node: etree._Element) -> None:
-    node.set("intensity", str(node.attrib.pop("illuminance")))
 
 
 def _maneuver_first(node: etree._Element) -> bool:
@@ -87,18 +67,6 @@ def _catalog_references_first(node: etree._Element) -> None:
     first = next(node.iterchildren("Maneuver"))
     for reference in list(node.iterchildren("CatalogReference")):
         first.addprevious(reference)
-
-
-def _graffic(node: etree._Element) -> bool:
-    return node.get("miscObjectCategory") == "grafficIsland"
-
-
-def _traffic(node: etree._Element) -> None:
-    node.set("miscObjectCategory", "trafficIsland")
-
-
-def _bare_command(node: etree._Element) -> bool:
-    return node.find("CustomCommandAction") is not None
 
 
 def _wrapped_command(node: etree._Element) -> None:
@@ -115,7 +83,7 @@ WORKAROUNDS = (
             holder,
             f"{holder} contains a CustomCommandAction without a UserDefinedAction",
             "put it into a UserDefinedAction; other tools may reject it",
-            _bare_command,
+            lambda node: node.find("CustomCommandAction") is not None,
             _wrapped_command,
         )
         for holder in ("Actions", "Action")
@@ -124,8 +92,8 @@ WORKAROUNDS = (
         "MiscObject",
         "MiscObject has the misspelled category 'grafficIsland'",
         "write trafficIsland; other tools may reject it",
-        _graffic,
-        _traffic,
+        lambda node: node.get("miscObjectCategory") == "grafficIsland",
+        lambda node: node.set("miscObjectCategory", "trafficIsland"),
     ),
     Workaround(
         "ManeuverGroup",
@@ -138,14 +106,14 @@ WORKAROUNDS = (
         "LightStateAction",
         "LightStateAction has LightState before LightType",
         "put LightType first; other tools may reject it",
-        _light_type_second,
-        _light_type_first,
+        lambda node: [child.tag for child in node.iterchildren(etree.Element)] == ["LightState", "LightType"],
+        lambda node: node.append(node[node.index(next(node.iterchildren("LightState")))]),
     ),
     Workaround(
         "Phase",
         "TrafficeSignalGroupState is the spelling of OpenSCENARIO up to 1.2",
         "write TrafficSignalGroupState; other tools may reject it",
-        _old_group_state,
+        lambda node: node.find("TrafficeSignalGroupState") is not None,
         _new_group_state,
         since=(1, 3),
     ),
@@ -153,8 +121,8 @@ WORKAROUNDS = (
         "Sun",
         "Sun has the illuminance of OpenSCENARIO 1.2 instead of intensity",
         "write intensity, or increase revMinor to 2; other tools may reject it",
-        _illuminance_alone,
-        _intensity,
+        lambda node: "illuminance" in node.attrib and "intensity" not in node.attrib,
+        lambda node: node.set("intensity", str(node.attrib.pop("illuminance"))),
         before=(1, 2),
     ),
 )

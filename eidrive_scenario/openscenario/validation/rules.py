@@ -1,40 +1,234 @@
-"""Rules that the schema cannot express: duplicate names, dangling references, contradictory values.
+"""Rules that the schema cannot express: contradictory values, unusable numbers, values of other than the declared type.
 
 The rules apply to incompletely read scenarios too: a field may be missing if the reader has reported an error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     AbsoluteTargetLane,
+    AngleCondition,
+    AnimationAction,
+    Axle,
     CatalogReference,
     Clothoid,
     ClothoidSpline,
+    ClothoidSplineSegment,
     Condition,
+    ControlPoint,
+    Dimensions,
+    DynamicConstraints,
     DynamicsDimension,
     Element,
+    EndOfRoadCondition,
+    Fog,
+    FollowTrajectoryAction,
     LaneLayerType,
+    LaneOffsetActionDynamics,
     LanePosition,
+    LightState,
+    LightStateAction,
     LongitudinalDistanceAction,
     Nurbs,
+    OffroadCondition,
     OpenScenario,
     Orientation,
+    ParameterAction,
+    ParameterDeclaration,
+    ParameterType,
+    Performance,
+    Phase,
     Polyline,
+    Precipitation,
     PreferredLaneLayerAction,
+    Range,
+    ReachPositionCondition,
+    RelativeAngleCondition,
+    RelativeClearanceCondition,
     RelativeLanePosition,
     RelativeTargetLane,
+    RoadCondition,
+    SpeedProfileEntry,
+    StandStillCondition,
+    Stochastic,
+    SynchronizeAction,
+    TargetDistanceSteadyState,
+    TargetTimeSteadyState,
     Timing,
+    TrafficSignalController,
+    TrafficSinkAction,
     TransitionDynamics,
+    VariableAction,
+    VariableDeclaration,
+    Wind,
 )
-from eidrive_scenario.openscenario.validation.declared_types import check_types
+from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.validation.names import check_names
-from eidrive_scenario.openscenario.validation.numbers import unusable
+from eidrive_scenario.openscenario.values.parameters import TYPES, fits_type
 from eidrive_scenario.openscenario.values.scalars import Version
+
+_WITHOUT_NUMBERS = (ParameterType.BOOLEAN, ParameterType.DATE_TIME, ParameterType.STRING)
+_TRUTH = ("true", "false")
+"""Boolean texts, which are compared case-insensitively, as Python capitalizes them."""
+
+
+def check_types(elements: Iterable[Element], collector: DiagnosticCollector) -> None:
+    """Warn of values and calculations that contradict the declared type."""
+    elements = tuple(elements)
+    types: dict[tuple[str, str], set[ParameterType]] = {}
+    for one in elements:
+        if isinstance(one, VariableDeclaration):
+            types.setdefault(("variable", one.name), set()).add(one.variable_type)
+            if _misfits(one.value, one.variable_type):
+                declared = one.variable_type.value
+                message = f"variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
+                collector.warning(message, "the value is used as a text", source=one.source, line=one.line)
+        elif isinstance(one, ParameterDeclaration):
+            types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
+    for one in elements:
+        if isinstance(one, VariableAction):
+            _check_action(one, "variable", one.variable_ref, types.get(("variable", one.variable_ref)), collector)
+        elif isinstance(one, ParameterAction):
+            _check_action(one, "parameter", one.parameter_ref, types.get(("parameter", one.parameter_ref)), collector)
+
+
+def _check_action(
+    action: VariableAction | ParameterAction,
+    kind: str,
+    name: str,
+    types: set[ParameterType] | None,
+    collector: DiagnosticCollector,
+) -> None:
+    """Check one action; the type is unknown if a name has several declarations with different types."""
+    if types is None or len(types) != 1:
+        return
+    (declared,) = types
+    setting = action.set_action
+    if setting is not None and _misfits(setting.value, declared):
+        message = f"{kind} {name!r} is declared as {declared.value}, but set to {setting.value!r}"
+        collector.warning(message, "the value is used as a text", source=setting.source, line=setting.line)
+    elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
+        message = f"{kind} {name!r} is declared as {declared.value}, but modified as a number"
+        collector.warning(message, "declare it as double", source=action.source, line=action.line)
+
+
+def _misfits(text: object, declared: ParameterType) -> bool:
+    """Whether a value is not of a type; values that could not be read are already reported."""
+    if not isinstance(text, str) or not isinstance(declared, ParameterType):
+        return False
+    if declared is ParameterType.BOOLEAN and text.lower() in _TRUTH:
+        return False
+    return not fits_type(text, TYPES[declared])
+
+
+MAX_ABSOLUTE = 1e9
+"""Maximum absolute value of coordinates [m], times [s] and speeds [m/s]."""
+MIN_POSITIVE = 1e-9
+"""Minimum value of lengths and weights by which other numbers are divided, so that no quotient overflows."""
+UNLIMITED: tuple[type[Element], ...] = (
+    DynamicConstraints,
+    Fog,
+    Performance,
+    Phase,
+    Range,
+    Stochastic,
+    TrafficSinkAction,
+)
+"""Elements whose numbers are limits; an infinite number is no limit."""
+NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
+    AngleCondition: ("angle_tolerance",),
+    AnimationAction: ("animation_duration",),
+    Dimensions: ("length", "width", "height"),
+    DynamicConstraints: (
+        "max_speed",
+        "max_acceleration",
+        "max_deceleration",
+        "max_acceleration_rate",
+        "max_deceleration_rate",
+    ),
+    EndOfRoadCondition: ("duration",),
+    FollowTrajectoryAction: ("initial_distance_offset",),
+    LaneOffsetActionDynamics: ("max_lateral_acc",),
+    LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
+    LightStateAction: ("transition_time",),
+    OffroadCondition: ("duration",),
+    Performance: (
+        "max_speed",
+        "max_acceleration",
+        "max_deceleration",
+        "max_acceleration_rate",
+        "max_deceleration_rate",
+    ),
+    Phase: ("duration",),
+    Precipitation: ("intensity", "precipitation_intensity"),
+    ReachPositionCondition: ("tolerance",),
+    RelativeAngleCondition: ("angle_tolerance",),
+    RelativeClearanceCondition: ("distance_forward", "distance_backward"),
+    RoadCondition: ("friction_scale_factor",),
+    SpeedProfileEntry: ("time",),
+    StandStillCondition: ("duration",),
+    SynchronizeAction: ("target_tolerance", "target_tolerance_master"),
+    TargetDistanceSteadyState: ("distance",),
+    TargetTimeSteadyState: ("time",),
+    TrafficSignalController: ("delay",),
+    Wind: ("speed",),
+}
+"""Attributes that must be at least 0 by the reference of the standard."""
+POSITIVE: Mapping[type[Element], tuple[str, ...]] = {
+    Axle: ("wheel_diameter",),
+    Clothoid: ("length",),
+    ClothoidSplineSegment: ("length",),
+    ControlPoint: ("weight",),
+}
+"""Attributes that must be above 0: at least MIN_POSITIVE."""
+
+
+def unusable(element: Element, version: Version) -> str:
+    """Return the error of the first unusable number of an element, with the expected value; "" if there is none."""
+    kind = type(element)
+    for name, value in vars(element).items():
+        if not isinstance(value, float):
+            continue
+        message = ""
+        if math.isnan(value):
+            message = "is NaN; a number is expected"
+        elif abs(value) > MAX_ABSOLUTE and not _may_be_immense(element, name):
+            message = f"is {_format(value)}; a number within {MAX_ABSOLUTE:g} is expected"
+        elif value < 0.0 and name in NOT_NEGATIVE.get(kind, ()):
+            message = f"is {_format(value)}; a number of at least 0 is expected"
+        elif value <= 0.0 and name in POSITIVE.get(kind, ()):
+            message = f"is {_format(value)}; a number above 0 is expected"
+        elif value < MIN_POSITIVE and name in POSITIVE.get(kind, ()):
+            message = f"is {_format(value)}; a number of at least {MIN_POSITIVE:g} is expected"
+        if message:
+            known = rules(kind, version).attributes.items()
+            spelling = next((spelling for spelling, rule in known if rule.field == name), name)
+            return f"{spelling} of {kind.__name__} {message}"
+    return ""
+
+
+def _may_be_immense(element: Element, name: str) -> bool:
+    """Whether a number may be infinite: limits, values of conditions, and the rate of a step."""
+    if isinstance(element, TransitionDynamics):
+        return element.dynamics_dimension is DynamicsDimension.RATE
+    if name == "delay":
+        return False
+    kind = type(element)
+    is_compared = kind.__name__.endswith("Condition") and kind is not RoadCondition
+    return is_compared or isinstance(element, UNLIMITED) or name.startswith("max_")
+
+
+def _format(value: float) -> str:
+    if math.isinf(value):
+        return "INF" if value > 0.0 else "-INF"
+    return f"{value:g}"
+
 
 MAX_NURBS_ORDER = 20
 """Maximum order of a Nurbs. The time per sample grows with its square; roads and maneuvers have orders up to 6."""
@@ -101,14 +295,6 @@ def _nurbs(curve: Nurbs) -> str:
     return _descending_times([point.time for point in curve.control_point])
 
 
-def _polyline(line: Polyline) -> str:
-    return _descending_times([vertex.time for vertex in line.vertex or ()])
-
-
-def _clothoid(curve: Clothoid) -> str:
-    return _descending_times([curve.start_time, curve.stop_time])
-
-
 def _clothoid_spline(curve: ClothoidSpline) -> str:
     return _descending_times([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
 
@@ -120,19 +306,12 @@ def _descending_times(times: Sequence[float | None]) -> str:
     return ""
 
 
-def _delay(condition: Condition) -> str:
-    return "Condition has a negative delay" if condition.delay is not None and condition.delay < 0 else ""
-
-
 def _transition(dynamics: TransitionDynamics) -> str:
     """Return the error of a negative duration or distance; the sign of a rate has no effect."""
     if dynamics.value is None or dynamics.value >= 0 or dynamics.dynamics_dimension is DynamicsDimension.RATE:
         return ""
-    return f"a transition cannot take {dynamics.value:g} {'s' if _takes_time(dynamics) else 'm'}"
-
-
-def _takes_time(dynamics: TransitionDynamics) -> bool:
-    return dynamics.dynamics_dimension is DynamicsDimension.TIME
+    unit = "s" if dynamics.dynamics_dimension is DynamicsDimension.TIME else "m"
+    return f"a transition cannot take {dynamics.value:g} {unit}"
 
 
 def _timing(timing: Timing) -> str:
@@ -142,13 +321,13 @@ def _timing(timing: Timing) -> str:
 
 _CHECKS: Mapping[type[Element], Callable[[Any], str]] = {
     AbsoluteTargetLane: _layer,
-    Clothoid: _clothoid,
+    Clothoid: lambda curve: _descending_times([curve.start_time, curve.stop_time]),
     ClothoidSpline: _clothoid_spline,
-    Condition: _delay,
+    Condition: lambda one: "Condition has a negative delay" if one.delay is not None and one.delay < 0 else "",
     LanePosition: _layer,
     LongitudinalDistanceAction: _distance,
     Nurbs: _nurbs,
-    Polyline: _polyline,
+    Polyline: lambda line: _descending_times([vertex.time for vertex in line.vertex or ()]),
     PreferredLaneLayerAction: _layer,
     RelativeLanePosition: _lane_position,
     RelativeTargetLane: _layer,

@@ -11,8 +11,8 @@ import msgspec
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.openscenario.model import Enumeration
+from eidrive_scenario.openscenario.model.declarations import INT, Limits
 from eidrive_scenario.openscenario.model.element import Usage
-from eidrive_scenario.openscenario.model.scalars import INT, Limits
 
 Version = tuple[int, int]
 

@@ -1,20 +1,68 @@
-"""Human-readable log of a run: one line per storyboard transition, decision of a planner and radio message."""
+"""Human-readable log of a run: storyboard transitions, decisions of planners, radio messages, and the final state."""
 
 from __future__ import annotations
 
 import io
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Protocol, TextIO
 
+from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.decisions import Decisions
-from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_expired, describe_link
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
-from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+
+
+class Decisions:
+    """Fold over the frames of a run that finds new decisions."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, str] = {}
+
+    def new(self, frame: Frame) -> Iterator[tuple[str, Plan]]:
+        """Yield stations and plans whose reason differs from that of the former plan in more than its numbers."""
+        for name, step in frame.steps.items():
+            if step.plan is None:
+                continue
+            decision = _NUMBER.sub("", step.plan.reason)
+            if self._last.get(name) != decision:
+                self._last[name] = decision
+                yield name, step.plan
+
+
+NOT_TRANSMITTED = frozenset({"queue", "absent"})
+"""Loss reasons of messages that a radio never transmitted."""
+
+_SIGHT = {"los": "no obstacle", "nlosv": "behind", "nlos": "behind a building or the ground"}
+
+
+def describe_expired(message: Message) -> str:
+    """Return the text about a received message that is too old: `message 7 of RSU is not used: it is too old; …`."""
+    text = f"message {message.number} of {message.sender} is not used: it is too old on arrival"
+    return f"{text}; measured at {message.detections.time:.3f} s by the clock of {message.sender}"
+
+
+def describe_link(link: LinkEvent) -> str:
+    """Return sender, receiver, outcome and radio conditions of a message: `RSU to Ego, message 7: lost: busy; …`.
+
+    Radio conditions are the path loss with shadowing and blockage [dB] and the signal-to-noise ratio [dB].
+    """
+    arrival = f"arrives at {link.arrives:.4f} s" if link.arrives is not None else ""
+    outcome = arrival or f"lost: {link.reason.replace('_', ' ')}"
+    text = f"{link.sender} to {link.receiver}, message {link.number}: {outcome}"
+    if link.path_loss_db is None or link.snr_db is None or link.los is None:
+        return text
+    bodies = ", ".join(link.blockers)
+    sight = _SIGHT[link.los] + (f" {bodies}" if link.los == "nlosv" else f", and {bodies}" if bodies else "")
+    radio = f"path loss {link.path_loss_db:.1f} dB, signal to noise {link.snr_db:.1f} dB"
+    return f"{text}; {radio}, {link.los.upper().replace('NLOSV', 'NLOSv')}: {sight}"
+
 
 STANDARD_OUTPUT = "-"
 _VERBS = {
@@ -108,3 +156,75 @@ def describe_change(change: StateChange) -> str:
     if change.transition is ElementTransition.END and change.after is ElementState.STANDBY:
         verb = "ends and returns to standbyState"
     return f"{verb}: {change.why}" if change.why and change.why != NO_TRIGGER else verb
+
+
+_STORYBOARD = "storyboard"
+_SHOWN = 5
+"""Maximum number of running events that are listed."""
+
+
+class FinalState:
+    """Observer that keeps the last state of the storyboard and the last plans."""
+
+    def __init__(self) -> None:
+        self._frame: Frame | None = None
+        self._running: dict[str, StateChange] = {}
+        self._interrupted: dict[str, StateChange] = {}
+        """Starts of the elements that were stopped with the storyboard, by path."""
+        self._last: StateChange | None = None
+        """Last change before the end of the storyboard."""
+        self._end: StateChange | None = None
+
+    def observe(self, frame: Frame) -> None:
+        """Process one frame."""
+        self._frame = frame
+        if frame.changes:
+            self._observe_changes(frame.changes)
+
+    def close(self) -> None:
+        """Do nothing: no file is open."""
+
+    def _observe_changes(self, changes: tuple[StateChange, ...]) -> None:
+        end = next((one for one in changes if one.kind == _STORYBOARD and one.after is ElementState.COMPLETE), None)
+        for change in changes:
+            start = self._running.pop(change.path, None)
+            if change.after is ElementState.RUNNING:
+                self._running[change.path] = change
+            if end is None:
+                self._last = change
+            elif start is not None and change.transition is ElementTransition.STOP:
+                self._interrupted[change.path] = start
+        self._end = end or self._end
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the state as lines of text; empty before the first frame."""
+        return () if self._frame is None else tuple(self._lines(self._frame))
+
+    def _lines(self, frame: Frame) -> Iterator[str]:
+        now = frame.view.time
+        yield f"storyboard: {self._storyboard(now)}"
+        events = [one for one in (self._running | self._interrupted).values() if one.kind == "event"]
+        shown = ", ".join(f"{one.path} since {one.time:.2f} s" for one in events[:_SHOWN])
+        more = f" and {len(events) - _SHOWN} more" if len(events) > _SHOWN else ""
+        yield f"running events: {shown or 'none'}{more}"
+        if self._last is not None:
+            last = self._last
+            element = describe_kind(last.kind) + (f" {last.path}" if last.path != last.kind else "")
+            yield f"last change: {last.time:.2f} s {element} {describe_change(last)}"
+        for name, step in frame.steps.items():
+            if step.plan is not None:
+                yield f"decision of {name}: {_decision(step.plan)}: {step.plan.reason}"
+
+    def _storyboard(self, now: float) -> str:
+        if self._end is None:
+            return f"running at {now:.2f} s"
+        how = "stopped" if self._end.transition is ElementTransition.STOP else "complete"
+        return f"{how} at {self._end.time:.2f} s" + (f": {self._end.why}" if self._end.why else "")
+
+
+def _decision(plan: Plan) -> str:
+    if plan.braking is not None:
+        return f"brake with {plan.braking:.1f} m/s²"
+    if len(plan.speeds) == 0:
+        return "no trajectory"
+    return f"drive at {float(plan.speeds[0]):.1f} m/s, acceleration {plan.acceleration:.1f} m/s²"

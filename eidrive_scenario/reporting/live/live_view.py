@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Self
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, SimulationError, quoted
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import as_json_text
-from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.live.server import Feed, LiveServer

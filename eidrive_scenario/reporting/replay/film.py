@@ -14,7 +14,7 @@ import cv2
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import write_atomically
-from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.drawing.canvas import Image
 from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture

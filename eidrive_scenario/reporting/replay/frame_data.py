@@ -12,13 +12,13 @@ import numpy as np
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
-from eidrive_scenario.storyboard.state.states import ElementState, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
 MOST = 40_000

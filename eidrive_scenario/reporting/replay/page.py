@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files.bounded_json import load_json
-from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, result_of
 from eidrive_scenario.recording.trace_hash import TraceHash

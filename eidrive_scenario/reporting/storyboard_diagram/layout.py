@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from eidrive_scenario.openscenario.model import StoryboardElementStateCondition
-from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch
+from eidrive_scenario.openscenario.validation.names import ReferenceMatch
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.elements import ManeuverElement, ManeuverGroupElement, StoryElement
 from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement

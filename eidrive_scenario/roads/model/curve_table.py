@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
 
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral
-from eidrive_scenario.roads.model.fresnel import fresnel
+from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral, fresnel
 from eidrive_scenario.roads.model.polynomials import spread
 
 EPSILON = float(np.finfo(np.float64).eps)
 """Argument of the cardinal sine in place of 0, as in numpy.sinc."""
-FEW = 12
-"""Maximum number of points on spirals that are evaluated individually, which is faster and gives the same result."""
-
-Value = TypeVar("Value", float, Array)
 
 
 class CurveTable:
@@ -105,13 +99,12 @@ class CurveTable:
         return found
 
     def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
-        columns = self._spiral.take(curve, axis=0)
-        if len(ds) > FEW:
-            u, v, turn, curvature = _on_spiral(ds, *columns.T)
-        else:
-            each = zip(ds.tolist(), columns.tolist(), strict=True)
-            u, v, turn, curvature = np.array([_on_spiral(one, *row) for one, row in each]).T
-        return u, v, turn, curvature, np.ones(len(ds))
+        k, rate, shift, scale, cosine0, sine0, sign, cos, sin = self._spiral.take(curve, axis=0).T
+        # Fresnel integrals from the start of the curve, along and across the tangent where the curvature is 0
+        sine, cosine = fresnel((ds + shift) * scale)
+        along, across = (cosine - cosine0) / scale, sign * (sine - sine0) / scale
+        u, v = cos * along - sin * across, sin * along + cos * across
+        return u, v, ds * (k + 0.5 * rate * ds), k + rate * ds, np.ones(len(ds))
 
     def _cubics(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
         u0, u1, u2, u3, v0, v1, v2, v3, pace = self._cubic[curve].T
@@ -122,25 +115,6 @@ class CurveTable:
         bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > STANDSTILL)
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
         return u, v, np.arctan2(dv, du), bend, norm * pace
-
-
-def _on_spiral(
-    ds: Value,
-    k: Value,
-    rate: Value,
-    shift: Value,
-    scale: Value,
-    cosine0: Value,
-    sine0: Value,
-    sign: Value,
-    cos: Value,
-    sin: Value,
-) -> tuple[Value, Value, Value, Value]:
-    """Return u, v, turn and curvature at a distance from the start of a spiral with these columns."""
-    sine, cosine = fresnel((ds + shift) * scale)
-    along, across = (cosine - cosine0) / scale, sign * (sine - sine0) / scale
-    u, v = cos * along - sin * across, sin * along + cos * across
-    return u, v, ds * (k + 0.5 * rate * ds), k + rate * ds
 
 
 def _spiral_columns(curvature: Array, rate: Array) -> Array:

@@ -6,7 +6,7 @@ Real maps have many small errors of one kind. Each kind is reported once, with i
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from eidrive_scenario.errors import Diagnostic
 
@@ -14,7 +14,8 @@ SHOWN = 4
 """Maximum number of further lines that a grouped warning lists."""
 
 
-class MapRule(NamedTuple):
+@dataclass(frozen=True)
+class MapRule:
     """Name and summary of a rule of `eidrive check` about road files. The level of all of them is warning."""
 
     name: str
@@ -49,7 +50,8 @@ MAP_RULES = (
 """All rules about road files, in the order of their listing."""
 
 
-class MapWarning(NamedTuple):
+@dataclass(frozen=True)
+class MapWarning:
     """Violation of a map rule at one element; violations of the same kind are reported together."""
 
     rule: MapRule

@@ -8,7 +8,7 @@ from typing import Literal, overload
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.roads.model.map_warnings import ROAD_MARK, MapRule, MapWarning
 
 MAX_ERRORS = 100

@@ -10,8 +10,7 @@ from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
-from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import XmlLimits, line_of, parse_untrusted
 from eidrive_scenario.roads.model.map_warnings import (
     JUNCTION_CONNECTION,
     LANE_LAYER,
@@ -28,14 +27,13 @@ from eidrive_scenario.roads.model.road_map import (
     Road,
     RoadLink,
     RoadMap,
+    RoadObject,
     RoadType,
 )
-from eidrive_scenario.roads.model.road_objects import RoadObject
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
-from eidrive_scenario.roads.reading.extent import check_extent
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
 from eidrive_scenario.roads.reading.objects_and_signals import read_controllers, read_objects, read_signals
-from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
+from eidrive_scenario.roads.reading.plan_view import LONGEST, check_extent, read_reference_line
 
 LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
 """Limits of an OpenDRIVE file."""

@@ -11,7 +11,7 @@ from typing import Literal
 import msgspec
 from lxml import etree
 
-from eidrive_scenario.files.xml_lines import line_of
+from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.roads.model.map_warnings import LANE_SIDE
 from eidrive_scenario.roads.model.polynomials import Polynomials, combine
 from eidrive_scenario.roads.model.road_map import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine

@@ -9,8 +9,15 @@ from msgspec.structs import replace
 
 from eidrive_scenario.roads.geometry.poses import BEYOND
 from eidrive_scenario.roads.model.map_warnings import SIGNAL_OFF_ROAD
-from eidrive_scenario.roads.model.road_map import Road, Signal, SignalController, SignalPlace
-from eidrive_scenario.roads.model.road_objects import Corner, Repeat, RoadObject
+from eidrive_scenario.roads.model.road_map import (
+    Corner,
+    Repeat,
+    Road,
+    RoadObject,
+    Signal,
+    SignalController,
+    SignalPlace,
+)
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MAX_REPETITIONS = 100_000

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +16,24 @@ from eidrive_scenario.roads.geometry.poses import lane_at
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
-from eidrive_scenario.roads.routing.costs import Cost
 from eidrive_scenario.roads.routing.links import LaneLinks
 from eidrive_scenario.roads.routing.movement import driving_direction
+
+Cost = Callable[[LaneKey, LaneKey, Mapping[str, Any]], float]
+"""Cost of an edge of the lane graph: lane, following lane, data of the edge."""
+
+USUAL_SPEED = 50.0 / 3.6
+"""Assumed speed on roads without a stated speed limit [m/s]."""
+FREE_SPEED = 130.0 / 3.6
+"""Assumed speed on roads whose speed is not limited [m/s]."""
+JUNCTION_COST = 1e6
+"""Cost of entering a junction where the fewest junctions are requested [m]; longer than any route."""
+
+
+def assumed_speed(limit: float | None) -> float:
+    """Return the speed [m/s] that costs assume for a speed limit [m/s]; None and 0 mean that none is stated."""
+    return USUAL_SPEED if not limit else min(limit, FREE_SPEED)
+
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -41,7 +57,8 @@ class RouteError(InputError):
     """No route over the lanes from one location to another exists."""
 
 
-class LaneWays(NamedTuple):
+@dataclass(frozen=True)
+class LaneWays:
     """Lanes and the edges between them as dictionaries, for the search of routes.
 
     nodes       `length` of each lane [m], its `end` (x, y) and `drivable`

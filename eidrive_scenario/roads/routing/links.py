@@ -1,4 +1,4 @@
-"""Links of lanes within a road, between roads, and through junctions.
+"""Links of lanes within a road, between roads, and through junctions; number of lanes between two places.
 
 Links are stored in both directions, as a file may specify them at either end.
 """
@@ -8,23 +8,25 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model.road_map import Connection, Contact, Junction, LaneSection, Road, RoadLink, RoadMap
 
 FAR = 200
 """Maximum number of lanes in the search for the continuation of a lane."""
 
 
-class LaneEnd(NamedTuple):
+@dataclass(frozen=True)
+class LaneEnd:
     """End of a lane of a lane section; side +1 is its end in s, -1 its start."""
 
     lane: LaneKey
     side: int
 
 
-class RoadEnd(NamedTuple):
+@dataclass(frozen=True)
+class RoadEnd:
     """End of a road; side +1 is its end in s, -1 its start."""
 
     road: str
@@ -149,3 +151,26 @@ def _nearest_end(road: Road, side: int, other: Road) -> Contact:
     x, y, *_ = road.reference.at(road.length if side > 0 else 0.0)
     start, end = other.reference.at(0.0), other.reference.at(other.length)
     return "start" if math.hypot(start.x - x, start.y - y) <= math.hypot(end.x - x, end.y - y) else "end"
+
+
+def lanes_between(roads: Mapping[str, Road], links: LaneLinks, a: LaneLocation, b: LaneLocation, runs: int) -> int:
+    """Return the number of lanes from the lane of a to that of b, positive in the direction of t at a.
+
+    The lane of a is followed along its links. If it does not reach b, the nearest lane beside it that does is followed,
+    first of those on its side of the road; without any, the lanes keep their numbers.
+
+    runs  1 if s at b increases in the direction of s at a, else -1
+    """
+    here, there = (roads[place.road].section_at(place.s) for place in (a, b))
+    own = _rank(a.lane)
+    beside = sorted((lane for lane in here.lanes if lane), key=lambda lane: (lane * a.lane < 0, abs(_rank(lane) - own)))
+    for lane in beside:
+        reached = links.continued(LaneKey(a.road, here.index, lane), b.road, there.index)
+        if reached:
+            return (_rank(b.lane) - _rank(reached)) * runs + _rank(lane) - own
+    return _rank(b.lane * runs) - own
+
+
+def _rank(lane: int) -> int:
+    """Return the place of a lane among those of a section in the direction of t, without lane 0."""
+    return lane if lane > 0 else lane + 1

@@ -16,7 +16,7 @@ from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.protocols import ActionContext, EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.actor import Actor
-from eidrive_scenario.storyboard.state.domains import Domain
+from eidrive_scenario.storyboard.state.element_states import Domain
 
 MOTION = Domain.LONGITUDINAL | Domain.LATERAL
 

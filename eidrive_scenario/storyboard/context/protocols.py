@@ -6,7 +6,7 @@ A condition reads the state of the run. An action also requests changes: those o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
@@ -16,16 +16,15 @@ from eidrive_scenario.requests import Override
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.state.commands import CustomCommand
+from eidrive_scenario.storyboard.state.commands import CustomCommand, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver
-from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 if TYPE_CHECKING:
-    from eidrive_scenario.traffic.background import BackgroundTraffic
-    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+    from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
+
 
 E = TypeVar("E", bound=model.Element)
 
@@ -209,3 +208,32 @@ class ControllerContext(ConditionContext, Protocol):
 
     def take_external_pose(self, name: str) -> ExternalPose | None:
         """Return and discard the pose that was set from outside for an entity; None without one."""
+
+
+class PreemptableAction(Protocol):
+    """Element whose behaviours hold domains that a later action can acquire."""
+
+    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
+        """Return the behaviours that lose their domains together with this one, including it."""
+
+    def preempt(self, behaviour: DomainHolder, why: str) -> None:
+        """Stop a behaviour whose domain another action has acquired."""
+
+
+class PendingAction(Protocol):
+    """Element that awaits an absent entity until all elements are updated at an instant."""
+
+    def abort(self) -> None:
+        """Stop the actions whose entity is still absent."""
+
+
+class DomainHolder(Protocol):
+    """Behaviour that holds control domains of an actor (ASAM OpenSCENARIO XML 1.3.1, 7.5.1)."""
+
+    @property
+    def name(self) -> str:
+        """Name of the behaviour."""
+
+    @property
+    def resource(self) -> str:
+        """Part of the domain that it holds; empty for the whole domain."""

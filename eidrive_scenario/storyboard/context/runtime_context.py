@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
+
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.requests import Override
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.preemption import DomainHolder, PendingAction, PreemptableAction
-from eidrive_scenario.storyboard.context.protocols import E, EntityAbsentError, PositionCache
+from eidrive_scenario.storyboard.context.protocols import (
+    DomainHolder,
+    E,
+    EntityAbsentError,
+    PendingAction,
+    PositionCache,
+    PreemptableAction,
+)
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trailers import disconnect
-from eidrive_scenario.storyboard.state.background import BackgroundTrafficPort
-from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
-from eidrive_scenario.storyboard.state.domains import Domain
-from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
-from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
+from eidrive_scenario.storyboard.state.commands import NONE, Commands, CustomCommand, ExternalPose
+from eidrive_scenario.storyboard.state.element_states import Domain, ElementStateObserver, ElementStates
 from eidrive_scenario.storyboard.state.signals import Signals
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 if TYPE_CHECKING:
-    from eidrive_scenario.traffic.background import BackgroundTraffic
-    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+    from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
     from eidrive_scenario.traffic.spawning.population import CentralObject
 
 
@@ -146,7 +150,7 @@ class RuntimeContext:
         """Build the background traffic. Raise SimulationError without a road network."""
         if self.roads is None:
             raise SimulationError("background traffic: the scenario has no road network")
-        from eidrive_scenario.traffic.background import BackgroundTraffic
+        from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic
         from eidrive_scenario.traffic.spawning.population import Population
 
         population = Population(
@@ -317,3 +321,54 @@ class RuntimeContext:
     def release_domains(self, holder: DomainHolder) -> None:
         """Release all domains of a behaviour."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]
+
+
+class BackgroundTrafficPort:
+    """Background traffic of one run. `build` builds it for its first instance."""
+
+    def __init__(self, build: Callable[[], BackgroundTraffic]) -> None:
+        self._build = build
+        self._traffic: BackgroundTraffic | None = None
+
+    @property
+    def traffic(self) -> BackgroundTraffic:
+        """Background traffic of the run; requires a road network."""
+        if self._traffic is None:
+            self._traffic = self._build()
+        return self._traffic
+
+    @property
+    def started(self) -> bool:
+        """Whether the background traffic exists."""
+        return self._traffic is not None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all vehicles of background traffic."""
+        return () if self._traffic is None else self._traffic.names
+
+    def start(self, instance: TrafficGenerator) -> None:
+        """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
+        self.traffic.start(instance)
+
+    def stop(self, name: str | None) -> None:
+        """Stop all instances of this name; all instances without a name."""
+        if self._traffic is not None:
+            self._traffic.stop(name)
+
+    def shortages(self) -> Iterator[Diagnostic]:
+        """Yield a warning for each instance whose road users were never complete so far."""
+        if self._traffic is not None:
+            yield from self._traffic.shortages()
+
+    def step(self, view: WorldView, dt: float, commands: Commands) -> None:
+        """Add spawns, removals and placements of the step that begins with this view to the commands."""
+        changes = self.traffic.step(view, dt)
+        for name, (spec, placement) in changes.additions.items():
+            commands.spawns[name] = placement
+            commands.actor_specs[name] = spec
+        commands.removals |= changes.removals
+        commands.placements.update(changes.placements)
+        for name in changes.additions:
+            if name not in changes.placements:
+                commands.placements[name] = replace(commands.spawns[name], teleport=True)

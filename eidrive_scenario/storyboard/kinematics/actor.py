@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.properties import is_agent_controller
+from eidrive_scenario.openscenario.conventions import is_agent_controller
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.motion import Motion

@@ -17,22 +17,22 @@ from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
-from eidrive_scenario.storyboard.positions.geographic import geo_position
-from eidrive_scenario.storyboard.positions.orientations import angles
-from eidrive_scenario.storyboard.positions.position_errors import position_error, road_origin, roads_of
-from eidrive_scenario.storyboard.positions.road_positions import (
+from eidrive_scenario.storyboard.positions.position_types import (
+    angles,
+    geo_position,
     in_lane,
     in_road,
     lane_id,
     lane_position,
-    relative_lane_position,
-    relative_road_position,
-    road_position,
-)
-from eidrive_scenario.storyboard.positions.world_positions import (
     on_ground,
+    position_error,
+    relative_lane_position,
     relative_object_position,
+    relative_road_position,
     relative_world_position,
+    road_origin,
+    road_position,
+    roads_of,
     world_position,
 )
 

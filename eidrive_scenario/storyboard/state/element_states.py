@@ -1,11 +1,59 @@
-"""States of all storyboard elements, and their transitions; read by StoryboardElementStateConditions."""
+"""States of storyboard elements, their transitions and observers, and control domains of actors.
+
+ASAM OpenSCENARIO XML 1.3.1, StoryboardElementState and 7.5.1.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum, Flag, auto
 
-from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.openscenario.validation.names import ReferenceMatch
+
+
+class Domain(Flag):
+    """Domains of an actor that an action controls. An action that acquires a domain ends its previous holder."""
+
+    NONE = 0
+    LONGITUDINAL = auto()
+    LATERAL = auto()
+    LIGHTING = auto()
+    ANIMATION = auto()
+
+
+class ElementState(Enum):
+    """State of an element."""
+
+    STANDBY = "standbyState"
+    RUNNING = "runningState"
+    COMPLETE = "completeState"
+
+
+class ElementTransition(Enum):
+    """Transition of an element. Conditions observe it in its step, and until their next evaluation."""
+
+    START = "startTransition"
+    END = "endTransition"
+    STOP = "stopTransition"
+    SKIP = "skipTransition"
+
+
+@dataclass(frozen=True)
+class StateChange:
+    """Change of the state of one element at `time` [s]."""
+
+    time: float
+    element: str
+    """Name of the element; `path` has the names of its parents too, separated by slashes."""
+    path: str
+    kind: str
+    """Type of the element: storyboard, story, act, maneuverGroup, maneuver, event or action."""
+    before: ElementState
+    transition: ElementTransition | None
+    after: ElementState
+    why: str = ""
+    """Description of the reason, such as the fulfilled trigger; empty without one."""
+
 
 NOT_STARTED = ElementState.STANDBY
 """State of an element whose parents have not started."""

@@ -20,8 +20,7 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.state.element_states import ElementRecord
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition
+from eidrive_scenario.storyboard.state.element_states import ElementRecord, ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
 
 NO_TRIGGER = "it has no start trigger"

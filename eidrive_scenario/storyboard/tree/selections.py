@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
-from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.storyboard.context.condition import EntityCondition, Measure
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Element, Maneuver
-from eidrive_scenario.storyboard.state.states import ElementTransition
+from eidrive_scenario.storyboard.state.element_states import ElementTransition
 from eidrive_scenario.storyboard.tree.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.tree.events import EventElement
 

@@ -14,8 +14,8 @@ from eidrive_scenario.car_following import IntelligentDriver
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.library import CATALOGS, library_path
 from eidrive_scenario.openscenario import Scenario, model, read_document
+from eidrive_scenario.openscenario.conventions import property_entries
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
-from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.specs import actor_spec

@@ -1,10 +1,10 @@
-"""Generators of background traffic: swarms, sources and areas."""
+"""Generators of background traffic (swarms, sources, areas), sinks at which it disappears, and all traffic of a run."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -16,8 +16,9 @@ from eidrive_scenario.openscenario.model import Element
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
-from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Population
+from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Changes, Population
 from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites, is_wide_enough
+from eidrive_scenario.world.view import WorldView
 
 RETRY = 0.5
 """Delay of the next attempt if no site was free [s]."""
@@ -269,3 +270,103 @@ class Area(MaintainedTraffic):
         if participant.walks not in self._inside:
             self._inside[participant.walks] = population.ground.covered(participant, self.covers)
         return self._inside[participant.walks]
+
+
+@dataclass
+class Sink(TrafficGenerator):
+    """Sink that removes background cars within a radius [m] around a position at a maximum rate [1/s].
+
+    categories  categories of the removed cars, None for all
+    """
+
+    place: tuple[float, float]
+    radius: float
+    rate: float
+    categories: frozenset[str] | None
+    _next: float = field(default=-math.inf, init=False)
+
+    def is_due(self, population: Population) -> bool:
+        """Return False, as a sink never spawns cars."""
+        return False
+
+    def step(self, population: Population) -> None:
+        """Remove the nearest cars within the radius as far as the rate permits."""
+        if self.rate <= 0.0:
+            return
+        names = [name for name in population.fleet.names if self._takes(population, name)]
+        if not names:
+            return
+        x, y = population.fleet.positions(names)
+        distance = np.hypot(x - self.place[0], y - self.place[1])
+        for n in np.argsort(distance, kind="stable").tolist():
+            if distance[n] > self.radius or self._next > population.time + TIME_TOLERANCE:
+                return
+            population.despawn(names[n])
+            # Unused capacity is not accumulated.
+            self._next = max(self._next, population.time - population.dt) + 1.0 / self.rate
+
+    def _takes(self, population: Population, name: str) -> bool:
+        return self.categories is None or population.fleet.spec(name).category in self.categories
+
+
+class BackgroundTraffic:
+    """Background cars without storyboard entity: created by generators, driven by the fleet."""
+
+    def __init__(self, population: Population) -> None:
+        self.population = population
+        self.fleet = population.fleet
+        self.instances: list[TrafficGenerator] = []
+        self._generators: list[TrafficGenerator] = []
+        """All generators, also those that have stopped."""
+        self._started: dict[str, int] = {}
+        self._begun = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all cars."""
+        return self.fleet.names
+
+    def key(self, name: str) -> int:
+        """Return the number of the next generator of this traffic name."""
+        self._started[name] = self._started.get(name, 0) + 1
+        return self._started[name]
+
+    def start(self, instance: TrafficGenerator) -> None:
+        """Start a generator. It takes effect from the next step on."""
+        self.instances.append(instance)
+        self._generators.append(instance)
+        self._begun = True
+
+    def stop(self, name: str | None) -> None:
+        """Stop all generators of this name, or all generators. Their cars remain."""
+        for instance in self.instances:
+            if name is None or instance.name == name:
+                instance.active = False
+
+    def shortages(self) -> Iterator[Diagnostic]:
+        """Yield a warning for each generator whose road users were never complete so far, or had no suitable lane."""
+        for instance in self._generators:
+            if (shortage := instance.shortage) is not None:
+                yield shortage
+
+    def step(self, view: WorldView, dt: float) -> Changes:
+        """Run the generators in each decision step, and move all cars by dt."""
+        changes = self.population.begin_step(view, dt)
+        if self.instances or len(self.fleet):
+            if self._begun or self.fleet.decides:
+                self._run_generators(view)
+            changes.placements = self.fleet.step(None, dt)
+            for name in self.fleet.departed:
+                self.population.forget(name)
+        return changes
+
+    def _run_generators(self, view: WorldView) -> None:
+        """Observe the other actors and run the generators."""
+        self._begun = False
+        growing = any(instance.is_due(self.population) for instance in self.instances)
+        self.fleet.observe(view, everywhere=growing)
+        if growing:
+            self.population.observe_foreign(view)
+        for instance in self.instances:
+            instance.step(self.population)
+        self.instances = [instance for instance in self.instances if instance.active]

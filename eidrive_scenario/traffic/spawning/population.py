@@ -11,9 +11,9 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import FREE
+from eidrive_scenario.traffic.right_of_way import MustStop
 from eidrive_scenario.traffic.spawning.bodies import WALKING, Participant
 from eidrive_scenario.traffic.spawning.sites import SpawnAreas, SpawnSites, is_unoccupied
-from eidrive_scenario.traffic.stop_lines import MustStop
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 

@@ -14,7 +14,7 @@ from street_scene import AGENT, STREET, at, groups_of
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.state.commands import Commands
-from eidrive_scenario.storyboard.state.states import StateChange
+from eidrive_scenario.storyboard.state.element_states import StateChange
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.actor import Placement
 

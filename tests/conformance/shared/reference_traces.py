@@ -21,7 +21,7 @@ from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.storyboard.kinematics.trailers import pairs
-from eidrive_scenario.storyboard.state.states import StateChange
+from eidrive_scenario.storyboard.state.element_states import StateChange
 
 RMS_LIMIT = 0.10
 """Maximum root mean square distance to the reference over time [m]."""

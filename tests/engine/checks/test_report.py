@@ -8,12 +8,14 @@ import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml, successor_xml
 from openscenario_xml import catalog_xml, road_file_xml, scenario_xml
 
-from eidrive_scenario.checks.catalog_checks import check_catalog
-from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
-from eidrive_scenario.checks.registry import ALL_RULES
-from eidrive_scenario.checks.report import CheckReport
-from eidrive_scenario.checks.rule import Level
-from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
+from eidrive_scenario.checks.rule import CheckReport, Level
+from eidrive_scenario.checks.scenario_checks import (
+    ALL_RULES,
+    DistributionCheckReport,
+    check_catalog,
+    check_road_file,
+    check_scenario,
+)
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic
 from eidrive_scenario.roads.model.map_warnings import MAP_RULES
 

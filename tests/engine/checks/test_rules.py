@@ -24,8 +24,8 @@ from storyboard_xml import (
     trigger_xml,
 )
 
-from eidrive_scenario.checks.registry import ALL_RULES, run_rules
 from eidrive_scenario.checks.rule import Level
+from eidrive_scenario.checks.scenario_checks import ALL_RULES, run_rules
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.openscenario import load_scenario
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from corpora import corpora_folder, corpora_name, needs_corpora, scenario_files
 
-from eidrive_scenario.checks.registry import run_rules
+from eidrive_scenario.checks.scenario_checks import run_rules
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
 

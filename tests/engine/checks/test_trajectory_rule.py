@@ -6,8 +6,7 @@ import pytest
 from openscenario_xml import road_file_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, private_xml
 
-from eidrive_scenario.checks.road_rules.context import RoadLintContext
-from eidrive_scenario.checks.road_rules.paths import MAX_POINTS, SPACING
+from eidrive_scenario.checks.road_rules import MAX_POINTS, SPACING, RoadLintContext
 from eidrive_scenario.checks.scenario_checks import check_scenario
 
 FOLLOW = """<RoutingAction><FollowTrajectoryAction><Trajectory name="far" closed="false"><Shape><Polyline>

@@ -17,7 +17,7 @@ HEAVY = (
 SHORT = (*HEAVY, "msgspec", "numpy", "py_trees", "pybullet", "rich", "simpleeval", "yaml")
 UNUSED = (
     "eidrive_scenario.experiments.judgement", "eidrive_scenario.openscenario.distributions.expansion",
-    "eidrive_scenario.recording.recording", "eidrive_scenario.traffic.background",
+    "eidrive_scenario.recording.recording", "eidrive_scenario.traffic.spawning.generators",
     "eidrive_scenario.rendering.renderer", "eidrive_scenario.rendering.scene",
 )  # fmt: skip
 """Modules for other runs: of distributions, with recording, background traffic or cameras."""

@@ -7,9 +7,9 @@ import pytest
 from eidrive_scenario.driving.planning.conflict_area import ConflictAreaSettings
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.openscenario.conventions import is_agent_controller
 from eidrive_scenario.openscenario.model.controllers import Controller
-from eidrive_scenario.openscenario.model.properties import Properties, Property
-from eidrive_scenario.openscenario.properties import is_agent_controller
+from eidrive_scenario.openscenario.model.declarations import Properties, Property
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 
 

@@ -20,7 +20,7 @@ from lxml import html
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.run_folder import folder_name, run_folder
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.files.lock import FileLock
+from eidrive_scenario.files.atomic import FileLock
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording import TraceHash, read_recording
 from eidrive_scenario.resolved_settings import ResolvedSettings

@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.experiments.judgement import judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.recorded_run import open_run
-from eidrive_scenario.export.table_files import write_csv
+from eidrive_scenario.export.tables import write_csv
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.simulation import RunSettings, Simulation

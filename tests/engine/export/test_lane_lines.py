@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from written_recording import view, write_run
 
-from eidrive_scenario.export.lane_lines import lane_edges
+from eidrive_scenario.export.geometry import lane_edges
 from eidrive_scenario.export.tool_topics import write_with_topics
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame

@@ -11,8 +11,7 @@ import pytest
 from written_recording import view, write_run
 
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
-from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.schemas import Osi
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.environment import Environment
 

@@ -180,7 +180,7 @@ def test_check_and_run_catalog_entries_that_multiply_are_refused(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each route refers to the next one twice, with another value: 2^24 routes in a few lines."""
-    monkeypatch.setattr("eidrive_scenario.openscenario.budget.MAX_CATALOG_ELEMENTS", 60_000)
+    monkeypatch.setattr("eidrive_scenario.openscenario.diagnostics.MAX_CATALOG_ELEMENTS", 60_000)
     declared = '<ParameterDeclaration name="p" parameterType="string" value="a"/>'
     assigned = '<ParameterAssignment parameterRef="p" value="${{$p + b{}}}"/>'
     declared = f"<ParameterDeclarations>{declared}</ParameterDeclarations>"

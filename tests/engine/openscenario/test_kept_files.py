@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.kept_files import KeptFiles
+from eidrive_scenario.openscenario.reading.parsing import KeptFiles
 
 
 def test_least_recently_used_values_are_removed() -> None:

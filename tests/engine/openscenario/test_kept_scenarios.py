@@ -10,9 +10,9 @@ import pytest
 from openscenario_xml import catalog_xml, object_xml, scenario_xml
 
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.openscenario import kept_scenarios
-from eidrive_scenario.openscenario.kept_files import KeptFiles
-from eidrive_scenario.openscenario.kept_scenarios import load_kept
+from eidrive_scenario.openscenario import loading
+from eidrive_scenario.openscenario.loading import load_kept
+from eidrive_scenario.openscenario.reading.parsing import KeptFiles
 from eidrive_scenario.openscenario.scenario import Scenario
 
 DECLARED = """<ParameterDeclarations>
@@ -96,7 +96,7 @@ def test_removed_catalog_is_an_error(scenario: Path) -> None:
 
 def test_kept_scenarios_are_bounded_by_the_size_of_their_files(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     size = scenario.stat().st_size
-    monkeypatch.setattr(kept_scenarios, "_kept", KeptFiles(2 * size))
+    monkeypatch.setattr(loading, "_kept", KeptFiles(2 * size))
     loaded = [load_kept(scenario, {"Speed": str(speed)}) for speed in (1, 2, 3)]
     again = [load_kept(scenario, {"Speed": str(speed)}) for speed in (3, 2)]
     assert again == [loaded[2], loaded[1]]

@@ -10,8 +10,7 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType
-from eidrive_scenario.openscenario.values.parameters import Scope, declare
-from eidrive_scenario.openscenario.values.references import hide_parameters, resolve_references
+from eidrive_scenario.openscenario.values.parameters import Scope, declare, hide_parameters, resolve_references
 
 
 def scope_of(**parameters: tuple[ParameterType, str]) -> Scope:

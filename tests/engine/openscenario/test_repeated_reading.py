@@ -11,9 +11,9 @@ from openscenario_xml import catalog_xml, object_xml, scenario_xml
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.library import scenarios
 from eidrive_scenario.openscenario import Scenario, load_scenario
-from eidrive_scenario.openscenario.kept_files import KeptFiles
 from eidrive_scenario.openscenario.model import Element
 from eidrive_scenario.openscenario.reading import parsing
+from eidrive_scenario.openscenario.reading.parsing import KeptFiles
 
 DECLARED = """<ParameterDeclarations>
 <ParameterDeclaration name="Speed" parameterType="double" value="5"/></ParameterDeclarations>"""

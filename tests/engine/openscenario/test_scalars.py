@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.openscenario.model import Priority, RelativeDistanceType, Rule
-from eidrive_scenario.openscenario.model.scalars import Limits
+from eidrive_scenario.openscenario.model.declarations import Limits
 from eidrive_scenario.openscenario.values.scalars import (
     BOOLEAN,
     DATE_TIME,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.view import Contact, WorldView

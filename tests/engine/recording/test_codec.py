@@ -15,7 +15,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.storyboard.state.states import ElementState
+from eidrive_scenario.storyboard.state.element_states import ElementState
 
 
 def round_trip(kind: Any, value: Any) -> Any:

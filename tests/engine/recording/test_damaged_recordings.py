@@ -176,7 +176,7 @@ def _forged(path: Path, source: Path, change: Callable[[bytes], bytes]) -> Path:
     """Write a recording with changed frames, a valid seal and valid checksums."""
     from mcap.writer import CompressionType, Writer
 
-    from eidrive_scenario.recording.seal import Seal
+    from eidrive_scenario.recording.integrity import Seal
 
     records = split(source.read_bytes())
     recording = read_recording(source)

@@ -12,8 +12,7 @@ from msgspec.structs import replace
 from eidrive_scenario.errors import InputError, SettingError, SimulationError
 from eidrive_scenario.recording import Recorder, TraceHash, read_recording
 from eidrive_scenario.recording.codec import codec
-from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.frame_check import check_frame
+from eidrive_scenario.recording.frame import Frame, check_frame
 from eidrive_scenario.recording.json_text import JsonText
 from eidrive_scenario.simulation.recorded_outcome import RunRecorder
 

@@ -11,7 +11,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import Frame, RunLog
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 
 START, STOP, SKIP, END = ElementTransition.START, ElementTransition.STOP, ElementTransition.SKIP, ElementTransition.END

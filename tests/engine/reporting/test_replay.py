@@ -15,12 +15,12 @@ from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
-from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.settings_text import short_number
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 
 Play = Callable[..., list[Frame]]
 

@@ -13,12 +13,12 @@ from msgspec.structs import replace
 
 from eidrive_scenario.evaluation.nearest_actor import nearest_body, nearest_pair
 from eidrive_scenario.geometry import box_distance
-from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.replay.frame_data import MessageList, Timeline, packed, replay_data
 from eidrive_scenario.reporting.replay.page import camera_files
 from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world.view import Contact
 

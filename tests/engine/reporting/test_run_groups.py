@@ -10,7 +10,7 @@ from lxml import html
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.reporting.run_report.report import write_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from eidrive_scenario.roads.model.fresnel import LONGEST, fresnel
+from eidrive_scenario.roads.model.curves import LONGEST, fresnel
 
 
 def test_fresnel_integrals_agree_with_scipy() -> None:

@@ -20,7 +20,7 @@ from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.state.domains import Domain
+from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.view import WorldView
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.state.domains import Domain
+from eidrive_scenario.storyboard.state.element_states import Domain
+from eidrive_scenario.storyboard.tree.builder import InitBlock
 from eidrive_scenario.storyboard.tree.elements import (
     ActElement,
     ManeuverElement,
@@ -15,7 +16,6 @@ from eidrive_scenario.storyboard.tree.elements import (
     StoryNode,
 )
 from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
-from eidrive_scenario.storyboard.tree.init_block import InitBlock
 from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 YES, NO = True, False

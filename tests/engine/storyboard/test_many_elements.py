@@ -20,12 +20,12 @@ from storyboard_xml import (
     trigger_xml,
 )
 
+from eidrive_scenario.checks.scenario_rules.context import ReachabilityAnalysis
 from eidrive_scenario.checks.scenario_rules.outline import Outline
-from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch, is_suffix
+from eidrive_scenario.openscenario.validation.names import ReferenceMatch, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.state.states import ElementState
+from eidrive_scenario.storyboard.state.element_states import ElementState
 from eidrive_scenario.storyboard.tree.events import EventElement
 
 ADD_ONE = """<GlobalAction><VariableAction variableRef="Count"><ModifyAction><Rule><AddValue value="1"/></Rule>

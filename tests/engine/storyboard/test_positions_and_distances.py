@@ -25,8 +25,8 @@ from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.distances import closing_speed, distance
+from eidrive_scenario.storyboard.positions.position_types import count_lanes
 from eidrive_scenario.storyboard.positions.resolution import resolve_position
-from eidrive_scenario.storyboard.positions.road_positions import count_lanes
 from eidrive_scenario.world.view import WorldView
 
 

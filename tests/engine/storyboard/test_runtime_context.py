@@ -13,7 +13,7 @@ from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.context.protocols import ActionContext, ConditionContext, ControllerContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion import Motion
-from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
+from eidrive_scenario.storyboard.state.commands import ExternalPose
 from eidrive_scenario.world.environment import Environment
 
 

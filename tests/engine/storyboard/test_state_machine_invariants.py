@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.state.domains import Domain
-from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.element_states import Domain, ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import (
     ActElement,
     ManeuverElement,

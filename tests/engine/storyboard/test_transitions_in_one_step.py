@@ -19,7 +19,7 @@ from storyboard_xml import (
     world_position_xml,
 )
 
-from eidrive_scenario.storyboard.state.states import ElementTransition
+from eidrive_scenario.storyboard.state.element_states import ElementTransition
 from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator
 
 PLACE = teleport_xml(world_position_xml(5))

@@ -23,9 +23,9 @@ from storyboard_xml import (
     world_position_xml,
 )
 
+from eidrive_scenario.checks.scenario_rules.context import ReachabilityAnalysis
 from eidrive_scenario.checks.scenario_rules.outline import Outline
-from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
-from eidrive_scenario.storyboard.state.states import ElementTransition
+from eidrive_scenario.storyboard.state.element_states import ElementTransition
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 TICKS = 60

@@ -12,7 +12,7 @@ from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, ro
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, LaneChanger
-from eidrive_scenario.traffic.mobil import Prospect, incentive, safe
+from eidrive_scenario.traffic.lane_changes import Prospect, incentive, safe
 
 BUMPERS = 4.6
 """Distance between the reference points of two cars in contact [m]."""

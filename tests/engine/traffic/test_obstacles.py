@@ -7,7 +7,7 @@ import pytest
 from fleet_scene import LENGTH, REAR_AXLE, street, view_of
 
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.obstacles import Obstacles
+from eidrive_scenario.traffic.occupancy import Obstacles
 from eidrive_scenario.world.actor import Placement
 
 LANE = -1.75

@@ -9,8 +9,8 @@ from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_x
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
-from eidrive_scenario.traffic.crossings import Crossings
 from eidrive_scenario.traffic.lanes import TrafficLanes
+from eidrive_scenario.traffic.right_of_way import Crossings
 
 
 @pytest.mark.parametrize(("radius", "conflict"), [(2.5, True), (12.0, False)])

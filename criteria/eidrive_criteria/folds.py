@@ -1,0 +1,193 @@
+"""Folds that criteria share: limits of a value, its extreme, steps of one actor, sums in a forbidden state."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from eidrive_scenario.api.common import RoadNetwork, WorldView
+from eidrive_scenario.api.criteria import (
+    Continuity,
+    Criterion,
+    CriterionSettings,
+    Frame,
+    LaneTracker,
+    Step,
+    Verdict,
+    actor_never_present,
+)
+
+TwoActors = TypeVar("TwoActors", bound=CriterionSettings)
+
+
+class BoundedSettings(CriterionSettings):
+    """Settings: `{at_least: 1, at_most: 3}` in the unit of the criterion, which passes without limits."""
+
+    at_least: Annotated[float, Field(ge=0)] | None = None
+    at_most: Annotated[float, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
+            raise ValueError(f"'at_least' exceeds 'at_most' (got {self.at_least} > {self.at_most})")
+        return self
+
+    def allows(self, value: float) -> bool:
+        """Return whether a value is within the limits."""
+        return not self.is_below(value) and not self.is_above(value)
+
+    def is_below(self, value: float) -> bool:
+        """Return whether a value is below the lower limit."""
+        return self.at_least is not None and value < self.at_least
+
+    def is_above(self, value: float) -> bool:
+        """Return whether a value is above the upper limit."""
+        return self.at_most is not None and value > self.at_most
+
+    def limit_of(self, value: float | None) -> float | None:
+        """Return the limit that a verdict states: the violated one, else the lower one if there is one."""
+        if self.at_least is None or (value is not None and self.is_above(value)):
+            return self.at_most
+        return self.at_least
+
+
+def require_two_actors(settings: TwoActors) -> TwoActors:
+    """Return settings whose actors `of` and `to` differ. It is a validator of pydantic: it raises ValueError."""
+    of, to = getattr(settings, "of", None), getattr(settings, "to", None)
+    if of == to:
+        raise ValueError(f"'of' and 'to' are equal (got {of!r}; expected two actors)")
+    return settings
+
+
+class Extreme:
+    """Largest or smallest value with its time [s], and the time of the first value beyond the limit."""
+
+    def __init__(self, limit: float | None, *, largest: bool, tolerance: float = 0.0) -> None:
+        self.limit = limit
+        self._largest, self._tolerance = largest, tolerance
+        self.value: float | None = None
+        """The extreme; None before the first value."""
+        self.when = math.nan
+        self.violated: float | None = None
+        """Time of the first violation [s]; None without one."""
+
+    def add(self, value: float, time: float) -> bool:
+        """Add a value, and return whether it is the new extreme."""
+        sign = 1.0 if self._largest else -1.0
+        if self.violated is None and self.limit is not None and sign * (value - self.limit) > self._tolerance:
+            self.violated = time
+        if self.value is not None and sign * (value - self.value) <= 0.0:
+            return False
+        self.value, self.when = value, time
+        return True
+
+
+def conclude_extreme(criterion: Criterion, extreme: Extreme, reason: str, *, measured: bool = True) -> Verdict:
+    """Return the verdict on an extreme: failed by a violation, or unless it was `measured`."""
+    return criterion.conclude(
+        measured and extreme.violated is None,
+        reason,
+        value=extreme.value,
+        limit=extreme.limit,
+        first_violation=extreme.violated,
+    )
+
+
+class FollowedCriterion(Criterion):
+    """Criterion on one actor. Its motion since the previous frame excludes absences and teleports."""
+
+    def __init__(self, settings: CriterionSettings, of: str) -> None:
+        super().__init__(settings)
+        self.of = of
+        self.subjects = (of,)
+        self.was_present = False
+        """Whether the actor was in a frame."""
+        self._continuity = Continuity()
+
+    def interrupt(self) -> None:
+        """Forget the previous frame, after an absence or a teleport, and before the first frame."""
+
+    @abstractmethod
+    def follow(self, frame: Frame, row: int, step: Step | None) -> None:
+        """Process a frame with the actor in a row. `step` is the motion since the previous frame; None without it."""
+
+    def observe(self, frame: Frame) -> None:
+        row = frame.view.rows.get(self.of)
+        step = self._continuity.step(frame.view, row)
+        if step is None:
+            self.interrupt()
+        if row is not None:
+            self.was_present = True
+            self.follow(frame, row, step)
+
+
+class SummedSettings(CriterionSettings):
+    """Settings: `{of: Ego, at_most: 0.5}` in the unit of the criterion."""
+
+    of: str
+    at_most: Annotated[float, Field(ge=0)] = 0.0
+
+
+class SummedCriterion(FollowedCriterion):
+    """Criterion that fails if a sum exceeds `at_most`; with `at_most` 0 a single frame in the state fails it."""
+
+    needs_roads = True
+    state: ClassVar[str]
+    """Predicate of the state in reasons, which follows the name of the actor."""
+
+    def __init__(self, settings: SummedSettings) -> None:
+        super().__init__(settings, settings.of)
+        self.at_most = settings.at_most
+        self._sum = 0.0
+        self._first: float | None = None
+        """First time in the state [s]."""
+        self._violated: float | None = None
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        if roads is not None:
+            self.lanes = LaneTracker(roads)
+
+    @abstractmethod
+    def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
+        """Return the amount to add since the previous frame, None outside the state.
+
+        duration, distance  since the previous frame [s, m]; 0 in the first one and after a teleport
+        """
+
+    def interrupt(self) -> None:
+        self.lanes.forget()
+
+    def follow(self, frame: Frame, row: int, step: Step | None) -> None:
+        time = frame.view.time
+        added = self.increment(frame.view, row, *(step or (0.0, 0.0)))
+        if added is None:
+            return
+        self._first = time if self._first is None else self._first
+        self._sum += added
+        if self._violated is None and (self._sum > self.at_most or self.at_most == 0.0):
+            self._violated = time
+
+    def verdict(self) -> Verdict:
+        if not self.was_present:
+            reason = actor_never_present([self.of])
+        elif self._first is None:
+            reason = f"{self.of} never {self.state}"
+        else:
+            amount = f"{self._sum:.2f} {self.unit}" if self.unit else f"{self._sum:.0f} times"
+            reason = f"{self.of} {self.state}: {amount}, first at {self._first:.2f} s"
+        return self.conclude(
+            self.was_present and self._violated is None,
+            reason,
+            value=self._sum if self.was_present else None,
+            limit=self.at_most,
+            first_violation=self._violated,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the sum."""
+        return {f"{self.name}.{self.of}": self._sum} if self.was_present else {}

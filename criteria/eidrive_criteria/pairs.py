@@ -1,0 +1,156 @@
+"""Base classes of criteria on an actor and another one: any other actor, or the leader in its lane."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+from pydantic import Field, model_validator
+
+from eidrive_criteria.folds import Extreme, conclude_extreme, require_two_actors
+from eidrive_scenario.api.common import RoadNetwork, WorldView
+from eidrive_scenario.api.criteria import (
+    Criterion,
+    CriterionSettings,
+    Frame,
+    Relation,
+    Surroundings,
+    Verdict,
+    actor_never_present,
+)
+
+
+class PairSettings(CriterionSettings):
+    """Settings: `{of: Ego, to: Incoming, at_least: 3.5}`. Without `at_least` the criterion only measures and passes."""
+
+    of: str
+    to: str
+    at_least: Annotated[float, Field(ge=0)] | None = None
+
+    _two_actors = model_validator(mode="after")(require_two_actors)
+
+
+class PairCriterion(Criterion):
+    """Criterion that fails if a quantity falls below `at_least`.
+
+    It also fails if both actors are never present at the same time.
+    """
+
+    def __init__(self, settings: PairSettings) -> None:
+        super().__init__(settings)
+        self.of, self.to, self.limit = settings.of, settings.to, settings.at_least
+        self.subjects = (settings.of, settings.to)
+        self.smallest, self.when = math.inf, math.nan
+        """Minimum so far, infinite without a value, and its time [s]."""
+        self._missing = set(self.subjects)
+        self._together = False
+        self._violated: float | None = None
+
+    @abstractmethod
+    def measure(self, view: WorldView, of: int, to: int) -> float:
+        """Return the quantity between the actors in two rows of the view; infinite if there is none now.
+
+        If it exceeds the minimum so far, any value between that minimum and the quantity is allowed.
+        """
+
+    @abstractmethod
+    def describe_smallest(self) -> str:
+        """Describe the minimum, or its absence although both actors were present."""
+
+    def observe(self, frame: Frame) -> None:
+        view = frame.view
+        if self._missing:
+            self._missing.difference_update(view.names)
+        of, to = view.rows.get(self.of), view.rows.get(self.to)
+        if of is None or to is None:
+            return
+        self._together = True
+        value = self.measure(view, of, to)
+        if value < self.smallest:
+            self.smallest, self.when = value, view.time
+        if self._violated is None and self.limit is not None and value < self.limit:
+            self._violated = view.time
+
+    def verdict(self) -> Verdict:
+        if self._together:
+            reason = self.describe_smallest()
+        else:
+            apart = f"{self.of} and {self.to} were never present at the same time"
+            reason = actor_never_present(self._missing) if self._missing else apart
+        return self.conclude(
+            self._together and self._violated is None,
+            reason,
+            value=self.smallest if math.isfinite(self.smallest) else None,
+            limit=self.limit,
+            first_violation=self._violated,
+        )
+
+
+class LeaderSettings(CriterionSettings):
+    """Settings: `{of: Ego}` for the nearest actor ahead in the path of the actor, `{of: Ego, to: Lead}` for one actor
+    while it is ahead in that path.
+    """
+
+    of: str
+    to: str | None = None
+
+    _two_actors = model_validator(mode="after")(require_two_actors)
+
+
+class LeaderCriterion(Criterion):
+    """Criterion on a quantity of an actor and its leader.
+
+    A criterion with a minimum fails below `limit`, one with a maximum above it. Without a leader it passes; its value
+    is then None.
+    """
+
+    quantity: ClassVar[str]
+    """Description of the quantity for reasons."""
+    largest: ClassVar[bool] = False
+    """Whether the extreme is a maximum."""
+
+    def __init__(self, settings: LeaderSettings, limit: float | None) -> None:
+        super().__init__(settings)
+        self.of, self.to, self.limit = settings.of, settings.to, limit
+        self.subjects = (settings.of,) if settings.to is None else (settings.of, settings.to)
+        self._surroundings = Surroundings(None)
+        self._missing = set(self.subjects)
+        self._extreme = Extreme(limit, largest=self.largest)
+        self._other = ""
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        self._surroundings = Surroundings(roads)
+
+    @abstractmethod
+    def measure(self, leader: Relation) -> float | None:
+        """Return the quantity with regard to the leader; None if it is not defined now."""
+
+    def observe(self, frame: Frame) -> None:
+        view = frame.view
+        if self._missing:
+            self._missing.difference_update(view.names)
+        leader = self._surroundings.leader(view, self.of, None if self.to is None else (self.to,))
+        value = self.measure(leader) if leader is not None else None
+        if value is None or leader is None:
+            return
+        if self._extreme.add(value, view.time):
+            self._other = leader.other
+
+    def verdict(self) -> Verdict:
+        if self._missing:
+            reason = actor_never_present(self._missing)
+        elif self._extreme.value is None:
+            reason = f"{self.of} never had {self.to or 'an actor'} ahead in its path, so there is no {self.quantity}"
+        else:
+            value = f"{self._extreme.value:.2f} {self.unit}"
+            reason = f"{self.quantity} of {self.of} to {self._other} was {value} at {self._extreme.when:.2f} s"
+        return conclude_extreme(self, self._extreme, reason, measured=not self._missing)
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the extreme and its time [s]; empty without a value."""
+        if self._extreme.value is None:
+            return {}
+        return {f"{self.name}.{self.of}": self._extreme.value, f"{self.name}.{self.of}.time": self._extreme.when}

@@ -1,0 +1,109 @@
+"""Tracking of one actor from frame to frame: its steps without absences and teleports, and the lanes under it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.roads import Lane, LaneKey, LaneLocation, RoadNetwork
+from eidrive_scenario.world.view import WorldView
+
+JUMP = 1.0
+"""Displacement beyond the one at twice the speed that is a teleport [m]."""
+
+
+class Step(NamedTuple):
+    """Motion since the previous frame: duration [s] and distance of the center of the body [m]."""
+
+    duration: float
+    distance: float
+
+
+class Continuity:
+    """Steps of one actor between successive frames."""
+
+    def __init__(self) -> None:
+        self._last: tuple[float, float, float, float] | None = None
+        """Time, center and speed in the previous frame; None if the actor was absent."""
+
+    def step(self, view: WorldView, row: int | None) -> Step | None:
+        """Return the motion since the previous frame; None after an absence or a teleport.
+
+        row  of the actor; None if it is absent
+        """
+        before = self._last
+        if row is None:
+            self._last = None
+            return None
+        x, y, *_ = view.plain_boxes[row]
+        speed = abs(float(view.speed[row]))
+        self._last = view.time, x, y, speed
+        if before is None:
+            return None
+        duration, distance = view.time - before[0], math.hypot(x - before[1], y - before[2])
+        reach = 2.0 * max(speed, before[3]) * duration + JUMP
+        return Step(duration, distance) if distance <= reach else None
+
+
+Point = tuple[float, float, float]
+
+SIDEWALKS = frozenset({"sidewalk", "walking"})
+"""Lane types for pedestrians."""
+
+
+class LaneTracker:
+    """Lanes under one actor. The previous lane has priority, so that an actor remains on its connecting road."""
+
+    def __init__(self, roads: RoadNetwork) -> None:
+        self.roads = roads
+        self._hint: LaneLocation | None = None
+
+    def center(self, view: WorldView, row: int) -> LaneLocation | None:
+        """Return the lane under the center of an actor; None off all lanes."""
+        x, y, *_ = view.plain_boxes[row]
+        place = self.roads.locate_at(x, y, self._hint, view.states[row].z)
+        self._hint = place
+        return place if place is not None and self.roads.on_road(place) else None
+
+    def forget(self) -> None:
+        """Forget the previous lane, after a teleport."""
+        self._hint = None
+
+    def lane(self, place: LaneLocation) -> Lane:
+        """Return the lane of a location."""
+        return self.roads.road(place.road).section_at(place.s).lanes[place.lane]
+
+    def key(self, place: LaneLocation) -> LaneKey:
+        """Return the lane of a location as a node of the lane graph."""
+        return LaneKey(place.road, self.roads.road(place.road).section_at(place.s).index, place.lane)
+
+    def rows_at(self, points: Sequence[Point]) -> list[set[int]]:
+        """Return the rows in `roads.tables` of all lanes under each point."""
+        x, y, z = np.array(points, dtype=float).reshape(-1, 3).T
+        rows, _, indices = self.roads.overlapped_lanes(x, y, z)
+        found: list[set[int]] = [set() for _ in points]
+        for row, index in zip(rows.tolist(), indices.tolist(), strict=True):
+            if self.roads.tables.lane_id[row]:
+                found[index].add(row)
+        return found
+
+    def types_at(self, points: Sequence[Point]) -> list[set[str]]:
+        """Return the types of all lanes under each point; "driving" for every type for cars."""
+        lanes = self.roads.tables.lanes
+        return [
+            {"driving" if lanes[row].drivable else lanes[row].type for row in rows} for rows in self.rows_at(points)
+        ]
+
+
+def corners(view: WorldView, row: int) -> list[Point]:
+    """Return the corners of the body of an actor on the ground: front left, rear left, rear right, front right."""
+    x, y, _, length, width, _, yaw = view.plain_boxes[row]
+    cos, sin, z = math.cos(yaw), math.sin(yaw), view.states[row].z
+    ahead, left = length / 2.0, width / 2.0
+    return [
+        (x + cos * p - sin * q, y + sin * p + cos * q, z)
+        for p, q in ((ahead, left), (-ahead, left), (-ahead, -left), (ahead, -left))
+    ]

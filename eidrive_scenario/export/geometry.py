@@ -1,0 +1,128 @@
+"""Poses of bounding boxes in world and vehicle coordinates; center lines and edges of lanes in the world."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+
+
+def rotations(yaw: Array, pitch: Array, roll: Array) -> Array:
+    """Return the matrices (N, 3, 3) of z-y'-x'' rotations, which turn vectors of the bodies into the world."""
+    cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def angles(turn: Array) -> tuple[float, float, float]:
+    """Return yaw, pitch and roll of a rotation matrix (3, 3), the inverse of `rotations` [rad]."""
+    (xx, _, _), (yx, _, _), (zx, zy, zz) = turn.tolist()
+    return math.atan2(yx, xx), math.asin(min(max(-zx, -1.0), 1.0)), math.atan2(zy, zz)
+
+
+def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[float, float, float, float]:
+    """Return x, y, z, w of a z-y'-x'' rotation [rad]."""
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+SPACING = 2.0
+"""Maximum distance between the points of a line [m]."""
+_MAX_POINTS = 400_000
+"""Maximum number of points of all lines of a map, which increases the distance on large maps."""
+_MARKS: Mapping[str, str] = {
+    "none": "NO_LINE",
+    "broken": "DASHED_LINE",
+    "broken broken": "DASHED_LINE",
+    "botts dots": "BOTTS_DOTS",
+    "curb": "CURB",
+    "grass": "GRASS_EDGE",
+    "edge": "ROAD_EDGE",
+}
+"""Types of edges by road mark; all others are solid lines."""
+_COLORS = frozenset({"white", "yellow", "red", "blue", "green", "violet", "orange"})
+
+Line = list[list[float]]
+"""Points x, y, z [m]."""
+
+
+@dataclass(frozen=True)
+class LaneEdge:
+    """Outer edge of a lane with one road mark, from one s to another [m]; types are those of OSI lane boundaries."""
+
+    start: float
+    end: float
+    type: str
+    color: str
+
+
+def point_spacing(roads: RoadNetwork) -> float:
+    """Return the distance between the points of lines, so that a large map has a limited number of points [m]."""
+    length = sum(
+        2.0 * section.length * len(section.lanes) for road in roads.roads.values() for section in road.sections
+    )
+    return max(SPACING, length / _MAX_POINTS)
+
+
+def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
+    """Yield the outer edges of a lane in the order of s, one per road mark."""
+    if lane is None:
+        return
+    marks = [mark for mark in lane.road_marks if mark.s_offset < section.length]
+    starts = [section.s + max(mark.s_offset, 0.0) for mark in marks]
+    if not marks or starts[0] > section.s:
+        yield LaneEdge(section.s, starts[0] if marks else section.end, "NO_LINE", "none")
+    for mark, start, end in zip(marks, starts, [*starts, section.end][1:], strict=True):
+        if end > start:
+            color = mark.color if mark.color in _COLORS else "white"
+            yield LaneEdge(start, end, _MARKS.get(mark.type, "SOLID_LINE"), color)
+
+
+def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, spacing: float) -> Line:
+    """Return the center line of a lane in the direction of s, with the height of the lane above the road."""
+    stations = _stations(section.s, section.end, spacing)
+    aside = [lane.side * lane.center.value(s - section.s) + road.lane_offset.value(s) for s in stations]
+    points = _line(roads, road, stations, aside)
+    return [[x, y, z + _height(lane, s - section.s)] for s, (x, y, z) in zip(stations, points, strict=True)]
+
+
+def edge_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, edge: LaneEdge, spacing: float) -> Line:
+    """Return an outer edge of a lane on the surface of the road, in the direction of s."""
+    stations = _stations(edge.start, edge.end, spacing)
+    aside = [lane.side * lane.outer.value(s - section.s) + road.lane_offset.value(s) for s in stations]
+    return _line(roads, road, stations, aside)
+
+
+def _line(roads: RoadNetwork, road: Road, stations: list[float], aside: list[float]) -> Line:
+    poses = roads.road_pose(road.id, stations, aside)
+    points: Line = np.column_stack([poses.x, poses.y, poses.z]).tolist()
+    return points
+
+
+def _height(lane: Lane, along: float) -> float:
+    """Return the height of the middle of a lane above the road [m], for example of a sidewalk."""
+    index = bisect_right(lane.heights, along, key=lambda entry: entry.s_offset) - 1
+    return 0.5 * (lane.heights[index].inner + lane.heights[index].outer) if index >= 0 else 0.0
+
+
+def _stations(start: float, end: float, spacing: float) -> list[float]:
+    found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
+    return found
