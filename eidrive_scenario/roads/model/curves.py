@@ -208,7 +208,7 @@ class Cubic(Curve):
 
 
 def spiral(
-    s: float, x: float, y: float, h: float, length: float, start: float, end: float, line: int | None = None
+    s: float, x: float, y: float, h: float, length: float, start: float, end: float, *, line: int | None = None
 ) -> Curve:
     """Return the curve with linear curvature from `start` to `end` [1/m], or an arc if the change is negligible."""
     rate = (end - start) / length

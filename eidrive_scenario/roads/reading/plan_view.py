@@ -76,7 +76,7 @@ def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequ
         return [Arc(s, x, y, h, length, collector.number(shape, "curvature"), line=line)]
     if shape.tag == "spiral":
         start, end = collector.number(shape, "curvStart"), collector.number(shape, "curvEnd")
-        return [curves.spiral(s, x, y, h, length, start, end, line)]
+        return [curves.spiral(s, x, y, h, length, start, end, line=line)]
     if shape.tag == "poly3":
         a, b, c, d = (collector.number(shape, name) for name in "abcd")
         collector.spend(geometry, "meters of poly3", length, LONGEST_POLY3)

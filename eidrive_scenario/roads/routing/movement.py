@@ -98,7 +98,9 @@ class Movement:
             inside = section.index == len(road.sections) - 1 if direction > 0 else True
             if remaining <= 0.0 and (inside or s < section.end):
                 break
-            following = self._next(road, section, lane, direction, with_traffic, offset, route, choose, visit)
+            following = self._next(
+                road, section, lane, direction, with_traffic, offset, route=route, choose=choose, visit=visit
+            )
             if following is None and (remaining <= 0.0 or to_end):
                 if not inside:
                     # At the end of the section, the next one starts without this lane.
@@ -157,10 +159,12 @@ class Movement:
         direction: int,
         with_traffic: bool,
         offset: float,
+        *,
         route: BranchGuide | None,
         choose: BranchSelector | None,
         visit: int,
     ) -> tuple[LaneKey, int, float] | None:
+        """Return the lane after the end of a lane, the direction in it, and the change of offset; None without one."""
         key = LaneKey(road.id, section.index, lane.id)
         found = self.branches(key, direction, with_traffic)
         if not found:
