@@ -1,19 +1,45 @@
-"""Digests of values: equal digests mean equal content, to the last bit of each number."""
+"""Digests of values and of texts, and the versions of the packages: what makes two results comparable."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
 import numpy as np
 import pydantic
 
+ENGINE = "eidrive-scenario"
+_PACKAGES = (ENGINE, "numpy", "pybullet")
 _NUMBER = struct.Struct("<d")
+
+
+def canonical_json(value: Any) -> str:
+    """Return JSON with sorted keys, without white space, in ASCII: equal values give equal texts."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+
+
+def sha256_of(content: bytes) -> str:
+    """Return the SHA-256 as 64 hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
+@cache
+def package_versions() -> Mapping[str, str]:
+    """Return the installed versions of the packages that affect the result."""
+    versions = {}
+    for name in _PACKAGES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
 
 
 class _Hash(Protocol):

@@ -1,4 +1,4 @@
-"""Exceptions of this package, and the diagnostics of invalid input.
+"""Exceptions of this package, the diagnostics of invalid input, and the exit codes of runs.
 
 EidriveError
 ├── InputError           invalid user input: one or several diagnostics, each with file, line and hint
@@ -311,3 +311,14 @@ def suggestion(word: str, known: Iterable[str]) -> str:
         return "none is known here"
     shown = ", ".join(shortened(name, _MAX_WORD) for name in candidates[:12])
     return f"known: {shown}" + (", …" if len(candidates) > 12 else "")
+
+
+PASSED = 0
+FAILED = 1
+"""A criterion failed."""
+INVALID_INPUT = 2
+"""The input is invalid; nothing was run."""
+ABORTED = 3
+"""The run was aborted, or reached its time limit."""
+NOT_JUDGED = 4
+"""The run ended, and no criterion judged it."""

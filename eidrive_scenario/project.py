@@ -46,6 +46,18 @@ def selected_project() -> Path | None:
     return Path(os.path.abspath(folder)) if folder else None
 
 
+def portable_path(path: str | os.PathLike[str]) -> str:
+    """Return the absolute path, or the path from the folder of the selected project for a file below it.
+
+    A command with it is valid in any folder, and after a copy of the project only the name of its folder changes.
+    """
+    full, project = Path(os.path.abspath(path)), selected_project()
+    if project is None or not full.is_relative_to(project):
+        return str(full)
+    relative = full.relative_to(project).as_posix()
+    return f"./{relative}" if relative.startswith("-") else relative
+
+
 def enter_project(folder: Path) -> str:
     """Use the project in a folder, and make this folder the current one. Return a notice for the user, or "".
 

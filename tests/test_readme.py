@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from eidrive_scenario.cli.command_table import CommandTable
+from eidrive_scenario.cli import CommandTable
 from eidrive_scenario.cli.show import Names
 from eidrive_scenario.pytest_plugin.options import OPTIONS
 

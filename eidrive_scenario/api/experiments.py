@@ -3,6 +3,7 @@
 Stable: all names but those of jobs and average precision, which may change in a minor version.
 """
 
+from eidrive_scenario.content_digest import canonical_json, sha256_of
 from eidrive_scenario.experiments.average_precision import (
     area_in_order,
     average_precision,
@@ -35,7 +36,6 @@ from eidrive_scenario.library import (
     library_path,
     resolve_scenario,
 )
-from eidrive_scenario.resolved_settings import canonical_json, sha256_of
 
 __all__ = [
     "Job",

@@ -6,7 +6,7 @@ Stable: all names.
 from eidrive_scenario.checks.rule import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.driving.step import StationAction
-from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, NOT_JUDGED, PASSED
+from eidrive_scenario.errors import ABORTED, FAILED, INVALID_INPUT, NOT_JUDGED, PASSED
 from eidrive_scenario.experiments.judgement import Judgement, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.statistics.sequential import success_rate
@@ -23,7 +23,7 @@ from eidrive_scenario.recording.text.csv_writer import text_of_csv
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.rendering.tone_mapping import ideal_image
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
-from eidrive_scenario.simulation.tick_start import TickStart
+from eidrive_scenario.simulation.tick import TickStart
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.camera import Pinhole

@@ -30,7 +30,6 @@ from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.validation.rules import check_values
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run_outcome import HOW_TO_JUDGE, UNJUDGED
 
 ALL_RULES: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES, *ROAD_FILE_RULES)
@@ -124,8 +123,7 @@ def scenario_diagnostics(
 def added_sources(settings: RunSettings | None) -> tuple[str | Path, ...]:
     """Return the criteria and driving stacks that settings add to a scenario, as YAML texts and files."""
     given = settings or RunSettings()
-    stacks = (stack for stack in drive_sources(given.drive).values() if stack is not None)
-    return (*criteria_sources(given.criteria), *stacks)
+    return (*given.criteria_sources, *(stack for stack in given.stacks.values() if stack is not None))
 
 
 def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:

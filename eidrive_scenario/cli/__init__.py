@@ -1,4 +1,6 @@
-"""Command `eidrive`. Each command is imported when it is executed, as the imports of all take longer than a short one.
+"""Command `eidrive`: commands of the engine, and those of other packages (entry points `eidrive_scenario.commands`).
+
+Each command is imported when it is executed or described, as the imports of all take longer than a short one.
 
 Exit codes: 0 passed, 1 a criterion failed, 2 invalid input, 3 the run was aborted or reached its time limit, 4 no
 criterion judges the run.
@@ -7,18 +9,85 @@ criterion judges the run.
 from __future__ import annotations
 
 import gc
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.main import get_command
 
 from eidrive_scenario import __version__
-from eidrive_scenario.cli.command_table import CommandTable
-from eidrive_scenario.cli.error_output import Guarded, print_error
-from eidrive_scenario.cli.streams import echo, make_writable
+from eidrive_scenario.cli.output import Guarded, echo, make_writable, print_error
 from eidrive_scenario.cli.supervision import allow
-from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.errors import ABORTED
+
+if TYPE_CHECKING:
+    from eidrive_scenario.registry import Registry
+
+FUNCTIONS = {
+    "run": "run:run",
+    "check": "check:check",
+    "list": "show:list_names",
+    "tree": "show:tree",
+    "view": "show:view",
+    "judge": "recordings:judge",
+    "export": "recordings:export",
+    "report": "show:report",
+    "sweep": "sweep:sweep",
+    "results": "results:results",
+    "compare": "results:compare",
+    "init": "init:init",
+}
+"""Module of this package and function of each command, in the order of the help."""
+_SHORT = frozenset({"run", "check", "sweep"})
+"""Commands with options that only `--help-all` describes."""
+
+
+class CommandTable(Mapping[str, Any]):
+    """Commands of the command line by name, each created on its first access."""
+
+    def __init__(self) -> None:
+        self._created: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a command. Raise KeyError if none has this name."""
+        if name not in self._created:
+            self._created[name] = _create(name, _function(name))
+        return self._created[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([*FUNCTIONS, *(name for name in _added() if name not in FUNCTIONS)])
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+def _added() -> Registry:
+    """Return the commands of other packages."""
+    from eidrive_scenario.registry import registry  # late: a command of the engine does not read entry points
+
+    return registry("commands")
+
+
+def _function(name: str) -> Callable[..., Any]:
+    """Return the function of a command. Those of the engine come first, so that no package replaces them."""
+    if name not in FUNCTIONS:
+        if name not in _added():
+            raise KeyError(name)
+        function: Callable[..., Any] = _added().load(name)
+        return function
+    module, _, function_name = FUNCTIONS[name].partition(":")
+    return getattr(import_module(f"eidrive_scenario.cli.{module}"), function_name)  # type: ignore[no-any-return]
+
+
+def _create(name: str, function: Callable[..., Any]) -> Any:
+    from eidrive_scenario.cli.options import ShortHelp
+
+    app = typer.Typer(add_completion=False)
+    app.command(name=name, cls=ShortHelp if name in _SHORT else None)(function)
+    return get_command(app)
 
 
 class _Commands(Guarded):
@@ -64,7 +133,7 @@ def _options(
     ] = False,
 ) -> None:
     """Select the project, by default that of the current folder. `Guarded` and `_show_version` evaluate the others."""
-    from eidrive_scenario.cli.streams import echo
+    from eidrive_scenario.cli.output import echo
     from eidrive_scenario.project import enter_project, select_project
 
     with suppress(FileNotFoundError):  # The current folder is deleted

@@ -4,39 +4,31 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import AllowTorchscript, Criteria, Drive, Planner
-from eidrive_scenario.cli.error_output import print_error, print_unused_projects
-from eidrive_scenario.cli.hung_check import HungCheck
-from eidrive_scenario.cli.option_values import check_seconds
-from eidrive_scenario.cli.short_help import HelpAll
-from eidrive_scenario.cli.streams import echo
+from eidrive_scenario.cli.options import HelpAll, takes_run_options
+from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
+from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError
+from eidrive_scenario.run_options import RunSettings, check_seconds
 from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
     from eidrive_scenario.checks.rule import CheckReport
-    from eidrive_scenario.simulation import RunSettings
 
 
+@takes_run_options("check", at="wall_limit", before={"planner": "criteria"})
 def check(
+    settings: RunSettings,
     context: typer.Context,
     paths: Annotated[list[str], typer.Argument(metavar="PATH…", help="Files, folders, or library names.")],
     strict: Annotated[bool, typer.Option("--strict", help="Treat warnings as errors.")] = False,
     ignore: Annotated[
         list[str] | None, typer.Option(metavar="RULE", help="Rule to ignore; repeatable.", show_default="none")
     ] = None,
-    drive: Drive = None,
-    planner: Planner = None,
-    criterion: Criteria = None,
-    allow_torchscript: AllowTorchscript = False,
     wall_limit: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
@@ -50,19 +42,15 @@ def check(
     A diagnostic of a rule ends with the name of the rule; `eidrive list rules` lists all rules.
     """
     from eidrive_scenario.checks.scenario_checks import DistributionCheckReport
-    from eidrive_scenario.simulation import RunSettings
-    from eidrive_scenario.simulation.added_settings import parse_drive
 
-    settings = RunSettings(
-        drive=parse_drive("--drive", drive or []),
-        planner=planner,
-        criteria=criterion,
-        allow_torchscript=allow_torchscript,
-    )
-    hung = HungCheck()
+    in_progress: list[Path] = []
+
+    def report_hang(error: WallLimitError) -> None:
+        print_error(error, "check", *in_progress)  # only the child process knows the file
+
     if wall_limit is not None:
         check_seconds("--wall-limit", wall_limit)
-        supervise(hung.end, partial(hung.report_dump, wall_limit), "check")
+        supervise(wall_limit, report_hang, what="check")
     missing: list[Diagnostic] = []
     aborted: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
@@ -70,7 +58,7 @@ def check(
     for diagnostic in missing:
         echo(str(diagnostic))
     for path in files:
-        hung.file = path
+        in_progress[:] = [path]
         try:
             report = _check_file(path, ignored, settings, wall_limit)
         except InputError:

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from eidrive_scenario.cli.streams import echo
+from eidrive_scenario.cli.output import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 TEMPLATE = "project_template"

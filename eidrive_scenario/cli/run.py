@@ -2,43 +2,62 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
+import math
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import (
-    AllowTorchscript,
-    Controllers,
-    Criteria,
-    Drive,
+from eidrive_scenario.cli.options import (
+    HelpAll,
     Keep,
-    NoCriteria,
-    Planner,
-    UserValues,
+    Record,
+    check_output_paths,
+    check_record,
+    rare,
+    takes_run_options,
 )
-from eidrive_scenario.cli.error_output import print_warnings
-from eidrive_scenario.cli.live import Live, LivePort, LiveSpeed, live_view, wait_until_closed
-from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
-from eidrive_scenario.cli.output_paths import check_output_paths
-from eidrive_scenario.cli.run_failures import RunFailures
-from eidrive_scenario.cli.short_help import HelpAll, rare
-from eidrive_scenario.cli.streams import echo, has_all_characters
-from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
-from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
+from eidrive_scenario.cli.output import echo, has_all_characters, print_warnings
+from eidrive_scenario.cli.supervision import RunFailures, supervise
+from eidrive_scenario.errors import (
+    ABORTED,
+    INVALID_INPUT,
+    ConstraintError,
+    Diagnostic,
+    EidriveError,
+    InputError,
+    SettingError,
+)
+from eidrive_scenario.run_options import RunSettings, check_seconds
 
 if TYPE_CHECKING:
+    from eidrive_scenario.experiments.statistics.sequential import RatioTest
     from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.recording import Explanation
+    from eidrive_scenario.reporting.live.live_view import LiveView
+    from eidrive_scenario.simulation import RunResult
 
 CONFIDENCE = 0.95
 """Default confidence of `--success-rate`."""
+STANDARD_OUTPUT = "-"
+"""Value of `--log` for standard output."""
+
+Live = Annotated[bool, typer.Option("--live", help="Show the run in the browser while it is in progress.")]
+LiveSpeed = Annotated[
+    str | None,
+    rare(metavar="FACTOR|max", help="Simulated seconds per second with --live.", show_default="1"),
+]
+LivePort = Annotated[
+    int | None, rare(min=1, max=65535, metavar="PORT", help="Port of --live.", show_default="a free one")
+]
 
 
+@takes_run_options("run", at="seed", before={"dt": "wall_limit", "time_limit": "out", "allow_torchscript": "json"})
 def run(
+    settings: RunSettings,
     ctx: typer.Context,
     scenario: Annotated[
         str,
@@ -46,28 +65,6 @@ def run(
             help="An .xosc file, or a library name; all runs of a distribution.",
         ),
     ],
-    channel: Annotated[
-        str | None,
-        typer.Option(
-            help="Channel profile: name, file or YAML; none: no cooperation.",
-            show_default=False,
-        ),
-    ] = None,
-    detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default=False)] = None,
-    planner: Planner = None,
-    weather: Annotated[str | None, typer.Option(help="Weather preset: name or file.", show_default=False)] = None,
-    cooperate: Annotated[
-        str | None,
-        typer.Option(metavar="A,B|none", help="Senders whose messages are used.", show_default=False),
-    ] = None,
-    param: Annotated[
-        list[str] | None, typer.Option(metavar="K=V", help="Parameter of the scenario; repeatable.")
-    ] = None,
-    user_value: UserValues = None,
-    controller: Controllers = None,
-    drive: Drive = None,
-    criterion: Criteria = None,
-    no_criteria: NoCriteria = False,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs; seeds from --seed on.")] = 1,
     success_rate: Annotated[
@@ -88,7 +85,6 @@ def run(
             show_default="all",
         ),
     ] = None,
-    dt: Annotated[float, rare(help="Time step in seconds.")] = 0.05,
     wall_limit: Annotated[
         float | None,
         rare(
@@ -97,15 +93,12 @@ def run(
             show_default="none",
         ),
     ] = None,
-    time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder of a subfolder per run: recording, result.json."),
     ] = None,
     no_record: Annotated[bool, rare("--no-record", help="Omit recording.mcap and camera images.")] = False,
-    record: Annotated[
-        Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")
-    ] = None,
+    record: Record = None,
     topics: Annotated[
         str | None,
         rare(metavar="A,B", help="Tools whose topics the recording gets, too: foxglove, osi."),
@@ -125,7 +118,6 @@ def run(
     live: Live = False,
     live_speed: LiveSpeed = None,
     live_port: LivePort = None,
-    allow_torchscript: AllowTorchscript = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run only.")] = False,
     help_all: HelpAll = False,
 ) -> None:
@@ -135,150 +127,191 @@ def run(
 
     Without an option, the scenario file decides.
     """
-    from eidrive_scenario.experiments.commands import reproduction_lines
-    from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
     from eidrive_scenario.library import definition, resolve_scenario
-    from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
-    from eidrive_scenario.simulation import RunSettings
-    from eidrive_scenario.simulation.added_settings import parse_drive
 
     if json and log == STANDARD_OUTPUT:
         raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))
-
     if no_record and record not in (None, Keep.never):
         message = f"--no-record and --record {record} contradict each other"
         raise SettingError(Diagnostic(message, "remove one of them"))
-    if record is not None and out is None:
-        raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))
+    check_record(record, out)
     kept = Keep.never.value if no_record else (record or Keep.always).value
-    wanted: tuple[str, ...] = ()
-    if topics is not None:
-        from eidrive_scenario.export.tool_topics import add_topics, check_topics
-
-        wanted = check_topics(name.strip() for name in topics.split(","))
-        if out is None or kept == Keep.never.value:
-            raise SettingError(Diagnostic("--topics is given, but no run is recorded", "give --out DIR, too"))
+    tools = _tools(topics, is_recorded=out is not None and kept != Keep.never.value)
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
-    for option, seconds in (("--dt", dt), ("--time-limit", time_limit), ("--wall-limit", wall_limit)):
-        if seconds is not None:
-            check_seconds(option, seconds)
     if wall_limit is not None:
-        report = partial(failures.report_dump, wall_limit)
-        supervise(failures.end_hung_run, report, publish=failures.share)
-    parameters = parse_assignments("--param", param or [])
-    stacks = parse_drive("--drive", drive or [])
-    settings = RunSettings(
-        channel=channel,
-        detector=detector,
-        planner=planner,
-        cooperate=parse_senders(cooperate),
-        weather=weather,
-        parameters=parameters,
-        user_values=parse_assignments("--user-value", user_value or []),
-        controllers=parse_assignments("--controller", controller or []),
-        drive=stacks,
-        criteria=criterion,
-        dt=dt,
-        time_limit=time_limit,
-        allow_torchscript=allow_torchscript,
-        no_criteria=no_criteria,
-    )
-
-    if success_rate is not None:
-        from eidrive_scenario.cli.rate import decision_code, rate_test
-
-        test = rate_test(success_rate, CONFIDENCE if confidence is None else confidence, repeat)
-    elif confidence is not None:
-        raise SettingError(Diagnostic("--confidence without --success-rate has no effect", "add --success-rate RATE"))
-    else:
-        test = None
-    most = repeat if test is None else test.limit
+        check_seconds("--wall-limit", wall_limit)
+        supervise(wall_limit, failures.report_hang, failures.subject)
+    test = _rate_test(success_rate, confidence, repeat)
+    count = repeat if test is None else test.limit
 
     path = resolve_scenario(scenario)
     is_distribution = definition(path) == "distribution"
-    written = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}
-    check_output_paths(written, (path, channel, weather, *stacks.values(), *(criterion or ())))
+    check_output_paths({"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}, (path, *settings.sources))
     several = "--success-rate" if test is not None else f"--repeat {repeat}" if repeat > 1 else ""
     if is_distribution and max_runs != 1:
         several = several or "a distribution; --max-runs 1 runs one of it"
-    viewed = ctx.with_resource(live_view(live, live_speed, live_port, several=several, to_stderr=json))
-    watching = () if viewed is None else (viewed,)
-
-    def run_seeds(source: Path | ConcreteRun) -> list[int]:
-        codes: list[int] = []
-        parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
-        for each in range(seed, seed + most):
-            if test is not None and (decided := decision_code(test, codes, json=json)) is not None:
-                return [decided]
-            suffixes = [*parts, f"seed-{each}"] if most > 1 else parts
-            explanations = _explanations(explain) if explain else []
-            failures.begin(each, None if isinstance(source, Path) else source.number)
-            try:
-                result = run_and_save(
-                    source,
-                    seed=each,
-                    settings=settings,
-                    below=out,
-                    record=kept,
-                    csv=_with_suffixes(csv, suffixes) if csv is not None else None,
-                    log=_with_suffixes(Path(log), suffixes) if log is not None and log != STANDARD_OUTPUT else log,
-                    explanations=explanations,
-                    observers=watching,
-                    wall_limit=wall_limit,
-                )
-                if result.recording is not None and wanted:
-                    added = add_topics(result.recording, wanted)
-                    result = replace(result, warnings=(*result.warnings, *added))
-            except InputError as error:
-                if not codes or isinstance(error, ConstraintError):
-                    raise
-                echo(f"seed {each}: {error}", err=True)  # The values that it draws are invalid
-                codes.append(INVALID_INPUT)
-                continue
-            except EidriveError as error:
-                failures.report(error)
-                wait_until_closed(viewed)
-                codes.append(ABORTED)
-                continue
-            if json:
-                echo(as_json_text(result, ascii_only=not has_all_characters()))
-                print_warnings(result.warnings)
-                for line in reproduction_lines(result):
-                    echo(line, err=True)
-            else:
-                from eidrive_scenario.cli.verdicts import show
-
-                show(result, varied="" if isinstance(source, Path) else str(source))
-            if result.folder is not None:
-                echo(f"files: {result.folder}", err=json)
-            for explanation in explanations:
-                echo("\n".join(explanation.lines()), err=json)
-            wait_until_closed(viewed)
-            codes.append(result.exit_code)
-        decided = None if test is None else decision_code(test, codes, json=json)
-        return codes if decided is None else [decided]
-
+    view = ctx.with_resource(live_view(live, live_speed, live_port, several=several, to_stderr=json))
+    runs = _Runs(
+        settings,
+        range(seed, seed + count),
+        test,
+        failures,
+        view,
+        out,
+        kept,
+        tools,
+        csv,
+        log,
+        explain or [],
+        wall_limit,
+        json,
+    )
     if is_distribution:
-        from eidrive_scenario.cli.batch import run_distribution
+        from eidrive_scenario.cli.repeated_runs import run_distribution
 
         raise typer.Exit(
             run_distribution(
                 path,
-                run_seeds,
+                runs.execute,
                 seed=seed,
                 repeat=repeat if test is None else 1,
                 max_runs=max_runs,
-                parameters=parameters,
+                parameters=settings.parameters,
             )
         )
     if max_runs is not None:
         raise SettingError(
             Diagnostic(f"--max-runs has no effect for a scenario (got {max_runs})", "remove the option", str(path))
         )
-    raise typer.Exit(max(run_seeds(path)))
+    raise typer.Exit(max(runs.execute(path)))
 
 
-def _explanations(names: list[str]) -> list[Explanation]:
+def _tools(topics: str | None, *, is_recorded: bool) -> tuple[str, ...]:
+    """Return the tools of `--topics`. Raise SettingError for an unknown one, and without a recording."""
+    if topics is None:
+        return ()
+    from eidrive_scenario.export.tool_topics import check_topics
+
+    tools = check_topics(name.strip() for name in topics.split(","))
+    if not is_recorded:
+        raise SettingError(Diagnostic("--topics is given, but no run is recorded", "give --out DIR, too"))
+    return tools
+
+
+def _rate_test(success_rate: float | None, confidence: float | None, repeat: int) -> RatioTest | None:
+    """Return the test of `--success-rate`, or None. Raise SettingError for options that do not fit together."""
+    if success_rate is not None:
+        from eidrive_scenario.cli.repeated_runs import rate_test
+
+        return rate_test(success_rate, CONFIDENCE if confidence is None else confidence, repeat)
+    if confidence is not None:
+        raise SettingError(Diagnostic("--confidence without --success-rate has no effect", "add --success-rate RATE"))
+    return None
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """Runs of one command: settings, seeds, and what is written about each run.
+
+    test   test of the success rate, which ends the runs; None for one run with each seed
+    kept   runs whose recording is kept
+    tools  tools whose topics the recordings get
+    """
+
+    settings: RunSettings
+    seeds: Sequence[int]
+    test: RatioTest | None
+    failures: RunFailures
+    view: LiveView | None
+    out: Path | None
+    kept: str
+    tools: tuple[str, ...]
+    csv: Path | None
+    log: str | None
+    explain: Sequence[str]
+    wall_limit: float | None
+    json: bool
+
+    def execute(self, source: Path | ConcreteRun) -> list[int]:
+        """Run a scenario, or one run of a distribution, with each seed, and return the exit codes."""
+        codes: list[int] = []
+        for seed in self.seeds:
+            if (decided := self._decided(codes)) is not None:
+                return [decided]
+            self.failures.begin(seed, None if isinstance(source, Path) else source.number)
+            try:
+                codes.append(self._execute(source, seed))
+            except InputError as error:
+                if not codes or isinstance(error, ConstraintError):
+                    raise
+                echo(f"seed {seed}: {error}", err=True)  # The values that it draws are invalid
+                codes.append(INVALID_INPUT)
+            except EidriveError as error:
+                self.failures.report(error)
+                wait_until_closed(self.view)
+                codes.append(ABORTED)
+        decided = self._decided(codes)
+        return codes if decided is None else [decided]
+
+    def _decided(self, codes: list[int]) -> int | None:
+        """Return the exit code of the test of the success rate after these runs, or None."""
+        if self.test is None:
+            return None
+        from eidrive_scenario.cli.repeated_runs import decision_code
+
+        return decision_code(self.test, codes, json=self.json)
+
+    def _execute(self, source: Path | ConcreteRun, seed: int) -> int:
+        """Execute and print one run, and return its exit code."""
+        from eidrive_scenario.experiments.single_run import run_and_save
+
+        parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
+        suffixes = [*parts, f"seed-{seed}"] if len(self.seeds) > 1 else parts
+        log = self.log
+        explanations = _explanations(self.explain)
+        result = run_and_save(
+            source,
+            seed=seed,
+            settings=self.settings,
+            below=self.out,
+            record=self.kept,
+            csv=None if self.csv is None else _with_suffixes(self.csv, suffixes),
+            log=log if log in (None, STANDARD_OUTPUT) else _with_suffixes(Path(log), suffixes),
+            explanations=explanations,
+            observers=() if self.view is None else (self.view,),
+            wall_limit=self.wall_limit,
+        )
+        if result.recording is not None and self.tools:
+            from eidrive_scenario.export.tool_topics import add_topics
+
+            result = replace(result, warnings=(*result.warnings, *add_topics(result.recording, self.tools)))
+        self._print(result, "" if isinstance(source, Path) else str(source))
+        for explanation in explanations:
+            echo("\n".join(explanation.lines()), err=self.json)
+        wait_until_closed(self.view)
+        return result.exit_code
+
+    def _print(self, result: RunResult, varied: str) -> None:
+        """Print a result; `varied` are the parameters of a run of a distribution."""
+        if self.json:
+            from eidrive_scenario.experiments.commands import reproduction_lines
+            from eidrive_scenario.experiments.single_run import as_json_text
+
+            echo(as_json_text(result, ascii_only=not has_all_characters()))
+            print_warnings(result.warnings)
+            for line in reproduction_lines(result):
+                echo(line, err=True)
+        else:
+            from eidrive_scenario.cli.console import show
+
+            show(result, varied=varied)
+        if result.folder is not None:
+            echo(f"files: {result.folder}", err=self.json)
+
+
+def _explanations(names: Sequence[str]) -> list[Explanation]:
+    if not names:
+        return []
     from eidrive_scenario.recording import Explanation
 
     return [Explanation(name) for name in names]
@@ -289,3 +322,57 @@ def _with_suffixes(path: Path, suffixes: list[str]) -> Path:
     if not suffixes or (path.exists() and not path.is_file()):
         return path
     return path.with_stem("-".join([path.stem, *suffixes]))
+
+
+def live_view(
+    requested: bool, speed: str | None, port: int | None, *, several: str, to_stderr: bool
+) -> AbstractContextManager[LiveView | None]:
+    """Return the live view of a run, or a context of None if it is not requested.
+
+    several    option that requests several runs; empty for a single run
+    to_stderr  whether the address is printed to standard error
+
+    Raise SettingError for an invalid option, several runs, and a port that cannot be used.
+    """
+    for option, value in (("--live-speed", speed), ("--live-port", port)):
+        if value is not None and not requested:
+            raise SettingError(Diagnostic(f"{option} without --live has no effect", "add --live"))
+    if not requested:
+        return nullcontext()
+    if several:
+        hint = "run one seed with --live; record several with --out, and read them by eidrive report"
+        raise SettingError(Diagnostic(f"--live shows a single run (got {several})", hint))
+    factor = _speed(speed)
+    from eidrive_scenario.reporting.live.live_view import WAIT, LiveView
+
+    def announce(address: str) -> None:
+        echo(f"live view: {address}", err=to_stderr)
+        echo(f"The run starts when the page is open, at the latest in {WAIT:g} s.", err=True)
+
+    return LiveView(speed=factor, port=port or 0, wait=WAIT, announce=announce)
+
+
+def wait_until_closed(view: LiveView | None) -> None:
+    """Wait after the end of a run until its pages are closed or the user interrupts."""
+    if view is None:
+        return
+    with suppress(KeyboardInterrupt):
+        if view.clients:
+            echo("The run has ended. Close the page or press Ctrl-C.", err=True)
+            view.wait_until_closed()
+
+
+def _speed(text: str | None) -> float:
+    if text is None:
+        return 1.0
+    if text == "max":
+        return math.inf
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if factor == 0.0:
+        return math.inf
+    if not 0.0 < factor < math.inf:
+        raise SettingError(Diagnostic(f"--live-speed is {text!r}", "give a factor such as 0.5, or max"))
+    return factor

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.output_paths import check_output_paths
-from eidrive_scenario.cli.streams import echo
+from eidrive_scenario.cli.options import check_output_paths
+from eidrive_scenario.cli.output import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 if TYPE_CHECKING:
@@ -108,8 +108,7 @@ def tree(
 
     Example: eidrive tree coop/scenario_1 --svg storyboard.svg
     """
-    from eidrive_scenario.cli.storyboard_tree import storyboard_tree
-    from eidrive_scenario.cli.verdicts import console
+    from eidrive_scenario.cli.console import console, storyboard_tree
     from eidrive_scenario.library import resolve_scenario
     from eidrive_scenario.openscenario import load_scenario
     from eidrive_scenario.reporting.storyboard_diagram.diagram import write_storyboard_diagram

@@ -1,23 +1,24 @@
-"""`--wall-limit` in a child process, whose parent reports code that cannot be interrupted."""
+"""Runs that do not end as they should: failures of `eidrive run`, `--wall-limit` in a child process, Ctrl-C."""
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import json
 import os
 import signal
 import sys
-from collections.abc import Callable
-from typing import TYPE_CHECKING, BinaryIO
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import typer
 
-from eidrive_scenario.cli.streams import echo
-from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.cli.output import echo, has_all_characters, print_error, show_traceback
+from eidrive_scenario.errors import ABORTED, EidriveError, SimulationError, WallLimitError
 
 if TYPE_CHECKING:
-    from types import FrameType
-
     from eidrive_scenario.wall_limit import Limit
 
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
@@ -33,17 +34,14 @@ def allow() -> None:
 
 
 def supervise(
-    end: Callable[[Limit, FrameType | None], None],
-    report: Callable[[str], None],
-    what: str = "run",
-    publish: Callable[[Limit], None] | None = None,
+    limit: float, report: Callable[[WallLimitError], None], subject: dict[str, Any] | None = None, what: str = "run"
 ) -> None:
     """Continue in a child process. The parent waits and ends with its exit code, or 3 for an abnormal end.
 
-    end      report of an uninterruptible run in the child, with the executed frame
-    report   the same report in the parent, with the stack that faulthandler wrote
+    limit    wall limit of each run or check [s]
+    report   prints the error of a run that does not return: in the child, or else in the parent
+    subject  description of the run in progress, which the parent gets before it reports
     what     subject of messages: run or check
-    publish  function that saves the notes of the run in progress for `report`; see LastResort
 
     Without `fork`, or outside the process of the command line, only runs that return to the interpreter are limited.
     """
@@ -51,10 +49,11 @@ def supervise(
         return
     import ctypes
 
+    from eidrive_scenario.experiments.hung_runs import last_resort
     from eidrive_scenario.files.bounded import file_in_memory
-    from eidrive_scenario.wall_limit import LastResort, set_last_resort
+    from eidrive_scenario.wall_limit import set_last_resort
 
-    dump = file_in_memory()  # stays open as long as the process
+    dump, notes = file_in_memory(), file_in_memory()  # stay open as long as the process
     finished, finish = os.pipe()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -65,11 +64,34 @@ def supervise(
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
         atexit.register(os.write, finish, b".")
-        set_last_resort(LastResort(end, dump, publish))
+
+        def publish(limit: Limit) -> None:
+            notes.seek(0)
+            notes.truncate()
+            notes.write(json.dumps([subject, limit.notes]).encode())
+            notes.flush()
+
+        set_last_resort(last_resort(report, dump, None if subject is None else publish, in_check=what == "check"))
         return
     os.close(finish)
-    code = _exit_code(_wait(child), finished, dump, report, what)
-    raise typer.Exit(code)
+    status = _wait(child)
+    if stack := _content(dump):
+        from eidrive_scenario.simulation.attribution import describe_dump
+
+        error = describe_dump(limit, stack)
+        if subject is not None and (saved := _content(notes)):
+            in_progress, lines = json.loads(saved)
+            subject.update(in_progress)
+            for line in lines:
+                error.add_note(line)
+        report(error)
+        raise typer.Exit(ABORTED)
+    raise typer.Exit(_exit_code(status, finished, what))
+
+
+def _content(file: BinaryIO) -> str:
+    file.seek(0)
+    return file.read().decode(errors="replace")
 
 
 def _wait(child: int) -> int:
@@ -80,12 +102,7 @@ def _wait(child: int) -> int:
     return os.waitpid(child, 0)[1]
 
 
-def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str], None], what: str) -> int:
-    dump.seek(0)
-    stack = dump.read().decode(errors="replace")
-    if stack:
-        report(stack)
-        return ABORTED
+def _exit_code(status: int, finished: int, what: str) -> int:
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
         echo(f"{what} aborted: its process was ended by {signal.Signals(-code).name}", err=True)
@@ -94,3 +111,70 @@ def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str
         echo(f"{what} aborted: an extension ended its process (os._exit)", err=True)
         return ABORTED
     return code
+
+
+class RunFailures:
+    """Reports of the runs of one command.
+
+    scenario   argument of the command
+    traceback  whether errors are printed with their traceback
+    """
+
+    def __init__(self, scenario: str, *, json: bool, traceback: bool) -> None:
+        self._scenario = scenario
+        self._json = json
+        self._traceback = traceback
+        self.subject: dict[str, Any] = {}
+        """Distribution number and seed of the run in progress."""
+
+    def begin(self, seed: int, run: int | None) -> None:
+        """Set seed and distribution number of the run in progress."""
+        self.subject |= {"seed": seed} if run is None else {"run": run, "seed": seed}
+
+    def report(self, error: EidriveError) -> None:
+        """Report the error of the run in progress, with its traceback on request."""
+        self._print_json(error)
+        (show_traceback if self._traceback else print_error)(error)
+
+    def report_hang(self, error: WallLimitError) -> None:
+        """Report a run that does not return at its wall limit."""
+        self._print_json(error)
+        print_error(error)
+
+    def _print_json(self, error: EidriveError) -> None:
+        """Print the JSON object of the run if `--json` is set."""
+        if not self._json:
+            return
+        description = error.as_json() if isinstance(error, SimulationError) else {"kind": "run", "message": str(error)}
+        entry = {
+            "scenario": self._scenario,
+            **self.subject,
+            "passed": False,
+            "end_reason": "error",
+            "error": description,
+        }
+        if notes := getattr(error, "__notes__", None):
+            entry["notes"] = notes
+        echo(json.dumps(entry, ensure_ascii=not has_all_characters()))
+
+
+@contextmanager
+def interrupt_once() -> Iterator[None]:
+    """Raise KeyboardInterrupt at the first Ctrl-C only, so that a second one does not interrupt the end of the block.
+
+    A command that ignores interruptions, such as a background job of a shell, continues to ignore them.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:
+        yield
+        return
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,4 +1,4 @@
-"""Commands `eidrive sweep` and `eidrive results`."""
+"""Command `eidrive sweep`."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, NoCriteria, UserValues
-from eidrive_scenario.cli.error_output import print_warnings
-from eidrive_scenario.cli.interruption import interrupt_once
-from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
-from eidrive_scenario.cli.output_paths import check_output_paths
-from eidrive_scenario.cli.short_help import HelpAll, rare
-from eidrive_scenario.cli.streams import echo
-from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED, PASSED
+from eidrive_scenario.cli.options import (
+    HelpAll,
+    Keep,
+    Record,
+    check_record,
+    parse_seeds,
+    parse_shard,
+    rare,
+    takes_run_options,
+)
+from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.supervision import interrupt_once
+from eidrive_scenario.errors import ABORTED, NOT_JUDGED, PASSED, Diagnostic, SettingError
+from eidrive_scenario.run_options import RunSettings, check_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from eidrive_scenario.experiments.sweeps.axes import Axis
-    from eidrive_scenario.experiments.sweeps.results import PointSummary
     from eidrive_scenario.experiments.sweeps.sweep import SweepProgress
 
 USUAL_LIMIT = 1800.0
@@ -31,7 +35,13 @@ REASONS = 3
 """Number of printed reasons of runs without a verdict."""
 
 
+@takes_run_options(
+    "sweep",
+    at="out",
+    before={"drive": "user_values", "no_criteria": "time_limit", "allow_torchscript": "retry"},
+)
 def sweep(
+    settings: RunSettings,
     scenario: Annotated[str, typer.Argument(help="An .xosc file or a library name; all runs of a distribution.")],
     store: Annotated[Path, typer.Option(help="SQLite file of results, which is continued.")],
     vary: Annotated[
@@ -50,22 +60,10 @@ def sweep(
         str | None, typer.Option(metavar="A-B|A,B", help="Seeds of each combination.", show_default="1")
     ] = None,
     runs: Annotated[int | None, rare(min=1, help="Total number of runs.", show_default="all")] = None,
-    channel: Annotated[str | None, typer.Option(help="Channel profile of all runs.", show_default=False)] = None,
-    param: Annotated[list[str] | None, typer.Option(metavar="K=V", help="Parameter of all runs; repeatable.")] = None,
-    drive: Annotated[
-        list[str] | None, rare(metavar="NAME[=STACK]", help="Give entity NAME a driving stack, as in `eidrive run`.")
-    ] = None,
-    user_value: UserValues = None,
-    controller: Controllers = None,
-    criterion: Annotated[list[str] | None, rare(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
-    no_criteria: NoCriteria = False,
-    time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
     out: Annotated[
         Path | None, typer.Option(help="Folder of a subfolder per run: recording, result.json.", show_default="none")
     ] = None,
-    record: Annotated[
-        Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")
-    ] = None,
+    record: Record = None,
     wall_limit: Annotated[float, rare(help="Maximum wall time of each run in seconds.")] = USUAL_LIMIT,
     workers: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Processes.", show_default="number of cores")
@@ -94,7 +92,6 @@ def sweep(
         str | None,
         rare(metavar="METRIC", help="Metric that --falsify minimizes instead of margins."),
     ] = None,
-    allow_torchscript: AllowTorchscript = False,
     retry: Annotated[bool, rare("--retry", help="Repeat aborted and crashed runs of the store.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would run.")] = False,
     help_all: HelpAll = False,
@@ -108,8 +105,7 @@ def sweep(
     if scheduler is None and not dry_run:
         start_server()  # First, as it imports for as long as the imports below
 
-    from eidrive_scenario.cli.sweep_progress import ProgressDisplay
-    from eidrive_scenario.cli.sweep_search import Search, check_search_options
+    from eidrive_scenario.cli.sweep_search import ProgressDisplay, Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
     from eidrive_scenario.experiments.run_folder import check_writable
     from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis, points_of, with_types
@@ -120,26 +116,11 @@ def sweep(
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
     from eidrive_scenario.experiments.sweeps.workers import KeptFiles, LocalWorkers, Workers
     from eidrive_scenario.library import definition, resolve_scenario
-    from eidrive_scenario.simulation import RunSettings
-    from eidrive_scenario.simulation.added_settings import parse_drive
 
-    for option, value in (("--time-limit", time_limit), ("--wall-limit", wall_limit)):
-        check_seconds(option, value)
-    if record is not None and out is None:
-        raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))
+    check_seconds("--wall-limit", wall_limit)
+    check_record(record, out)
     files = None if out is None else KeptFiles(out.absolute(), (record or Keep.always).value, store.absolute())
     path = resolve_scenario(scenario)
-    settings = RunSettings(
-        channel=channel,
-        parameters=parse_assignments("--param", param or []),
-        user_values=parse_assignments("--user-value", user_value or []),
-        controllers=parse_assignments("--controller", controller or []),
-        drive=parse_drive("--drive", drive or []),
-        criteria=criterion,
-        time_limit=time_limit,
-        allow_torchscript=allow_torchscript,
-        no_criteria=no_criteria,
-    )
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
     kind = definition(path)
 
@@ -211,96 +192,3 @@ def _print_summary(progress: SweepProgress, store: Path) -> None:
         echo(f"{count} {status}: {message}", err=True)
     if not progress.is_complete:
         echo(f"all runs without a verdict: eidrive results {shlex.quote(str(store))} --failures", err=True)
-
-
-def results(
-    stores: Annotated[list[Path], typer.Argument(metavar="STORE...", help="Stores of sweeps; shards are combined.")],
-    by: Annotated[str | None, typer.Option(metavar="A,B", help="Axes of the table.", show_default="all")] = None,
-    interval: Annotated[str, typer.Option(help="anytime (valid while runs are added), wilson or exact.")] = "anytime",
-    confidence: Annotated[float, typer.Option(help="Confidence of the intervals.")] = 0.95,
-    csv: Annotated[Path | None, typer.Option(help="Write one row per run as CSV.")] = None,
-    parquet: Annotated[Path | None, typer.Option(help="Write one row per run as Parquet.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per combination.")] = False,
-    failures: Annotated[bool, typer.Option("--failures", help="Print the commands of runs that did not pass.")] = False,
-) -> None:
-    """Print the success rates of a sweep by combination of values, and export its runs.
-
-    Example: eidrive results s.db --by channel.delay.seconds --csv runs.csv
-    """
-    import json as json_text
-
-    from eidrive_scenario.experiments.sweeps.results import (
-        indistinct,
-        mixed_versions,
-        stored_runs,
-        summaries,
-        warned,
-        write_csv,
-        write_parquet,
-    )
-    from eidrive_scenario.experiments.sweeps.store import PASSED as PASSED_RUN
-
-    if not 0.0 < confidence < 1.0:
-        raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
-    check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
-    found = list(stored_runs(stores))
-    names = None if by is None else [name.strip() for name in by.split(",")]
-    rows = summaries(found, by=names, interval=interval, confidence=confidence)
-    mixed = (indistinct(found), mixed_versions(found))
-    warnings = (*(f"{one}; a new store keeps them apart" for one in mixed if one), warned(found))
-    print_warnings([warning for warning in warnings if warning])
-    if csv is not None:
-        write_csv(found, csv)
-    if parquet is not None:
-        write_parquet(found, parquet)
-    if json:
-        for row in rows:
-            echo(json_text.dumps(_as_json(row)))
-    elif failures:
-        for run in found:
-            if run.status != PASSED_RUN:
-                echo(f"{run.status}: {run.command or f'{run.scenario}, run {run.run}, seed {run.seed}'}")
-                if run.error:
-                    echo("  " + run.error.replace("\n", "\n  "))
-    else:
-        _print_table(rows, interval, confidence)
-
-
-def _as_json(row: PointSummary) -> dict[str, object]:
-    rate = row.rate
-    limits = {} if rate is None else {"success_rate": rate.share, "low": rate.low, "high": rate.high}
-    return {"point": dict(row.point), "runs": dict(row.counts), **limits}
-
-
-def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float) -> None:
-    from rich.table import Table
-
-    from eidrive_scenario.cli.verdicts import console
-
-    axes = list(dict.fromkeys(name for row in rows for name in row.point))
-    statuses = [
-        status for status in dict.fromkeys(status for row in rows for status in row.counts) if status != "passed"
-    ]
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in axes:
-        table.add_column(name, overflow="fold")
-    for name in ("runs", "passed", *statuses, "success rate", f"{confidence:.0%} {interval}"):
-        table.add_column(name, justify="right")
-    for row in rows:
-        rate = row.rate
-        table.add_row(
-            *(_short(row.point.get(name, "")) for name in axes),
-            str(sum(row.counts.values())),
-            str(row.counts.get("passed", 0)),
-            *(str(row.counts.get(status, 0)) for status in statuses),
-            "" if rate is None else f"{rate.share:.1%}",
-            "" if rate is None else f"{rate.low:.1%} to {rate.high:.1%}",
-        )
-    out = console()
-    if not out.is_terminal:  # lines as long as necessary, so that other programs can read them
-        out.width = max(200, 40 * len(table.columns))
-    out.print(table)
-
-
-def _short(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -6,7 +6,6 @@ are relative to its folder, which the command names once: after a copy of the pr
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 from collections.abc import Mapping
@@ -17,44 +16,20 @@ from typing import Any
 from eidrive_scenario.library import library_path, name_of, resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.project import selected_project
-from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
-from eidrive_scenario.simulation.run import RunResult, RunSettings
-from eidrive_scenario.v2x.profile import SUFFIXES
+from eidrive_scenario.project import portable_path, selected_project
+from eidrive_scenario.run_options import OPTIONS, RunSettings
+from eidrive_scenario.simulation.result import RunResult
 
 
 def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
     """Return the `eidrive run` command that repeats a run, quoted for a shell."""
-    defaults = RunSettings()
     project = selected_project()
     words = ["eidrive", *([] if project is None else ["--project", str(project)]), "run", _scenario(scenario)]
-    for option, value in (
-        ("--channel", _channel(settings.channel)),
-        ("--detector", settings.detector),
-        ("--planner", settings.planner),
-        ("--weather", _file_or_name(settings.weather)),
-        ("--cooperate", None if settings.cooperate is None else ",".join(settings.cooperate) or "none"),
-    ):
-        if value is not None:
-            words += _option(option, value)
-    for option, values in (
-        ("--param", settings.parameters),
-        ("--user-value", settings.user_values),
-        ("--controller", settings.controllers),
-    ):
-        words += _assignments(option, values)
-    for name, stack in drive_sources(settings.drive).items():
-        words += _option("--drive", name if stack is None else f"{name}={_file_or_name(stack)}")
-    for criterion in criteria_sources(settings.criteria):
-        words += _option("--criterion", str(_file_or_name(criterion)))
-    words += ["--seed", str(seed)]
-    for option, number, default in (
-        ("--dt", settings.dt, defaults.dt),
-        ("--time-limit", settings.time_limit, defaults.time_limit),
-    ):
-        words += [] if number == default else [option, repr(float(number))]
-    words += ["--allow-torchscript"] if settings.allow_torchscript else []
-    words += ["--no-criteria"] if settings.no_criteria else []
+    for options in ([], ["--seed", str(seed)]):
+        words += options
+        for option in OPTIONS:
+            if option.form.follows_seed is bool(options):
+                words += option.words(getattr(settings, option.name))
     return shlex.join(words)
 
 
@@ -84,37 +59,4 @@ def _scenario(path: Path) -> str:
     in_library = path.resolve() == (library_path() / f"{name}.xosc").resolve()
     if in_library and not os.path.exists(os.path.join(selected_project() or "", name)):
         return name
-    return _path(path)
-
-
-def _path(path: str | Path) -> str:
-    """Return the absolute path, or the path from the folder of the project for a file below it."""
-    full, project = Path(os.path.abspath(path)), selected_project()
-    if project is None or not full.is_relative_to(project):
-        return str(full)
-    relative = full.relative_to(project).as_posix()
-    return f"./{relative}" if relative.startswith("-") else relative
-
-
-def _channel(value: Any) -> str | None:
-    """Return an inline profile as JSON, the name of a profile, or the path of its file."""
-    if isinstance(value, Mapping):
-        return json.dumps(value)
-    return _file_or_name(value) if value is None or Path(value).suffix in SUFFIXES else str(value)
-
-
-def _file_or_name(value: str | Path | None) -> str | None:
-    if value is None:
-        return None
-    return _path(value) if os.path.isfile(value) else str(value)
-
-
-def _assignments(option: str, values: Mapping[str, str | Assignment]) -> list[str]:
-    words = []
-    for name, value in values.items():
-        words += _option(option, f"{name}={value.text if isinstance(value, Assignment) else value}")
-    return words
-
-
-def _option(option: str, value: str) -> list[str]:
-    return [f"{option}={value}"] if value.startswith("-") else [option, value]
+    return portable_path(path)

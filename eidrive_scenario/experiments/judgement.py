@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, EidriveError, SettingError
+from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, EidriveError, SettingError
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
@@ -16,12 +16,11 @@ from eidrive_scenario.evaluation.criteria_parser import (
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads, checked_verdict
-from eidrive_scenario.exit_codes import ABORTED, PASSED
 from eidrive_scenario.recording.frame import ExecutedCommand, Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.added_settings import criteria_sources
+from eidrive_scenario.run_options import RunSettings
 from eidrive_scenario.simulation.attribution import report_extension
 from eidrive_scenario.simulation.commands import parse_added_criteria
 from eidrive_scenario.simulation.recorded_outcome import (
@@ -127,7 +126,9 @@ class _Judge:
     def add_others(self, criteria: Any) -> None:
         """Add criteria that replace those of the run."""
         self._own = False
-        declarations = parse_added_criteria(criteria_sources(criteria), recorded_context(self._recording))
+        declarations = parse_added_criteria(
+            RunSettings(criteria=criteria).criteria_sources, recorded_context(self._recording)
+        )
         self._add(build_criteria(declarations))
 
     def observe(self, frame: Frame) -> None:

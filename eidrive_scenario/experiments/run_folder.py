@@ -13,7 +13,7 @@ from tempfile import TemporaryFile
 from eidrive_scenario.errors import Diagnostic, InputError, OutputError
 from eidrive_scenario.files.atomic import FileLock, partial_path, write_atomically
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, read_result
-from eidrive_scenario.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 _READABLE = 100
 """Maximum length of the readable part of a name [bytes]."""

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, replace
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,9 +21,8 @@ from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.registry import third_party_files
 from eidrive_scenario.roads.reading.document import read_road_text
-from eidrive_scenario.simulation import DEFAULT_SEED, Observer, RunResult, RunSettings, Simulation
-from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
-from eidrive_scenario.simulation.run import checked_seed
+from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_seed
+from eidrive_scenario.simulation import Observer, RunResult, Simulation
 from eidrive_scenario.wall_limit import limit_wall_time
 
 if TYPE_CHECKING:
@@ -212,19 +211,10 @@ def _finite(value: Any) -> Any:
 
 def _given_settings(scenario: Scenario, seed: int, run: int | None, settings: RunSettings) -> dict[str, str]:
     """Return the settings of the caller as texts, without settings that use the value of the file."""
-    given = {name: value for name, value in asdict(settings).items() if value is not None and name != "parameters"}
-    if run is not None:
-        given["run"] = run
-    if settings.cooperate is not None:
-        given["cooperate"] = ",".join(settings.cooperate) or "none"
-    given["controllers"] = json.dumps(settings.controllers) if settings.controllers else None
-    drive = {name: None if stack is None else str(stack) for name, stack in drive_sources(settings.drive).items()}
-    given["drive"] = json.dumps(drive) if drive else None
-    criteria = [str(one) for one in criteria_sources(settings.criteria)]
-    given["criteria"] = json.dumps(criteria) if criteria else None
-    given["user_values"] = json.dumps(settings.user_values) if settings.user_values else None
-    texts = {name: str(value) for name, value in given.items() if value is not None}
-    return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}
+    given = {option.name: option.form.recorded(getattr(settings, option.name)) for option in OPTIONS}
+    given |= {"run": None if run is None else str(run), "parameters": json.dumps(scenario.parameters)}
+    texts = {name: text for name, text in given.items() if text is not None}
+    return {"scenario": scenario.name, "seed": str(seed), **texts}
 
 
 def _attachments(text: bytes, scenario: Scenario) -> dict[str, bytes]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.exit_codes import ABORTED, NOT_JUDGED
+from eidrive_scenario.errors import ABORTED, NOT_JUDGED, SimulationError
 from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval
 from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest

@@ -8,25 +8,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.gym.action_settings import (
-    ActionSettings,
-    MetaSpeed,
-    Pedals,
-    SendMessages,
-    ShareObjects,
-    TargetSpeed,
-)
 from eidrive_scenario.gym.environment import EidriveEnv
 from eidrive_scenario.gym.libraries import gymnasium
-from eidrive_scenario.gym.observation_settings import (
+from eidrive_scenario.gym.settings import (
+    ActionSettings,
     GridSettings,
+    MetaSpeed,
     ObservationSettings,
+    Pedals,
+    RenderSettings,
     RouteSettings,
+    SendMessages,
+    ShareObjects,
     TableSettings,
+    TargetSpeed,
 )
-from eidrive_scenario.gym.render_settings import RenderSettings
-from eidrive_scenario.gym.rewards import RewardSettings
-from eidrive_scenario.lazy_exports import lazy_exports
+from eidrive_scenario.gym.station_interface import RewardSettings
+from eidrive_scenario.imports import lazy_exports
 
 if TYPE_CHECKING:
     from eidrive_scenario.gym.parallel import EidriveParallelEnv

@@ -11,9 +11,9 @@ from msgspec.structs import replace
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.step import OWN_DECISIONS, StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.gym.action_settings import ActionSettings, MetaSpeed, Pedals, SendMessages, TargetSpeed
 from eidrive_scenario.gym.libraries import spaces
-from eidrive_scenario.gym.object_table import nearest_rows
+from eidrive_scenario.gym.observations import nearest_rows
+from eidrive_scenario.gym.settings import ActionSettings, MetaSpeed, Pedals, SendMessages, TargetSpeed
 from eidrive_scenario.world.actor import Control
 
 _TOLERANCE = 1e-6

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, Unpack
 
 from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
-from eidrive_scenario.gym.action_settings import ActionSettings
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.libraries import gymnasium
-from eidrive_scenario.gym.observation_settings import ObservationSettings
-from eidrive_scenario.gym.render_mode import build_renderer, frames_per_second
-from eidrive_scenario.gym.render_settings import METADATA, RenderSettings
-from eidrive_scenario.gym.rewards import RewardSettings
-from eidrive_scenario.gym.runs import MAX_SEED, Runs
-from eidrive_scenario.gym.station_interface import InterfaceSettings, sum_terms
+from eidrive_scenario.gym.runs import MAX_SEED, EnvironmentOptions, ScenarioEnvironment
+from eidrive_scenario.gym.station_interface import sum_terms
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
-from eidrive_scenario.simulation import RunResult, RunSettings
+from eidrive_scenario.simulation import RunResult
 
 
-class EidriveEnv(gymnasium.Env[Any, Any]):
+class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
     """Environment in which a policy controls one station of a scenario.
 
     scenario      a path, a library name such as `coop/scenario_1`, or any other source of `Simulation`
@@ -41,41 +36,17 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
     or if the scenario has no station.
     """
 
-    metadata: ClassVar[dict[str, Any]] = METADATA  # type: ignore[misc]
-
     def __init__(
         self,
         scenario: Scenario | Source | ConcreteRun,
         *,
         station: str | None = None,
-        observation: ObservationSettings | Mapping[str, Any] | None = None,
-        action: str | ActionSettings | Mapping[str, Any] | tuple[Any, ...] | list[Any] | None = None,
-        reward: RewardSettings | Mapping[str, Any] | None = None,
-        settings: RunSettings | None = None,
-        max_steps: int | None = None,
-        ticks_per_step: int = 1,
-        terminate_on_collision: bool = True,
-        render_mode: str | None = None,
-        render: RenderSettings | Mapping[str, Any] | None = None,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
-        self._runs = Runs(
-            scenario,
-            None if station is None else (station,),
-            InterfaceSettings.parse(observation, action, reward),
-            settings,
-            single=True,
-            max_steps=max_steps,
-            ticks_per_step=ticks_per_step,
-            terminate_on_collision=terminate_on_collision,
-        )
+        self._set_up(scenario, None if station is None else (station,), single=True, **options)
         ((self.station, self._interface),) = self._runs.interfaces.items()
         self.observation_space = self._interface.encoder.space
         self.action_space = self._interface.decoder.space
-        self.render_mode = render_mode
-        self._renderer = build_renderer(render_mode, render, self.station)
-        frame_rate = frames_per_second(self._runs.settings, ticks_per_step)
-        self.metadata = {**self.metadata, "render_fps": frame_rate}  # type: ignore[misc]
-        self._episode: Episode | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; return its first observation, and its seed, time [s] and parameters.
@@ -88,12 +59,8 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         episode = self._episode = self._runs.start(drawn, options)
         if self.station not in episode.perceived:
             raise SettingError(Diagnostic(f"station {self.station!r} never enters the world", "select another one"))
-        self._interface.begin(episode)
-        if self._renderer is not None:
-            self._renderer.begin(episode)
-        simulation = episode.simulation
-        info = {"seed": simulation.seed, "time": episode.start.view.time}
-        return self._interface.observe(episode), {**info, "parameters": dict(simulation.scenario.parameters)}
+        info = self._begin(episode, [self.station])
+        return self._interface.observe(episode), info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Apply an action for one step; return observation, reward, terminated, truncated and information.
@@ -136,29 +103,10 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         truncated = episode.is_truncated and not has_left
         return observation, sum(summed.values()), ended and not truncated, truncated, info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3) of the current instant, uint8 in the order red, green, blue.
-
-        It is that of `eidrive view --png`. Return None with a warning without a render mode. Raise SimulationError
-        before `reset`.
-        """
-        if self._renderer is None:
-            gymnasium.logger.warn("the environment has no render mode; create it with render_mode='rgb_array'")
-            return None
-        if self._episode is None:
-            raise SimulationError("the environment has no episode; call reset")
-        return self._renderer.picture()
-
     def _running_episode(self) -> Episode:
         if self._episode is None or self._episode.result is not None:
             raise SimulationError("the environment has no running episode; call reset")
         return self._episode
-
-    def close(self) -> None:
-        """Free the world of the running episode."""
-        if self._episode is not None:
-            self._episode.close()
-            self._episode = None
 
 
 def final_info(result: RunResult) -> dict[str, Any]:

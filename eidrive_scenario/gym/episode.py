@@ -13,10 +13,9 @@ from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerce
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
-from eidrive_scenario.simulation.added_settings import criteria_sources
-from eidrive_scenario.simulation.planner_option import select_planner
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
-from eidrive_scenario.simulation.tick_start import TickStart
+from eidrive_scenario.simulation.scenario_options import select_planner
+from eidrive_scenario.simulation.tick import TickStart
 from eidrive_scenario.world.view import WorldView
 
 Decide = Callable[[Mapping[str, StationPerception]], Mapping[str, StationAction]]
@@ -53,7 +52,7 @@ class Episode:
         self.simulation = Simulation(
             source,
             seed=seed,
-            settings=replace(settings, criteria=(*criteria_sources(settings.criteria), *added)),
+            settings=replace(settings, criteria=(*settings.criteria_sources, *added)),
             stack=stations_with_planners(planners),
             load_weights=load_weights,
         )

@@ -1,4 +1,4 @@
-"""Observations: spaces, and conversion of perceptions."""
+"""Observations of a station: the space of its parts, tables of objects, and the occupancy grid."""
 
 from __future__ import annotations
 
@@ -7,18 +7,204 @@ from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.geometry import footprint
 from eidrive_scenario.gym.libraries import spaces
-from eidrive_scenario.gym.object_table import MAX_AGE, MAX_SPEED, column_bounds, object_values
-from eidrive_scenario.gym.observation_settings import ObservationSettings, RouteSettings, TableSettings
-from eidrive_scenario.gym.occupancy_grid import grid_bounds, occupancy_grid
+from eidrive_scenario.gym.settings import GridSettings, ObservationSettings, RouteSettings, TableSettings
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import Control
+
+MAX_SPEED = 70.0
+"""Bound of speeds in observations [m/s]."""
+MAX_SIZE = 30.0
+"""Bound of lengths and widths of objects [m]."""
+MAX_DEVIATION = 10.0
+"""Bound of standard deviations of positions [m]."""
+MAX_AGE = 10.0
+"""Bound of ages [s]."""
+
+COLUMNS = (
+    "present", "x", "y", "velocity_x", "velocity_y", "velocity_known", "length", "width", "cos", "sin", "existence",
+    "deviation_x", "deviation_y", "covariance_known", "age", *CLASSES,
+)  # fmt: skip
+"""Columns of the table. Positions [m], velocities over ground [m/s] and headings are in the axes of the vehicle."""
+FEW = 12
+"""Maximum number of objects for which scalar arithmetic is faster than arrays."""
+_SIGNED = ("x", "y", "velocity_x", "velocity_y", "cos", "sin")
+_CLASS = {name: COLUMNS.index(name) for name in CLASSES}
+_CLASS_COLUMNS = {name: [float(name == other) for other in CLASSES] for name in CLASSES}
+
+
+def column_bounds(reach: float) -> tuple[Array, Array]:
+    """Return lower and upper bounds of the columns in SI units for objects within `reach` [m]."""
+    high = np.ones(len(COLUMNS))
+    for name, bound in (
+        ("x", reach),
+        ("y", reach),
+        ("velocity_x", MAX_SPEED),
+        ("velocity_y", MAX_SPEED),
+        ("length", MAX_SIZE),
+        ("width", MAX_SIZE),
+        ("deviation_x", MAX_DEVIATION),
+        ("deviation_y", MAX_DEVIATION),
+        ("age", MAX_AGE),
+    ):
+        high[COLUMNS.index(name)] = bound
+    low = np.where([name in _SIGNED for name in COLUMNS], -high, 0.0)
+    return low, high
+
+
+def nearest_rows(objects: Detections, ego: EgoState, reach: float = math.inf) -> list[int]:
+    """Return the rows of the objects within `reach` [m], nearest first; equal distances in the order of the rows."""
+    if not len(objects):
+        return []
+    x, y, _ = ego.position.tolist()
+    if len(objects) <= FEW:
+        places = [math.hypot(box[0] - x, box[1] - y) for box in objects.boxes.tolist()]
+        return sorted([row for row, away in enumerate(places) if away <= reach], key=places.__getitem__)
+    distance = np.hypot(objects.boxes[:, 0] - x, objects.boxes[:, 1] - y)
+    order = np.argsort(distance, kind="stable")
+    return [row for row in order.tolist() if distance[row] <= reach]
+
+
+def object_values(
+    objects: Detections, ego: EgoState, now: float, *, count: int, reach: float
+) -> Sequence[float] | Array:
+    """Return the values of the table of the nearest objects in SI units, row by row; at most `count` rows."""
+    rows = nearest_rows(objects, ego, reach)[:count]
+    age = max(now - objects.time, 0.0)
+    if len(rows) > FEW:
+        return object_rows(objects, rows, ego, age).ravel()
+    return [value for row in few_object_rows(objects, rows, ego, age) for value in row] if rows else ()
+
+
+def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> list[list[float]]:
+    """Return the same as `object_rows` in scalar arithmetic. Adding 0 replaces -0 at rest."""
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    own_x, own_y, _ = ego.position.tolist()
+    boxes, velocities = objects.boxes.tolist(), objects.velocity.tolist()
+    covariances, confidence = objects.covariance.tolist(), objects.confidence.tolist()
+    filled = []
+    for row in rows:
+        x, y, _, length, width, _, yaw = boxes[row]
+        dx, dy = x - own_x, y - own_y
+        vx, vy = velocities[row]
+        moves = math.isfinite(vx) and math.isfinite(vy)
+        if not moves:
+            vx = vy = 0.0
+        (xx, xy), (yx, yy) = covariances[row]
+        certain = math.isfinite(xx + xy + yx + yy)
+        ahead = aside = 0.0
+        if certain:
+            ahead = cos * cos * xx + cos * sin * (xy + yx) + sin * sin * yy
+            aside = sin * sin * xx - sin * cos * (xy + yx) + cos * cos * yy
+        heading = yaw - ego.yaw
+        filled.append(
+            [
+                1.0,
+                dx * cos + dy * sin,
+                dy * cos - dx * sin,
+                vx * cos + vy * sin + 0.0,
+                vy * cos - vx * sin + 0.0,
+                float(moves),
+                length,
+                width,
+                math.cos(heading),
+                math.sin(heading),
+                confidence[row],
+                math.sqrt(max(ahead, 0.0)),
+                math.sqrt(max(aside, 0.0)),
+                float(certain),
+                age,
+                *_CLASS_COLUMNS[objects.classes[row]],
+            ]
+        )
+    return filled
+
+
+def object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> Array:
+    """Return the rows (N, C) of these objects in SI units."""
+    filled = np.zeros((len(rows), len(COLUMNS)))
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    axes = np.array([[cos, -sin], [sin, cos]])
+    boxes = objects.boxes[rows]
+    filled[:, 0] = 1.0
+    filled[:, 1:3] = (boxes[:, :2] - ego.position[:2]) @ axes
+    velocity = objects.velocity[rows] @ axes
+    known = np.isfinite(velocity[:, 0]) & np.isfinite(velocity[:, 1])
+    filled[:, 3:5] = np.where(np.reshape(known, (-1, 1)), velocity, 0.0)
+    filled[:, 5] = known
+    filled[:, 6:8] = boxes[:, 3:5]
+    heading = boxes[:, 6] - ego.yaw
+    filled[:, 8], filled[:, 9] = np.cos(heading), np.sin(heading)
+    filled[:, 10] = objects.confidence[rows]
+    covariance = objects.covariance[rows]
+    certain = np.isfinite(covariance.sum(axis=(1, 2)))
+    variance = np.einsum("ji,njk,ki->ni", axes, np.where(np.reshape(certain, (-1, 1, 1)), covariance, 0.0), axes)
+    filled[:, 11:13] = np.sqrt(np.maximum(variance, 0.0))
+    filled[:, 13] = certain
+    filled[:, 14] = age
+    for index, row in enumerate(rows):
+        filled[index, _CLASS[objects.classes[row]]] = 1.0
+    return filled
+
+
+CHANNELS = ("existence", "velocity_x", "velocity_y", "route")
+"""Channels of the grid: probability of existence, velocity over ground in the axes of the vehicle [m/s], route."""
+ROUTE_WIDTH = 3.5
+"""Width of the route in the grid [m]: a lane."""
+_FRACTION_BITS = 4
+"""Binary places of the coordinates of polygons."""
+
+
+def grid_bounds(settings: GridSettings) -> tuple[Array, Array]:
+    """Return lower and upper bounds of the grid in SI units, each (4, length, width)."""
+    high = np.ones((len(CHANNELS), settings.length, settings.width))
+    high[1:3] = MAX_SPEED
+    low = np.zeros_like(high)
+    low[1:3] = -MAX_SPEED
+    return low, high
+
+
+def occupancy_grid(objects: Detections, route: Array, ego: EgoState, settings: GridSettings) -> NDArray[Any]:
+    """Return the grid (4, length, width) in SI units.
+
+    Cell (i, j) has its center at x = (i + 0.5) resolution - behind ahead of the reference point, and at
+    y = (j + 0.5 - width / 2) resolution to its left. Of overlapping objects the nearest one is drawn.
+
+    route  points (P, 2) in the frame of the vehicle [m]
+    """
+    grid = np.zeros((len(CHANNELS), settings.length, settings.width), np.float32)
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    axes = np.array([[cos, -sin], [sin, cos]])
+    corners_of_all = footprint(objects.boxes)
+    for row in reversed(nearest_rows(objects, ego)):
+        corners = (corners_of_all[row] - ego.position[:2]) @ axes
+        polygon = _pixels(corners, settings)
+        velocity = np.nan_to_num(objects.velocity[row] @ axes)
+        values = (float(objects.confidence[row]), *velocity.tolist())
+        for channel, value in enumerate(values):
+            cv2.fillConvexPoly(grid[channel], polygon, value, shift=_FRACTION_BITS)
+    if len(route) > 1:
+        thickness = max(1, round(ROUTE_WIDTH / settings.resolution))
+        cv2.polylines(grid[3], [_pixels(route, settings)], False, 1.0, thickness, shift=_FRACTION_BITS)
+    return grid
+
+
+def _pixels(points: Array, settings: GridSettings) -> NDArray[Any]:
+    """Return points (N, 2) in the frame of the vehicle as fixed-point pixels, column before row."""
+    row = (points[:, 0] + settings.behind) / settings.resolution - 0.5
+    column = points[:, 1] / settings.resolution + settings.width / 2.0 - 0.5
+    scaled = np.stack([column, row], axis=1) * 2.0**_FRACTION_BITS
+    return np.rint(np.clip(scaled, -1e6, 1e6)).astype(np.int32)
+
 
 EGO_COLUMNS = (
     "speed", "acceleration", "yaw_rate", "requested_speed", "request_known", "throttle", "brake", "steering",

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, Unpack
 
 from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, suggestion
-from eidrive_scenario.gym.action_settings import ActionSettings
 from eidrive_scenario.gym.environment import final_info
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.libraries import INSTALL, gymnasium, spaces
-from eidrive_scenario.gym.observation_settings import ObservationSettings
-from eidrive_scenario.gym.render_mode import build_renderer, frames_per_second
-from eidrive_scenario.gym.render_settings import METADATA, RenderSettings
-from eidrive_scenario.gym.rewards import RewardSettings
-from eidrive_scenario.gym.runs import MAX_SEED, OPTIONS, Runs
-from eidrive_scenario.gym.station_interface import InterfaceSettings, sum_terms
+from eidrive_scenario.gym.runs import MAX_SEED, OPTIONS, EnvironmentOptions, ScenarioEnvironment
+from eidrive_scenario.gym.settings import METADATA
+from eidrive_scenario.gym.station_interface import sum_terms
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
-from eidrive_scenario.simulation import RunSettings
 
 try:
     from pettingzoo import ParallelEnv
@@ -29,7 +24,10 @@ Outcome = tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, boo
 """Observations, rewards, terminated, truncated and information, each by agent."""
 
 
-class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+_METADATA = {**METADATA, "name": "eidrive_scenario_v0", "is_parallelizable": True}
+
+
+class EidriveParallelEnv(ScenarioEnvironment, ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """Environment in which policies control several stations of a scenario. The agents are the stations.
 
     stations  controlled stations; None: all that drive
@@ -39,48 +37,22 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     them unless `terminate_on_collision` is off. Pictures follow the first station.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        **METADATA,
-        "name": "eidrive_scenario_v0",
-        "is_parallelizable": True,
-    }
+    metadata = _METADATA
 
     def __init__(
         self,
         scenario: Scenario | Source | ConcreteRun,
         *,
         stations: Sequence[str] | None = None,
-        observation: ObservationSettings | Mapping[str, Any] | None = None,
-        action: str | ActionSettings | Mapping[str, Any] | tuple[Any, ...] | list[Any] | None = None,
-        reward: RewardSettings | Mapping[str, Any] | None = None,
-        settings: RunSettings | None = None,
-        max_steps: int | None = None,
-        ticks_per_step: int = 1,
-        terminate_on_collision: bool = True,
-        render_mode: str | None = None,
-        render: RenderSettings | Mapping[str, Any] | None = None,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
-        self._runs = Runs(
-            scenario,
-            (stations,) if isinstance(stations, str) else stations,
-            InterfaceSettings.parse(observation, action, reward),
-            settings,
-            single=False,
-            max_steps=max_steps,
-            ticks_per_step=ticks_per_step,
-            terminate_on_collision=terminate_on_collision,
-        )
+        self._set_up(scenario, (stations,) if isinstance(stations, str) else stations, single=False, **options)
         self._interfaces = self._runs.interfaces
         self.possible_agents = list(self._interfaces)
         self.agents: list[str] = []
         self._left = set[str]()
         """Stations that have left the world in this episode, and may have returned without an agent."""
-        self.render_mode = render_mode
-        self._renderer = build_renderer(render_mode, render, self.possible_agents[0])
-        frame_rate = frames_per_second(self._runs.settings, ticks_per_step)
-        self.metadata = {**self.metadata, "render_fps": frame_rate}  # type: ignore[misc]
         self._generator, _ = gymnasium.utils.seeding.np_random()
-        self._episode: Episode | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of the observations of an agent."""
@@ -107,13 +79,7 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self.agents = self._present(episode)
         if not self.agents:
             raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
-        for name in self.agents:
-            self._interfaces[name].begin(episode)
-        if self._renderer is not None:
-            self._renderer.begin(episode)
-        simulation = episode.simulation
-        info: dict[str, Any] = {"seed": simulation.seed, "time": episode.start.view.time}
-        info["parameters"] = dict(simulation.scenario.parameters)
+        info = self._begin(episode, self.agents)
         return {name: self._interfaces[name].observe(episode) for name in self.agents}, {
             name: dict(info) for name in self.agents
         }
@@ -183,25 +149,11 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         if unknown is not None:
             raise SettingError(Diagnostic(f"{unknown!r} is not an agent", suggestion(str(unknown), self.agents)))
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3) of the current instant as `EidriveEnv.render`, around the first agent.
-
-        Return None without a render mode. Raise SimulationError before `reset`.
-        """
-        if self._renderer is None:
-            gymnasium.logger.warn("the environment has no render mode; create it with render_mode='rgb_array'")
-            return None
-        if self._episode is None:
-            raise SimulationError("the environment has no episode; call reset")
-        return self._renderer.picture()
-
     def _present(self, episode: Episode) -> list[str]:
         """Return the agents of the current tick."""
         return [name for name in self.possible_agents if name in episode.perceived and name not in self._left]
 
     def close(self) -> None:
-        """Free the world of the running episode."""
+        """Free the world of the running episode, and end its agents."""
         self.agents = []
-        if self._episode is not None:
-            self._episode.close()
-            self._episode = None
+        super().close()

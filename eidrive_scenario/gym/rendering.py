@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.gym.episode import Episode
-from eidrive_scenario.gym.render_settings import RenderSettings
+from eidrive_scenario.gym.settings import RenderSettings
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
 from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture

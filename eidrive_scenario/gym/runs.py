@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, quoted, suggestion
 from eidrive_scenario.evaluation.criteria_parser import EXITS
 from eidrive_scenario.gym.episode import Episode
-from eidrive_scenario.gym.station_interface import InterfaceSettings, StationInterface
+from eidrive_scenario.gym.libraries import gymnasium
+from eidrive_scenario.gym.settings import METADATA, RENDER_MODES, ActionSettings, ObservationSettings, RenderSettings
+from eidrive_scenario.gym.station_interface import InterfaceSettings, RewardSettings, StationInterface, parse_mapping
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
 from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
+
+if TYPE_CHECKING:
+    from eidrive_scenario.gym.rendering import Renderer
+
 
 MAX_SEED = 2**31
 """Exclusive bound of the seeds that an environment draws for its runs."""
@@ -126,3 +132,101 @@ def _stations(
         message = f"the scenario has the stations {', '.join(candidates)}"
         raise SettingError(Diagnostic(message, "select one by station=NAME"))
     return tuple(candidates) if not single else (candidates[0],)
+
+
+class EnvironmentOptions(TypedDict, total=False):
+    """Arguments that the environments of one and of several stations share; see EidriveEnv."""
+
+    observation: ObservationSettings | Mapping[str, Any] | None
+    action: str | ActionSettings | Mapping[str, Any] | tuple[Any, ...] | list[Any] | None
+    reward: RewardSettings | Mapping[str, Any] | None
+    settings: RunSettings | None
+    max_steps: int | None
+    ticks_per_step: int
+    terminate_on_collision: bool
+    render_mode: str | None
+    render: RenderSettings | Mapping[str, Any] | None
+
+
+class ScenarioEnvironment:
+    """Part of an environment that does not depend on the number of its controlled stations."""
+
+    metadata: dict[str, Any] = METADATA
+
+    def _set_up(
+        self,
+        scenario: Scenario | Source | ConcreteRun,
+        stations: Sequence[str] | None,
+        *,
+        single: bool,
+        observation: Any = None,
+        action: Any = None,
+        reward: Any = None,
+        settings: RunSettings | None = None,
+        max_steps: int | None = None,
+        ticks_per_step: int = 1,
+        terminate_on_collision: bool = True,
+        render_mode: str | None = None,
+        render: Any = None,
+    ) -> None:
+        """Build the runs and the renderer. The arguments are those of EidriveEnv."""
+        self._runs = Runs(
+            scenario,
+            stations,
+            InterfaceSettings.parse(observation, action, reward),
+            settings,
+            single=single,
+            max_steps=max_steps,
+            ticks_per_step=ticks_per_step,
+            terminate_on_collision=terminate_on_collision,
+        )
+        self.render_mode = render_mode
+        self._renderer = build_renderer(render_mode, render, next(iter(self._runs.interfaces)))
+        self.metadata = {**self.metadata, "render_fps": 1.0 / (self._runs.settings.dt * ticks_per_step)}
+        self._episode: Episode | None = None
+
+    def _begin(self, episode: Episode, names: Iterable[str]) -> dict[str, Any]:
+        """Begin an episode for these stations; return its seed, time [s] and parameters."""
+        for name in names:
+            self._runs.interfaces[name].begin(episode)
+        if self._renderer is not None:
+            self._renderer.begin(episode)
+        simulation = episode.simulation
+        info = {"seed": simulation.seed, "time": episode.start.view.time}
+        return {**info, "parameters": dict(simulation.scenario.parameters)}
+
+    def render(self) -> Any:
+        """Return the picture (height, width, 3) of the current instant, uint8 in the order red, green, blue.
+
+        It is that of `eidrive view --png`, around the first controlled station. Return None with a warning without a
+        render mode. Raise SimulationError before `reset`.
+        """
+        if self._renderer is None:
+            gymnasium.logger.warn("the environment has no render mode; create it with render_mode='rgb_array'")
+            return None
+        if self._episode is None:
+            raise SimulationError("the environment has no episode; call reset")
+        return self._renderer.picture()
+
+    def close(self) -> None:
+        """Free the world of the running episode."""
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None
+
+
+def build_renderer(mode: str | None, settings: Any, station: str) -> Renderer | None:
+    """Return the renderer of a mode with RenderSettings or a mapping of them; None without a mode.
+
+    station  station that the pictures follow
+
+    Raise SettingError for an unknown mode or an invalid setting.
+    """
+    parsed = parse_mapping(RenderSettings, settings, "render")
+    if mode is None:
+        return None
+    if mode not in RENDER_MODES:
+        raise SettingError(Diagnostic(f"render_mode is {quoted(mode)}", f"give {' or '.join(RENDER_MODES)}, or None"))
+    from eidrive_scenario.gym.rendering import Renderer  # imports OpenCV
+
+    return Renderer(station, parsed)

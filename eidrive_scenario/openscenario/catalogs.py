@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 from lxml import etree
 
+from eidrive_scenario.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
 from eidrive_scenario.files.untrusted_xml import line_of
@@ -28,7 +29,6 @@ from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope
 from eidrive_scenario.openscenario.values.scalars import Version
-from eidrive_scenario.resolved_settings import sha256_of
 
 Listing = tuple[str, ...] | bool
 """Sorted names in a folder; whether anything is at a path that is no folder."""

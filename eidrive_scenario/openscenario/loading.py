@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 
 import msgspec
 
+from eidrive_scenario.content_digest import sha256_of
 from eidrive_scenario.errors import ErrorCollector
 from eidrive_scenario.files.bounded import read_regular_file
 from eidrive_scenario.library import resolve_scenario
@@ -20,7 +21,6 @@ from eidrive_scenario.openscenario.reading.parsing import KeptFiles, Source
 from eidrive_scenario.openscenario.scenario import Scenario, find_road_file, load_scenario
 from eidrive_scenario.openscenario.values.parameters import Assignment, as_assignments
 from eidrive_scenario.openscenario.variation import drawn_parameters
-from eidrive_scenario.resolved_settings import sha256_of
 
 MAX_KEPT = 2**18
 """Maximum size of the files of all scenarios that are kept [byte]; their objects take about 40 times as much."""

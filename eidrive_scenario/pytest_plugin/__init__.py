@@ -7,22 +7,19 @@ parameter value distribution becomes as many tests for each of its runs, up to `
 
 from __future__ import annotations
 
-from eidrive_scenario.pytest_plugin.collection import pytest_collect_file
-from eidrive_scenario.pytest_plugin.distributions import (
-    pytest_sessionfinish,
-    pytest_testnodedown,
-)
+from eidrive_scenario.pytest_plugin.failures import pytest_runtest_makereport, pytest_runtest_setup
 from eidrive_scenario.pytest_plugin.fixture import pytest_generate_tests, run_scenario
-from eidrive_scenario.pytest_plugin.hung_runs import pytest_handlecrashitem, pytest_unconfigure
-from eidrive_scenario.pytest_plugin.options import (
+from eidrive_scenario.pytest_plugin.items import pytest_collect_file, pytest_sessionfinish, pytest_testnodedown
+from eidrive_scenario.pytest_plugin.options import pytest_report_header
+from eidrive_scenario.pytest_plugin.reports import pytest_terminal_summary
+from eidrive_scenario.pytest_plugin.session import (
     pytest_addoption,
     pytest_configure,
     pytest_configure_node,
+    pytest_handlecrashitem,
     pytest_load_initial_conftests,
-    pytest_report_header,
+    pytest_unconfigure,
 )
-from eidrive_scenario.pytest_plugin.run_records import pytest_runtest_makereport, pytest_runtest_setup
-from eidrive_scenario.pytest_plugin.summary import pytest_terminal_summary
 
 __all__ = [
     "pytest_addoption",

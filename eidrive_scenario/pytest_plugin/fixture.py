@@ -14,15 +14,21 @@ from eidrive_scenario.errors import ExtensionError, InputError, SimulationError,
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.library import definition, library_path, resolve_scenario
-from eidrive_scenario.pytest_plugin.failure_text import explain_outcome, failures_of
+from eidrive_scenario.pytest_plugin.failures import (
+    add_error,
+    add_failed_run,
+    add_properties,
+    add_section,
+    explain_outcome,
+    failures_of,
+)
 from eidrive_scenario.pytest_plugin.markers import run_markers, test_name
+from eidrive_scenario.pytest_plugin.option_values import path_beside
 from eidrive_scenario.pytest_plugin.outcome import (
     properties,
     rate_properties,
     run_variant,
 )
-from eidrive_scenario.pytest_plugin.relative_paths import path_beside
-from eidrive_scenario.pytest_plugin.run_records import add_error, add_failed_run, add_properties, add_section
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant, run_variants
 
 if TYPE_CHECKING:

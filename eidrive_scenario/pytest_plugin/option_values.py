@@ -1,9 +1,17 @@
-"""Parsers of the values of options and ini options."""
+"""Values of options and ini options: their parsers, checks before the first test, and paths beside a file."""
 
 from __future__ import annotations
 
+import os
 from argparse import ArgumentTypeError
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.run_options import NO_COOPERATION, Seconds, option_of
 
 NO_LIMIT = "none"
 """Value of the wall limit for no limit."""
@@ -38,14 +46,6 @@ def parse_rate(text: str) -> Any:
         raise ArgumentTypeError(f"not a rate between 0 and 1 (got {text!r})") from error
 
 
-def parse_entity(text: str) -> str:
-    """Return the text of an entity, with a stack after an equals sign. Raise ArgumentTypeError for another text."""
-    name, equals, stack = text.partition("=")
-    if not name.strip() or (equals and not stack.strip()):
-        raise ArgumentTypeError(f"no entity or stack is given (got {text!r})")
-    return text
-
-
 def parse_listed_channels(text: str) -> str:
     """Return a text that lists at least one channel. Raise ArgumentTypeError for another text."""
     if not split_channels(text):
@@ -53,18 +53,15 @@ def parse_listed_channels(text: str) -> str:
     return text
 
 
-def parse_record(text: str) -> str:
-    """Return the runs whose recording is kept. Raise ArgumentTypeError for an unknown text."""
-    if text not in RECORD:
-        raise ArgumentTypeError(f"not one of {', '.join(RECORD)} (got {text!r})")
-    return text
+def parse_choice(choices: tuple[str, ...]) -> Callable[[str], str]:
+    """Return the parser of an option with these values."""
 
+    def parse(text: str) -> str:
+        if text not in choices:
+            raise ArgumentTypeError(f"not one of {', '.join(choices)} (got {text!r})")
+        return text
 
-def parse_without_criteria(text: str) -> str:
-    """Return the outcome of a test without criteria. Raise ArgumentTypeError for an unknown text."""
-    if text not in WITHOUT_CRITERIA:
-        raise ArgumentTypeError(f"not one of {', '.join(WITHOUT_CRITERIA)} (got {text!r})")
-    return text
+    return parse
 
 
 def parse_topics(text: str) -> tuple[str, ...]:
@@ -75,30 +72,12 @@ def parse_topics(text: str) -> tuple[str, ...]:
     return names
 
 
-def parse_given(text: str) -> str:
-    """Return a text that is not blank. Raise ArgumentTypeError for another text."""
-    if not text.strip():
-        raise ArgumentTypeError(f"no value is given (got {text!r})")
-    return text
-
-
-def parse_seconds(text: str) -> float:
-    """Return a positive number of seconds. Raise ArgumentTypeError for another text."""
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds < float("inf"):
-        raise ArgumentTypeError(f"not a positive number of seconds (got {text!r})")
-    return seconds
-
-
 def parse_seconds_or_none(text: str) -> float | str:
     """Return a positive number of seconds or `none`. Raise ArgumentTypeError for another text."""
     if text.strip() == NO_LIMIT:
         return NO_LIMIT
     try:
-        return parse_seconds(text)
+        return Seconds().parse_text(text)
     except ArgumentTypeError:
         raise ArgumentTypeError(f"not a positive number of seconds or none (got {text!r})") from None
 
@@ -113,3 +92,88 @@ def split_channels(text: str) -> list[str]:
         else:
             parts[-1] += character
     return [name for name in dict.fromkeys(part.strip() for part in parts) if name]
+
+
+def path_beside(source: Any, folder: Path) -> Any:
+    """Return the path of a file relative to a folder, or any other value unchanged."""
+    if isinstance(source, str | Path) and _is_file(folder / source):
+        return folder / source
+    return source
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return os.path.isfile(path)
+    except (OSError, ValueError):  # a YAML text that no file name can be
+        return False
+
+
+def check_values(name: str, place: str, value: Any, folder: Path) -> None:
+    """Raise UsageError if the value of an option names an unknown extension or profile, or is not valid YAML.
+
+    place   option or ini option, for the message
+    folder  folder of relative paths
+    """
+    check = _CHECKS.get(name)
+    if check is None or value is None:
+        return
+    try:
+        check(place, value, folder)
+    except InputError as error:
+        raise pytest.UsageError("\n".join(_with_place(place, str(one)) for one in error.diagnostics)) from None
+
+
+def _with_place(place: str, message: str) -> str:
+    return message if message.startswith(f"{place}: ") else f"{place}: {message}"
+
+
+def _check_channels(place: str, value: list[str], folder: Path) -> None:
+    """Check that profiles exist and that inline profiles are YAML; their settings are checked when a run loads them."""
+    from eidrive_scenario.files.yaml_text import load_yaml
+    from eidrive_scenario.library import library_path, resolve
+
+    for channel in split_channels(",".join(value)):
+        if "{" in channel:
+            load_yaml(channel, source=place)
+        elif channel != NO_COOPERATION and not (library_path() / "channels" / channel).is_file():
+            resolve("channels", path_beside(channel, folder))
+
+
+def _check_extension(group: str) -> Callable[[str, str, Path], None]:
+    def check(place: str, value: str, folder: Path) -> None:
+        from eidrive_scenario.errors import SettingError
+        from eidrive_scenario.registry import registry
+
+        if value not in registry(group):
+            raise SettingError(registry(group).unknown(value, source=place))
+
+    return check
+
+
+def _check_drive(place: str, value: list[str], folder: Path) -> None:
+    from eidrive_scenario.files.yaml_text import read_yaml_source
+
+    for stack in option_of("drive").form.parse(place, value).values():
+        if stack is not None:
+            read_yaml_source(path_beside(stack, folder), option=place)
+
+
+def _check_criteria(place: str, value: list[str], folder: Path) -> None:
+    from eidrive_scenario.errors import quoted
+    from eidrive_scenario.evaluation.criteria_parser import declare_criteria
+    from eidrive_scenario.files.yaml_text import read_yaml_source
+
+    for text in value:
+        content = read_yaml_source(path_beside(text, folder), option=place)
+        shown = quoted(content.data)
+        if "$" not in shown:  # the parameters of the scenario are not known yet
+            declare_criteria(content.data, content.lines, source=content.source, shown=shown)
+
+
+_CHECKS: dict[str, Callable[[str, Any, Path], None]] = {
+    "channel": _check_channels,
+    "detector": _check_extension("detectors"),
+    "planner": _check_extension("planners"),
+    "drive": _check_drive,
+    "criterion": _check_criteria,
+}

@@ -5,46 +5,37 @@ from __future__ import annotations
 import os
 from argparse import ArgumentTypeError
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 
-from eidrive_scenario.pytest_plugin import hung_runs, junit, markers, option_checks
 from eidrive_scenario.pytest_plugin.option_values import (
+    NO_LIMIT,
+    RECORD,
+    WITHOUT_CRITERIA,
+    check_values,
+    parse_choice,
     parse_count,
     parse_count_or_all,
-    parse_entity,
-    parse_given,
     parse_listed_channels,
     parse_rate,
-    parse_record,
-    parse_seconds,
     parse_seconds_or_none,
     parse_topics,
-    parse_without_criteria,
 )
+from eidrive_scenario.run_options import OPTIONS as RUN_OPTIONS
+from eidrive_scenario.run_options import Form, PytestForm, RunOption
 
+RUNS = "runs"
+"""Folder of the files of runs beside the report, without --eidrive-out."""
+USUAL_LIMIT = 1800.0
+"""Default wall limit of each run [s]."""
 _DEFAULT_MAX_RUNS = 100
-_SHOWN = (
-    "channel",
-    "drive",
-    "criterion",
-    "without_criteria",
-    "detector",
-    "planner",
-    "seeds",
-    "success_rate",
-    "time_limit",
-    "out",
-    "record",
-    "topics",
-    "report",
-)
-"""Options that the header of a report lists."""
-_COMBINED = ("drive", "criterion")
-"""Options whose values are added to those of the ini file."""
+_HIDDEN = ("max_runs", "wall_limit")
+"""Options that the header of a report omits."""
+_SHOWN_LAST = ("seeds", "success_rate", "time_limit", "out", "record", "topics", "report")
+"""Options at the end of this header."""
 _EXCLUSIVE = ("seeds", "success_rate")
 """Options of which one place gives at most one."""
 _EXCLUDE = " exclude each other (expected one of them)"
@@ -61,13 +52,28 @@ class Option:
 
     parse       returns the value of a text; raises ArgumentTypeError for an invalid one
     repeatable  given several times on the command line, one per line in the ini file
+    combined    whether values of the command line are added to those of the ini file
+    setting     field of RunSettings that it gives; "" for an option of the session
     """
 
     name: str
     metavar: str
     help: str
-    parse: Callable[[str], Any] = parse_given
+    parse: Callable[[str], Any] = Form().parse_text
     repeatable: bool = False
+    combined: bool = False
+    setting: str = ""
+
+    @classmethod
+    def of(cls, option: RunOption) -> Option:
+        """Return the option of pytest of an option of a run."""
+        given = option.pytest or PytestForm()
+        text = given.help or f"{option.help[:1].lower()}{option.help[1:].rstrip('.')}"
+        repeated = option.form.is_repeated
+        metavar = given.metavar or option.metavar or "VALUE"
+        return cls(
+            given.name or option.name, metavar, text, option.form.parse_text, repeated, repeated, setting=option.name
+        )
 
     @property
     def flag(self) -> str:
@@ -80,15 +86,11 @@ class Option:
         return f"eidrive_{self.name}"
 
 
+_OF_RUN = {option.name: Option.of(option) for option in RUN_OPTIONS if option.pytest is not None}
+"""Options of pytest by the option of a run that they give."""
+
 OPTIONS = (
-    Option(
-        "channel",
-        "A,B",
-        "run each scenario with each of these channel profiles (default: the file's own); none: no cooperation; "
-        "repeatable",
-        parse_listed_channels,
-        repeatable=True,
-    ),
+    replace(_OF_RUN.pop("channel"), parse=parse_listed_channels, repeatable=True),
     Option("seeds", "N", "run each scenario with the seeds 1 to N (default: 1)", parse_count),
     Option(
         "success_rate",
@@ -97,27 +99,16 @@ OPTIONS = (
         "confidence of 95 %%; a test is undecided and fails after 500 runs",
         parse_rate,
     ),
-    Option(
-        "drive",
-        "NAME[=STACK]",
-        "give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable",
-        parse_entity,
-        repeatable=True,
-    ),
-    Option(
-        "criterion",
-        "YAML|FILE",
-        "add criteria to those of each scenario, such as '{collision: {of: Ego}}', or those of a file; repeatable",
-        repeatable=True,
-    ),
+    _OF_RUN.pop("drive"),
+    _OF_RUN.pop("criteria"),
     Option(
         "without_criteria",
         "error|warn|pass",
         "outcome of a run that no criterion judges: an error of the test, a warning, or neither (default: error)",
-        parse_without_criteria,
+        parse_choice(WITHOUT_CRITERIA),
     ),
-    Option("detector", "NAME", "detector of all stations (default: the file's own)"),
-    Option("planner", "NAME", "planner of all driven stations (default: the file's own)"),
+    _OF_RUN.pop("detector"),
+    _OF_RUN.pop("planner"),
     Option(
         "max_runs",
         "N|all",
@@ -129,7 +120,7 @@ OPTIONS = (
         "record",
         "always|on-failure|never",
         "runs whose recording and camera images --eidrive-out keeps (default: always)",
-        parse_record,
+        parse_choice(RECORD),
     ),
     Option(
         "topics",
@@ -143,19 +134,17 @@ OPTIONS = (
         "write the page of `eidrive report` about the runs of the session, with a replay of each recorded run; without "
         "--eidrive-out their files are kept in the folder `runs` beside it",
     ),
-    Option(
-        "time_limit", "SECONDS", "maximum simulated time of each run; an error if reached (default: 120)", parse_seconds
-    ),
+    *_OF_RUN.values(),
     Option(
         "wall_limit",
         "SECONDS|none",
-        f"maximum wall time of each run; an error if reached (default: {hung_runs.USUAL_LIMIT:g})",
+        f"maximum wall time of each run; an error if reached (default: {USUAL_LIMIT:g})",
         parse_seconds_or_none,
     ),
 )
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def add_options(parser: pytest.Parser) -> None:
     """Add the options `--eidrive-…` and the ini options."""
     group = parser.getgroup("eidrive", "OpenSCENARIO files")
     for option in OPTIONS:
@@ -179,42 +168,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type="paths",
         default=None,
     )
-    markers.add_ini_option(parser)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
-    """Select the project of the root, as `eidrive` does, before a `conftest.py` registers further extensions."""
-    from eidrive_scenario.errors import InputError
-    from eidrive_scenario.project import VARIABLE, select_project
-
-    if VARIABLE in os.environ:
-        return
-    try:
-        select_project(early_config.rootpath)
-    except InputError as error:
-        raise pytest.UsageError(str(error)) from None
-
-    def restore() -> None:
-        os.environ.pop(VARIABLE, None)
-
-    early_config.add_cleanup(restore)
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Declare the markers, check the values of all options and store the paths of the command line."""
+def read_options(config: pytest.Config) -> None:
+    """Check the values of all options, and store the paths of the command line. Raise UsageError."""
     config.stash[_INI] = {option.name: value for option in OPTIONS if (value := _ini_value(config, option)) is not None}
     config.stash[_GIVEN] = _given(config)
-    markers.declare(config)
     _check_exclusive(config)
     if not hasattr(config, "workerinput"):  # its controller has checked them
         for option in OPTIONS:
-            option_checks.check_values(option.name, option.flag, command_line_value(config, option.name), Path())
+            check_values(option.name, option.flag, command_line_value(config, option.name), Path())
             listed = config.stash[_INI].get(option.name)
-            option_checks.check_values(option.name, f"ini option {option.key}", listed, config.rootpath)
-    junit.register(config)
-    limit = option_value(config, "wall_limit")
-    hung_runs.configure(config, hung_runs.USUAL_LIMIT if limit is None else limit)
+            check_values(option.name, f"ini option {option.key}", listed, config.rootpath)
+
+
+def send_paths(node: Any) -> None:
+    """Send the paths of the command line to a worker of pytest-xdist, whose own arguments omit them."""
+    node.workerinput[_WORKER_KEY] = [str(path) for path in node.config.stash[_GIVEN]]
 
 
 def _check_exclusive(config: pytest.Config) -> None:
@@ -230,7 +200,7 @@ def _ini_value(config: pytest.Config, option: Option) -> Any:
 
     Raise UsageError for an invalid value.
     """
-    if option.name not in _COMBINED and command_line_value(config, option.name) is not None:
+    if not option.combined and command_line_value(config, option.name) is not None:
         return None
     given = config.getini(option.key)
     texts = [str(text) for text in (given if isinstance(given, list) else [given])] if given is not None else []
@@ -263,9 +233,33 @@ def max_runs(config: pytest.Config) -> int | None:
     return None if given == "all" else given or _DEFAULT_MAX_RUNS
 
 
+def wall_limit(config: pytest.Config) -> float | None:
+    """Return the limit of the wall time of each run [s], or None."""
+    given = option_value(config, "wall_limit")
+    return None if given == NO_LIMIT else given or USUAL_LIMIT
+
+
+def path_value(config: pytest.Config, name: str) -> Path | None:
+    """Return the path of an option: relative to the current folder, that of an ini option to the root."""
+    if (given := command_line_value(config, name)) is not None:
+        return Path(config.invocation_params.dir, given)
+    listed = option_value(config, name)
+    return None if listed is None else config.rootpath / listed
+
+
+def runs_folder(config: pytest.Config) -> Path | None:
+    """Return the folder below which the files of runs are kept, or None."""
+    below = path_value(config, "out")
+    if below is not None:
+        return below
+    page = path_value(config, "report")
+    return None if page is None else (page.parent if page.suffix == ".html" else page) / RUNS
+
+
 def pytest_report_header(config: pytest.Config) -> str | None:
     """Return the options with a value, or None."""
-    values = {name: option_value(config, name) for name in _SHOWN}
+    names = dict.fromkeys([*(option.name for option in OPTIONS if option.name not in _SHOWN_LAST), *_SHOWN_LAST])
+    values = {name: option_value(config, name) for name in names if name not in _HIDDEN}
     given = [f"{name} {_shown(value)}" for name, value in values.items() if value is not None]
     return f"eidrive: {', '.join(given)}" if given else None
 
@@ -299,10 +293,3 @@ def _given(config: pytest.Config) -> tuple[Path, ...]:
         return ()
     paths = (Path(config.invocation_params.dir, argument.split("::")[0]) for argument in config.args)
     return tuple(Path(os.path.abspath(path)) for path in paths)  # as pytest, which does not resolve links
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_configure_node(node: Any) -> None:
-    """Send the paths of the command line to a worker of pytest-xdist, whose own arguments omit them."""
-    hung_runs.pytest_configure_node(node)
-    node.workerinput[_WORKER_KEY] = [str(path) for path in node.config.stash[_GIVEN]]

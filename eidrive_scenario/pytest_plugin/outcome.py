@@ -10,15 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from eidrive_scenario.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
-from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
-from eidrive_scenario.pytest_plugin.option_values import split_channels
-from eidrive_scenario.pytest_plugin.options import OPTIONS, command_line_value, listed_value, option_value
-from eidrive_scenario.pytest_plugin.relative_paths import path_beside
-from eidrive_scenario.pytest_plugin.run_records import add_properties, record_of
-from eidrive_scenario.pytest_plugin.session_report import runs_folder
+from eidrive_scenario.pytest_plugin.failures import WARNING, add_properties, record_of
+from eidrive_scenario.pytest_plugin.option_values import path_beside, split_channels
+from eidrive_scenario.pytest_plugin.options import (
+    OPTIONS,
+    command_line_value,
+    listed_value,
+    option_value,
+    runs_folder,
+    wall_limit,
+)
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant
-from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
+from eidrive_scenario.run_options import Criteria, Stacks, option_of
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.success_rate import RateVerdict
@@ -27,8 +33,6 @@ if TYPE_CHECKING:
 
 Properties = list[tuple[str, object]]
 
-WARNING = "warning"
-"""Name of the properties with the warnings of a run."""
 _NOT_REPEATED = ("out", "record", "report", "max_runs")
 """Options that the command of a test omits, as they do not change its run."""
 
@@ -116,20 +120,20 @@ def _run_and_report(
     from eidrive_scenario.simulation.run_outcome import UNJUDGED
 
     config, overrides = item.config, dict(overrides)
-    wall_limit = overrides.pop("wall_limit", wall_limit_of(config))
+    limit = overrides.pop("wall_limit", wall_limit(config))
     known = [field.name for field in fields(RunSettings)]
     for keyword in overrides:
         if keyword not in known:
             raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, known)))
-    settings: dict[str, Any] = {
+    settings: dict[str, Any] = {}
+    for option in OPTIONS:
+        if (value := option_value(config, option.name)) is not None and option.setting:
+            settings[option.setting] = option_of(option.setting).form.parse(option.flag, value)
+    settings |= {
         "channel": _channel(config, variant.channel),
-        "detector": option_value(config, "detector"),
-        "planner": option_value(config, "planner"),
         "no_criteria": option_value(config, "without_criteria") in ("warn", "pass"),
         **added_settings(config, variant.added),
     }
-    if (time_limit := option_value(config, "time_limit")) is not None:
-        settings["time_limit"] = time_limit
     settings.update(overrides)
     below = runs_folder(config)
     below = below and below.joinpath(*_subfolders(config, file))
@@ -139,7 +143,7 @@ def _run_and_report(
         settings=RunSettings(**settings),
         below=below,
         record=option_value(config, "record") or True,
-        wall_limit=wall_limit,
+        wall_limit=limit,
         command=_command(item, source),
     )
     if option_value(config, "without_criteria") == "pass":
@@ -159,18 +163,16 @@ def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, A
     A stack of the command line replaces that of the marker for the same entity, and this one that of the ini file.
     Criteria are added. Raise SettingError for an invalid value.
     """
-    from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources, parse_drive
-
-    root = config.rootpath
-    listed = parse_drive("eidrive_drive", listed_value(config, "drive"))
+    root, stacks = config.rootpath, Stacks()
+    listed = stacks.parse("eidrive_drive", listed_value(config, "drive"))
     in_file = {name: stack and path_beside(stack, root) for name, stack in listed.items()}
-    by_option = parse_drive("--eidrive-drive", command_line_value(config, "drive") or ())
+    by_option = stacks.parse("--eidrive-drive", command_line_value(config, "drive") or ())
     criteria = [path_beside(one, root) for one in listed_value(config, "criterion")]
     return {
-        "drive": {**in_file, **drive_sources(marker.drive), **by_option},
+        "drive": {**in_file, **stacks.check("drive", marker.drive), **by_option},
         "criteria": [
             *criteria,
-            *criteria_sources(marker.criteria),
+            *Criteria().check("criteria", marker.criteria),
             *(command_line_value(config, "criterion") or ()),
         ],
     }

@@ -12,10 +12,11 @@ import pytest
 
 from eidrive_scenario.pytest_plugin.option_values import split_channels
 from eidrive_scenario.pytest_plugin.options import command_line_value, listed_value, option_value
+from eidrive_scenario.run_options import OPTIONS
 
 _MAX_LENGTH = 80
 """Maximum number of characters of a channel in the name of a test."""
-_NAMED = ("detector", "planner")
+_NAMED = tuple(option.name for option in OPTIONS if option.pytest is not None and option.pytest.is_named)
 """Options with one value that the name of a test contains."""
 
 

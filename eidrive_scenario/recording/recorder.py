@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from eidrive_scenario.content_digest import package_versions
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.codec import codec
@@ -14,7 +15,6 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import NAME as SEAL
 from eidrive_scenario.recording.integrity import Seal
 from eidrive_scenario.recording.json_text import JsonText
-from eidrive_scenario.resolved_settings import package_versions
 
 if TYPE_CHECKING:
     from mcap.writer import Writer

@@ -1,7 +1,4 @@
-"""Check of this project's CustomCommandActions and of added criteria before a run.
-
-Errors in late events are thus reported at once.
-"""
+"""Commands of the storyboard to the engine: channel, criteria and end of the run; their checks and their execution."""
 
 from __future__ import annotations
 
@@ -11,13 +8,21 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import msgspec
+
+from eidrive_scenario.driving.stack import DrivingStack, StackInputs
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, SettingError, quoted, suggestion
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
+    EXITS,
     CriterionDeclaration,
+    build_criteria,
+    declaration_text,
     declare_criteria,
+    exit_verdict,
     parse_criteria,
 )
+from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads
 from eidrive_scenario.files.yaml_text import read_yaml_source
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
@@ -30,9 +35,15 @@ from eidrive_scenario.openscenario.model import (
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import variations
+from eidrive_scenario.recording.frame import ExecutedCommand
 from eidrive_scenario.registry import registry
-from eidrive_scenario.storyboard.state.commands import CustomCommand
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.v2x.profile import ChannelProfile, load_profile, profile_file
+from eidrive_scenario.world import World
+from eidrive_scenario.world.environment import Environment, weather_from_environment
+from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.view import WorldView
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
@@ -180,3 +191,179 @@ def _requests_routes(scenario: Scenario) -> bool:
 def _monitors(scenario: Scenario) -> list[str]:
     declared = scenario.document.monitor_declarations
     return [one.name for one in declared.monitor_declaration] if declared is not None else []
+
+
+SUN_PERIOD = 60.0
+"""Time between two positions of the sun under a running clock [s], in which it moves by half its diameter."""
+
+
+class RunState(msgspec.Struct):
+    """Objects of a run that commands change.
+
+    weather_fixed  True if an option of the run overrides the weather of the scenario
+    declared       criteria that the commands of the scenario declare, parsed before the run
+    inputs         requests and signal states for the next step of the stack
+    criteria       of the run; commands add to them
+    warnings       of the run; commands without effect add to them
+    exit           verdict of the command that ends the run; None before it
+    executed       custom commands since the last frame
+    trailers       trailer of each towing vehicle since the last step of the world, by name
+    environment    of the last EnvironmentAction; weather_since  time at which the weather was set [s]
+    """
+
+    scenario: Scenario
+    roads: RoadNetwork | None
+    world: World
+    stack: DrivingStack
+    weather_fixed: bool
+    declared: DeclaredCriteria
+    criteria: list[Criterion]
+    warnings: list[str]
+    inputs: StackInputs = msgspec.field(default_factory=StackInputs)
+    exit: Verdict | None = None
+    executed: list[ExecutedCommand] = msgspec.field(default_factory=list)
+    trailers: Mapping[str, str] = msgspec.field(default_factory=dict)
+    environment: Environment | None = None
+    weather_since: float = 0.0
+
+    def take_executed(self) -> tuple[ExecutedCommand, ...]:
+        """Return the commands since the last call."""
+        if not self.executed:
+            return ()
+        executed, self.executed = tuple(self.executed), []
+        return executed
+
+    def trailers_in(self, view: WorldView) -> Mapping[str, str]:
+        """Return the trailer of each towing vehicle of which both are present."""
+        if not self.trailers:
+            return {}
+        return {front: back for front, back in self.trailers.items() if front in view and back in view}
+
+    def record(self, kind: str, content: str) -> None:
+        """Add an executed command."""
+        self.executed.append(ExecutedCommand(kind, content, self.world.time))
+
+
+def execute(commands: Commands, run: RunState) -> None:
+    """Execute all commands of one tick but the placements, which are an argument of `World.step`."""
+    for handler in HANDLERS:
+        handler(commands, run)
+
+
+def remove_actors(commands: Commands, run: RunState) -> None:
+    """Remove actors from the world and the stack."""
+    for name in sorted(commands.removals):
+        run.world.remove(name)
+        run.stack.remove(name)
+
+
+def set_trailers(commands: Commands, run: RunState) -> None:
+    """Set which actors are connected, before a trailer enters the world."""
+    run.trailers = commands.trailers
+    run.world.set_trailers([frozenset(pair) for pair in commands.trailers.items()])
+
+
+def spawn_actors(commands: Commands, run: RunState) -> None:
+    """Add actors to the world and the stack."""
+    for name, placement in commands.spawns.items():
+        spec = commands.actor_specs.get(name) or actor_spec(name, run.scenario.entities[name])
+        run.world.add(spec, placement)
+        run.stack.add(spec)
+
+
+def switch_drivers(commands: Commands, run: RunState) -> None:
+    """Switch each vehicle of the stack between its own controls and scripted motion."""
+    for name in sorted(run.stack.drivers):
+        run.world.set_driven(name, name in commands.driven)
+
+
+def set_inputs(commands: Commands, run: RunState) -> None:
+    """Pass goals and signal states to the next step of the stack."""
+    run.inputs = StackInputs(commands.goals, commands.signals)
+
+
+def set_display_state(commands: Commands, run: RunState) -> None:
+    """Show signal states and appearances in camera images."""
+    run.world.set_display_state(commands.signals, commands.appearances)
+
+
+def set_weather(commands: Commands, run: RunState) -> None:
+    """Set the weather of an EnvironmentAction, unless an option overrides it. The sun follows a running clock."""
+    if run.weather_fixed:
+        return
+    if commands.environment is not None:
+        run.environment = commands.environment
+    elif run.environment is None or not run.environment.moves_sun or run.world.time < run.weather_since + SUN_PERIOD:
+        return
+    run.weather_since = run.world.time
+    run.world.set_weather(weather_from_environment(run.environment, run.world.time))
+
+
+def execute_custom(commands: Commands, run: RunState) -> None:
+    """Execute CustomCommandActions. A command of another tool has no effect, which is a warning."""
+    for command in commands.custom:
+        if command.type != CRITERION:  # `add_criteria` records criteria with all their settings
+            run.record(command.type, command.content)
+        handler = CUSTOM_HANDLERS.get(command.type)
+        if handler is not None:
+            handler(command, run)
+        elif not command.type.startswith(PREFIX):
+            run.warnings.append(
+                f"{command.source}:{command.line}: command of type {command.type!r} is recorded, not executed"
+            )
+
+
+def select_channel(command: CustomCommand, run: RunState) -> None:
+    """Select the channel of a command `eidrive.channel`."""
+    warnings = run.stack.request_channel(command.content, source=command.source, line=command.line, scope=command.scope)
+    run.warnings += map(str, warnings)
+
+
+def declare(command: CustomCommand, run: RunState) -> None:
+    """Add the criteria of a command `eidrive.criterion`."""
+    declarations = run.declared.get(command_key(command))
+    if declarations is None:  # A command that an action of an extension has created
+        declarations = parse_criteria(
+            command.content,
+            source=command.source,
+            line=command.line,
+            entities=run.scenario.entities,
+            scope=command.scope,
+            has_roads=run.roads is not None,
+        )
+    add_criteria(declarations, run)
+
+
+def add_criteria(declarations: Iterable[CriterionDeclaration], run: RunState) -> None:
+    """Add new criteria. The name of another criterion is not used again."""
+    declarations = list(declarations)
+    added = build_criteria(declarations, [criterion.name for criterion in run.criteria])
+    for declaration, criterion in zip(declarations, added, strict=True):
+        bind_roads(criterion, run.roads)
+        run.record(CRITERION, declaration_text(declaration, criterion.name))
+    run.criteria += added
+
+
+def end_run(command: CustomCommand, run: RunState) -> None:
+    """End the run with the verdict of an exit command."""
+    run.exit = exit_verdict(command, run.world.time)
+
+
+HANDLERS: tuple[Callable[[Commands, RunState], None], ...] = (
+    remove_actors,
+    set_trailers,
+    spawn_actors,
+    switch_drivers,
+    set_inputs,
+    set_display_state,
+    set_weather,
+    execute_custom,
+)
+"""Handlers of `Commands`, in the order of execution."""
+
+CUSTOM_HANDLERS: dict[str, Callable[[CustomCommand, RunState], None]] = {
+    CHANNEL: select_channel,
+    CRITERION: declare,
+    **dict.fromkeys(EXITS, end_run),
+}
+"""Handlers of CustomCommandActions by type. No command starts a program."""

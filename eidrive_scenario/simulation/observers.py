@@ -4,9 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, suppress
+from typing import Protocol
 
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.simulation.run import Observer, RunResult, checked_observer
+from eidrive_scenario.simulation.result import RunResult
+
+
+class Observer(Protocol):
+    """Observer of a run that does not change it, such as a recorder, a CSV writer or a collector of images.
+
+    It may have the methods `begin(simulation)`, called before its first frame, and `conclude(result)`, which
+    `Simulation.run` calls with the result of a completed run.
+    """
+
+    def observe(self, frame: Frame) -> None:
+        """Process one frame."""
+
+    def close(self) -> None:
+        """Finish after the last frame."""
+
+
+def checked_observer(observer: Observer) -> Observer:
+    """Return an observer. Raise SettingError for an object that lacks the methods of an observer."""
+    for method in ("observe", "close"):
+        if not callable(getattr(observer, method, None)):
+            name = type(observer).__name__
+            raise SettingError(
+                Diagnostic(f"observer {name} has no method {method}", "define observe(frame) and close()")
+            )
+    return observer
 
 
 class Observers:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from eidrive_scenario.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json
@@ -19,9 +20,8 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
-from eidrive_scenario.resolved_settings import canonical_json
 from eidrive_scenario.simulation.commands import CriteriaContext, criteria_context
-from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.simulation.result import RunResult
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import msgspec
 
+from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.driving.station_warnings import MotionlessStations
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED, Diagnostic
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.known_actors import FalseTracks
-from eidrive_scenario.exit_codes import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.resolved_settings import ResolvedSettings
-from eidrive_scenario.simulation.command_execution import RunState
-from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.recording.text.run_log import FinalState
+from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.simulation.commands import RunState
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation.result import RunResult
 from eidrive_scenario.storyboard.state.commands import user_value_warnings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
@@ -34,6 +36,29 @@ UNJUDGED = "the run is not judged: it has no criterion"
 """Start of the warning of a run without verdicts."""
 HOW_TO_JUDGE = "add one to the scenario or by --criterion '{collision: {of: Ego}}', or accept the run by --no-criteria"
 """Hint to the warning."""
+
+
+class RunMeasures:
+    """What a run measures in each tick, apart from its criteria.
+
+    stack  driving stack, whose stations are watched for standstill and false tracks
+    """
+
+    def __init__(self, stack: DrivingStack) -> None:
+        self._stack = stack
+        self.trace = TraceHash()
+        self.false_tracks = FalseTracks()
+        self.final_state = FinalState()
+        self.motionless = MotionlessStations(stack.possible_drivers)
+
+    def observe(self, frame: Frame, driven: Collection[str]) -> None:
+        """Process one frame; `driven` are the stations that drive their vehicle."""
+        if self.motionless.watching:
+            self.motionless.observe(frame.view, driven)
+        self.trace.observe(frame)
+        self.final_state.observe(frame)
+        if limits := self._stack.min_existence:
+            self.false_tracks.observe(frame, limits)
 
 
 class RunEnd(msgspec.Struct, frozen=True):
@@ -58,9 +83,7 @@ def build_result(
     end: RunEnd,
     *,
     settings: ResolvedSettings,
-    trace_hash: str,
-    false_tracks: FalseTracks,
-    final_state: tuple[str, ...],
+    measures: RunMeasures,
     late_warnings: Iterator[str],
     no_criteria: bool = False,
 ) -> RunResult:
@@ -74,7 +97,7 @@ def build_result(
     unjudged = [] if verdicts else [UNJUDGED if no_criteria else f"{UNJUDGED}; {HOW_TO_JUDGE}"]
     metrics = criteria_metrics(state.criteria)
     metrics.update(stack.metrics(frame.view.time))
-    metrics.update(false_tracks.metrics())
+    metrics.update(measures.false_tracks.metrics())
     metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
     return RunResult(
         scenario=settings.scenario,
@@ -85,7 +108,7 @@ def build_result(
         exit_code=exit_code,
         criteria=verdicts,
         metrics=metrics,
-        trace_hash=trace_hash,
+        trace_hash=measures.trace.hexdigest(),
         simulated_s=frame.view.time,
         wall_s=end.wall_s,
         warnings=tuple(dict.fromkeys([*unjudged, *state.warnings, *late_warnings, *map(str, expired_messages(links))])),
@@ -94,7 +117,7 @@ def build_result(
         links=links,
         final_links=tuple(end.final_links),
         settings=settings,
-        final_state=final_state,
+        final_state=measures.final_state.lines(),
     )
 
 

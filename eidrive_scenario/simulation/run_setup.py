@@ -20,11 +20,9 @@ from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
-from eidrive_scenario.simulation.commands import DeclaredCriteria, check_added_criteria, check_commands
-from eidrive_scenario.simulation.driven_entities import drive_entities
-from eidrive_scenario.simulation.planner_option import select_planner
-from eidrive_scenario.simulation.run import RunSettings
+from eidrive_scenario.run_options import RunSettings, option_of
+from eidrive_scenario.simulation.commands import DeclaredCriteria, RunState, check_added_criteria, check_commands
+from eidrive_scenario.simulation.scenario_options import drive_entities, select_planner
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world import World
@@ -59,6 +57,19 @@ class RunSetup(msgspec.Struct, frozen=True):
     progress_warnings: tuple[Diagnostic, ...] = ()
     can_be_judged: bool = True
 
+    def state(self) -> RunState:
+        """Return the state of the run before its first tick."""
+        return RunState(
+            self.scenario,
+            self.roads,
+            self.world,
+            self.stack,
+            weather_fixed=self.weather is not None,
+            declared=self.declared_criteria,
+            criteria=[],
+            warnings=list(self.warnings),
+        )
+
 
 def set_up_run(
     source: Scenario | Source | ConcreteRun,
@@ -74,71 +85,96 @@ def set_up_run(
 
     Raise InputError with the diagnostics of all parts.
     """
-    collector = ErrorCollector()
-    scenario = load_for_run(source, seed, settings.parameters, collector)
-    roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
-    criteria: tuple[CriterionDeclaration, ...] = ()
-    declared: DeclaredCriteria = {}
-    added: tuple[CriterionDeclaration, ...] = ()
-    replaced: tuple[Diagnostic, ...] = ()
-    weather: Weather | None = None
-    with collector:
-        scenario, replaced = drive_entities(scenario, drive_sources(settings.drive))
-        scenario = select_planner(scenario, settings.planner)
-    with collector:
-        declared = check_commands(scenario)
-    with collector:
-        added = check_added_criteria(scenario, criteria_sources(settings.criteria))
-    with collector:
-        storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=seed, controllers=settings.controllers)
-    with collector:
-        driving = build_stack(stack, _stack_context(scenario, roads, seed, settings, load_weights))
-    with collector:
-        criteria = tuple(stop_trigger_declarations(scenario))
-    with collector:
-        if settings.weather is not None:
-            weather = load_weather(settings.weather, origin="--weather")
-    collector.raise_if_any()
-    declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
-    all_criteria = [one.build() for one in declarations]
-    progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
-    warnings = tuple(
-        map(str, [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)])
-    )
-    can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)
-    world = World(roads, dt=settings.dt, entities=storyboard.road_objects, picture_maker=picture_maker)
-    if weather is not None:
-        world.set_weather(weather)
-    return RunSetup(
-        scenario,
-        roads,
-        storyboard,
-        driving,
-        criteria,
-        declared,
-        added,
-        weather,
-        world,
-        warnings,
-        progress,
-        can_be_judged,
-    )
+    return _RunBuilder(source, seed, settings, load_weights, stack).build()
 
 
-def _stack_context(
-    scenario: Scenario, roads: RoadNetwork | None, seed: int, settings: RunSettings, load_weights: bool
-) -> StackContext:
-    return StackContext(
-        scenario,
-        roads,
-        seed,
-        settings.dt,
-        channel=settings.channel,
-        detector=settings.detector,
-        cooperate=settings.cooperate,
-        load_weights=load_weights,
-        allow_torchscript=settings.allow_torchscript,
-    )
+class _RunBuilder:
+    """Builder of the parts of one run; each gets what the settings of the run say about it.
+
+    An error of one part does not hide those of the others.
+    """
+
+    def __init__(
+        self,
+        source: Scenario | Source | ConcreteRun,
+        seed: int,
+        settings: RunSettings,
+        load_weights: bool,
+        stack: StackFactory,
+    ) -> None:
+        self._source, self._seed, self._settings = source, seed, settings
+        self._load_weights, self._stack = load_weights, stack
+        self._errors = ErrorCollector()
+
+    def build(self) -> RunSetup:
+        """Return all parts. Raise InputError with the diagnostics of all."""
+        settings = self._settings
+        scenario, replaced = self._load_scenario()
+        roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+        declared: DeclaredCriteria = {}
+        added: tuple[CriterionDeclaration, ...] = ()
+        criteria: tuple[CriterionDeclaration, ...] = ()
+        weather: Weather | None = None
+        with self._errors:
+            declared = check_commands(scenario)
+        with self._errors:
+            added = check_added_criteria(scenario, settings.criteria_sources)
+        with self._errors:
+            storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=self._seed, controllers=settings.controllers)
+        with self._errors:
+            driving = build_stack(self._stack, self._stack_context(scenario, roads))
+        with self._errors:
+            criteria = tuple(stop_trigger_declarations(scenario))
+        with self._errors:
+            if settings.weather is not None:
+                weather = load_weather(settings.weather, origin=option_of("weather").flag)
+        self._errors.raise_if_any()
+        declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
+        all_criteria = [one.build() for one in declarations]
+        progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
+        warnings = [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)]
+        can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)
+        world = World(roads, dt=settings.dt, entities=storyboard.road_objects, picture_maker=picture_maker)
+        if weather is not None:
+            world.set_weather(weather)
+        return RunSetup(
+            scenario,
+            roads,
+            storyboard,
+            driving,
+            criteria,
+            declared,
+            added,
+            weather,
+            world,
+            tuple(map(str, warnings)),
+            progress,
+            can_be_judged,
+        )
+
+    def _load_scenario(self) -> tuple[Scenario, tuple[Diagnostic, ...]]:
+        """Return the scenario with the parameters, stacks and planner of the settings, and warnings about them."""
+        settings = self._settings
+        scenario = load_for_run(self._source, self._seed, settings.parameters, self._errors)
+        replaced: tuple[Diagnostic, ...] = ()
+        with self._errors:
+            scenario, replaced = drive_entities(scenario, settings.stacks)
+            scenario = select_planner(scenario, settings.planner)
+        return scenario, replaced
+
+    def _stack_context(self, scenario: Scenario, roads: RoadNetwork | None) -> StackContext:
+        settings = self._settings
+        return StackContext(
+            scenario,
+            roads,
+            self._seed,
+            settings.dt,
+            channel=settings.channel,
+            detector=settings.detector,
+            cooperate=settings.cooperate,
+            load_weights=self._load_weights,
+            allow_torchscript=settings.allow_torchscript,
+        )
 
 
 def _warnings(scenario: Scenario, roads: RoadNetwork | None, stack: DrivingStack) -> Iterator[Diagnostic]:

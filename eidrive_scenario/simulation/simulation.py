@@ -11,35 +11,29 @@ from typing import Self
 from msgspec.structs import replace
 
 from eidrive_scenario.driving.stack import StackFactory
-from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
-from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.run_log import FinalState
-from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose
+from eidrive_scenario.run_options import DEFAULT_SEED, RunSettings, as_setting_text, checked_seed
 from eidrive_scenario.simulation.attribution import attributed, report_extension, wall_limit_error
-from eidrive_scenario.simulation.command_execution import RunState, add_criteria, execute
-from eidrive_scenario.simulation.destinations import check_destinations
-from eidrive_scenario.simulation.observers import Observers
-from eidrive_scenario.simulation.run import (
-    DEFAULT_SEED,
-    Observer,
-    RunResult,
-    RunSettings,
-    as_setting_text,
-    checked_seed,
+from eidrive_scenario.simulation.commands import add_criteria, execute
+from eidrive_scenario.simulation.observers import Observer, Observers
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings, resolve_settings
+from eidrive_scenario.simulation.result import RunResult
+from eidrive_scenario.simulation.run_outcome import (
+    RunEnd,
+    RunMeasures,
+    build_result,
+    end_reason,
+    late_warnings,
+    scheduled_end,
 )
-from eidrive_scenario.simulation.run_outcome import RunEnd, build_result, end_reason, late_warnings, scheduled_end
 from eidrive_scenario.simulation.run_setup import set_up_run
-from eidrive_scenario.simulation.settings_resolution import resolve_settings
-from eidrive_scenario.simulation.spawn_checks import check_spawns
-from eidrive_scenario.simulation.spawn_warnings import spawn_warnings
-from eidrive_scenario.simulation.tick_start import TickStart, check_action
+from eidrive_scenario.simulation.start_checks import check_destinations, check_spawns, spawn_warnings
+from eidrive_scenario.simulation.tick import OutsideInputs, Tick, TickStart, check_action
 from eidrive_scenario.storyboard.state.commands import Commands, ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time, raise_if_limit_reached
@@ -82,14 +76,11 @@ class Simulation:
         """Warnings about criteria that demand no progress; they are warnings of the result as well."""
         self.can_be_judged = setup.can_be_judged
         """Whether the run may get a verdict: by a criterion, or by a command that ends it."""
-        self._state = RunState.of(setup)
+        self._state = setup.state()
         self.criteria = self._state.criteria
-        self._trace, self._false_tracks, self._final_state = TraceHash(), FalseTracks(), FinalState()
-        self._motionless = MotionlessStations(self.stack.possible_drivers)
-        self._user_values = dict(self.settings.user_values)
-        self._external_poses: dict[str, ExternalPose] = {}
-        self._actions: dict[str, StationAction] = {}
-        self._begun: tuple[TickStart, Commands] | None = None
+        self._measures = RunMeasures(self.stack)
+        self._outside = OutsideInputs(dict(self.settings.user_values))
+        self._begun: Tick | None = None
         self._links: Sequence[LinkEvent] = ()
         try:
             add_criteria(setup.criteria, self._state)
@@ -152,7 +143,7 @@ class Simulation:
 
         Raise SettingError if the value is not a text, number or truth value.
         """
-        self._user_values[name] = as_setting_text(f"the user-defined value {name!r}", value)
+        self._outside.user_values[name] = as_setting_text(f"the user-defined value {name!r}", value)
 
     def set_pose(self, name: str, pose: Pose, speed: float = 0.0) -> None:
         """Set the pose of an entity in the next view, and its speed [m/s].
@@ -161,7 +152,7 @@ class Simulation:
         Raise SettingError if no controller of the entity has that model.
         """
         self.storyboard.check_accepts_external_poses(name)
-        self._external_poses[name] = ExternalPose(pose, speed)
+        self._outside.poses[name] = ExternalPose(pose, speed)
 
     def set_action(self, name: str, action: StationAction) -> None:
         """Set the decisions of a station for the next tick, or for the second half of a begun one.
@@ -169,7 +160,7 @@ class Simulation:
         Raise SettingError if there is no such station, or if it does not drive and the action does.
         """
         check_action(name, action, self.stack)
-        self._actions[name] = action
+        self._outside.actions[name] = action
 
     @attributed
     def run(self, *, wall_limit: float | None = None) -> RunResult:
@@ -220,22 +211,21 @@ class Simulation:
             perceived = self.stack.perceive(self.world, view, self._state.inputs)
             commands = self._tick_storyboard(view)
             end = self._state.exit or scheduled_end(self.storyboard, view.time, self.settings.time_limit)
-            self._begun = TickStart(view, perceived, end is not None), commands
-        return self._begun[0]
+            self._begun = Tick(view, perceived, end is not None, commands)
+        return self._begun
 
     def _tick_storyboard(self, view: WorldView) -> Commands:
-        commands = self.storyboard.tick(view, user_values=self._user_values, external_poses=self._external_poses)
-        self._external_poses = {}
-        return commands
+        outside = self._outside
+        return self.storyboard.tick(view, user_values=outside.user_values, external_poses=outside.take_poses())
 
     def _tick(self) -> tuple[Frame, str | None]:
         begun, self._begun = self._begun, None
-        view = self.world.view() if begun is None else begun[0].view
+        view = self.world.view() if begun is None else begun.view
         inputs = self._state.inputs
-        if self._actions:
-            inputs, self._actions = replace(inputs, actions=self._actions), {}
+        if actions := self._outside.take_actions():
+            inputs = replace(inputs, actions=actions)
         steps = self.stack.act(self.world, view, inputs)
-        commands = self._tick_storyboard(view) if begun is None else begun[1]
+        commands = self._tick_storyboard(view) if begun is None else begun.commands
         self._environment = commands.environment or self._environment
         frame = Frame(
             view,
@@ -250,7 +240,10 @@ class Simulation:
             self._state.take_executed(),
             self._state.trailers_in(view),
         )
-        self._observe(frame, commands.driven)
+        self._measures.observe(frame, commands.driven)
+        self._observers.observe(frame)
+        for criterion in self.criteria:
+            criterion.observe(frame)
         end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)
         if end is None:
             self._links = self.stack.send(steps, view.time)
@@ -260,37 +253,24 @@ class Simulation:
             self._ended = RunEnd.of(self._state, frame, end, time.perf_counter() - self._started)
         return frame, end
 
-    def _observe(self, frame: Frame, driven: Collection[str]) -> None:
-        if self._motionless.watching:
-            self._motionless.observe(frame.view, driven)
-        self._trace.observe(frame)
-        self._final_state.observe(frame)
-        if limits := self.stack.min_existence:
-            self._false_tracks.observe(frame, limits)
-        self._observers.observe(frame)
-        for criterion in self.criteria:
-            criterion.observe(frame)
-
     @attributed
     def result(self) -> RunResult:
         """Return the result of a run that has ended. Raise SimulationError before the end."""
         if self._ended is None:
             raise SimulationError("the run has not ended; call tick until it gives a reason for the end, or run")
-        values = self._user_values, self.settings.user_values
+        values = self._outside.user_values, self.settings.user_values
         return build_result(
             self._state,
             self._ended,
             settings=self.resolved,
-            trace_hash=self._trace.hexdigest(),
-            false_tracks=self._false_tracks,
-            final_state=self._final_state.lines(),
-            late_warnings=late_warnings(self.scenario, self.storyboard, self._motionless, values, self._ended),
+            measures=self._measures,
+            late_warnings=late_warnings(self.scenario, self.storyboard, self._measures.motionless, values, self._ended),
             no_criteria=self.settings.no_criteria,
         )
 
     def describe_state(self) -> tuple[str, ...]:
         """Return the state of the storyboard and the decisions of the stations in the last tick, as lines of text."""
-        return self._final_state.lines()
+        return self._measures.final_state.lines()
 
     def attribute(self, error: BaseException) -> None:
         """Raise ExtensionError from an error that an extension of this run raised; return otherwise."""

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.lazy_exports import lazy_exports
+from eidrive_scenario.imports import lazy_exports
 
 if TYPE_CHECKING:
     from eidrive_scenario.traffic.fleet import Fleet

@@ -13,7 +13,7 @@ from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, run_file
-from eidrive_scenario.simulation.tick_start import TickStart
+from eidrive_scenario.simulation.tick import TickStart
 from eidrive_scenario.world.actor import Control
 
 ONE = "coop/scenario_1"

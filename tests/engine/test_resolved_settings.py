@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
+from eidrive_scenario.content_digest import canonical_json
 from eidrive_scenario.library import library_path
-from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 ONE = library_path() / "coop" / "scenario_1.xosc"
 PASSING_BY = Path(__file__).parents[1] / "data" / "passing_by.xosc"

@@ -7,11 +7,10 @@ from html.parser import HTMLParser
 
 import pytest
 
+from eidrive_scenario.errors import FAILED
 from eidrive_scenario.evaluation import Verdict
-from eidrive_scenario.exit_codes import FAILED
-from eidrive_scenario.resolved_settings import ResolvedSettings
-from eidrive_scenario.simulation.result_views import typed
-from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation.result import RunResult, typed
 
 PROFILE = {"model": "composed", "delay": {"kind": "trace", "seconds": [0.1, 0.2]}, "own_perception": False}
 RESULT = RunResult(

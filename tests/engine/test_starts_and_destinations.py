@@ -146,7 +146,7 @@ def test_number_of_overlaps_that_are_compared_is_linear(monkeypatch: pytest.Monk
         pairs.append(1)
         return overlap(a, b)
 
-    monkeypatch.setattr("eidrive_scenario.simulation.spawn_checks.overlap", counted)
+    monkeypatch.setattr("eidrive_scenario.simulation.start_checks.overlap", counted)
     monkeypatch.setattr("eidrive_scenario.world.physics.contacts.overlap", counted)
     names = [f"Car{number}" for number in range(300)]
     source = scenario_xml(

@@ -15,7 +15,7 @@ from eidrive_scenario import wall_limit
 from eidrive_scenario.errors import WallLimitError
 from eidrive_scenario.recording import Frame
 from eidrive_scenario.simulation import Simulation
-from eidrive_scenario.simulation.hung_runs import describe_dump, describe_hung_run
+from eidrive_scenario.simulation.attribution import describe_dump, describe_hung_run
 from eidrive_scenario.wall_limit import LastResort, Limit, limit_wall_time, set_last_resort
 
 pytestmark = pytest.mark.timeout(600)
@@ -89,7 +89,7 @@ def test_report_of_a_run_that_cannot_be_described_names_the_limit(monkeypatch: p
     def fail(*arguments: object) -> None:
         raise RuntimeError("changed during iteration")
 
-    monkeypatch.setattr("eidrive_scenario.simulation.hung_runs.wall_limit_error", fail)
+    monkeypatch.setattr("eidrive_scenario.simulation.attribution.wall_limit_error", fail)
     assert "after 5 s of wall time" in str(describe_hung_run(Limit(5.0), sys._getframe()))
 
 

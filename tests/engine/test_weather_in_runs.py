@@ -12,7 +12,7 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.simulation.command_execution import execute
+from eidrive_scenario.simulation.commands import execute
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.weather import load_weather

@@ -20,8 +20,8 @@ from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.model import ParameterType
 from eidrive_scenario.randomness import integer_key
-from eidrive_scenario.simulation import RunSettings
-from eidrive_scenario.v2x.profile import NO_COOPERATION, load_profile
+from eidrive_scenario.run_options import OPTIONS, RunSettings
+from eidrive_scenario.v2x.profile import load_profile
 
 Scalar = str | int | float
 Point = Mapping[str, Scalar]
@@ -32,7 +32,7 @@ MOST_VALUES = 100_000
 PARAMETER = "param."
 """Optional prefix of parameters, for those that have the name of a setting."""
 CHANNEL = "channel"
-SETTINGS = (CHANNEL, "detector", "planner", "weather", "cooperate", "dt", "time_limit")
+SETTINGS = {option.name: option for option in OPTIONS if option.form.has_axis}
 """Settings of a run that may vary; all other names are parameters of the scenario."""
 _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
@@ -187,12 +187,8 @@ def settings_at(point: Point, base: RunSettings, profile: Mapping[str, Any] | No
     for name, value in point.items():
         if name.startswith(f"{CHANNEL}."):
             changes[name.removeprefix(f"{CHANNEL}.")] = value
-        elif name == "cooperate":
-            fields[name] = () if value == NO_COOPERATION else tuple(str(value).split("+"))
-        elif name in ("dt", "time_limit"):
-            fields[name] = _seconds(name, value)
         elif name in SETTINGS:
-            fields[name] = str(value)
+            fields[name] = SETTINGS[name].form.from_axis(name, value)
         else:
             parameters[name.removeprefix(PARAMETER)] = text_of_value(value)
     if changes:
@@ -235,12 +231,6 @@ def changed_profile(profile: Mapping[str, Any], changes: Mapping[str, Scalar]) -
 def text_of_value(value: Scalar) -> str:
     """Return a value as the text of a parameter; integers and exact decimals as they were given."""
     return value if isinstance(value, str) else repr(value)
-
-
-def _seconds(name: str, value: Scalar) -> float:
-    if isinstance(value, str):
-        raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a number of seconds"))
-    return float(value)
 
 
 def _error(text: str, hint: str) -> SettingError:

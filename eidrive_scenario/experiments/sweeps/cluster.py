@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
-from eidrive_scenario.optional_imports import optional_import
+from eidrive_scenario.imports import optional_import
 from eidrive_scenario.project import VARIABLE
 from eidrive_scenario.registry import use_project
 

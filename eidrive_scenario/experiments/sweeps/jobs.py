@@ -10,6 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from eidrive_scenario.content_digest import canonical_json, package_versions, sha256_of
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, SettingError, suggestion
 from eidrive_scenario.experiments.sweeps.axes import (
     CHANNEL,
@@ -24,8 +25,8 @@ from eidrive_scenario.experiments.sweeps.axes import (
 )
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
-from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json, package_versions, sha256_of
 from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 from eidrive_scenario.v2x.profile import load_profile
 
 RUN = "run"

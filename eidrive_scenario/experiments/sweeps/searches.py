@@ -19,7 +19,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, Point, Scalar
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
-from eidrive_scenario.optional_imports import optional_import
+from eidrive_scenario.imports import optional_import
 
 PLACES = 241
 """Number of tested boundaries, over the range and half of its length on either side."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.hang_reports import HungRunError
+from eidrive_scenario.experiments.hung_runs import HungRunError, describe_report
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import (
     EXCLUDED,
@@ -153,7 +153,7 @@ def run_sweep(
         if error is None:
             writer.add(future.result())
         elif isinstance(error, HungRunError):
-            writer.add(hung(job, error.describe(wall_limit), wall_limit))
+            writer.add(hung(job, describe_report(str(error), wall_limit), wall_limit))
         elif not workers.is_crash(error):
             raise error
         elif tries < TRIES:

@@ -19,12 +19,12 @@ from multiprocessing.context import BaseContext
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from eidrive_scenario import exit_codes
+from eidrive_scenario import errors
 from eidrive_scenario.errors import ConstraintError, InputError, OutputError, WallLimitError
 from eidrive_scenario.experiments.commands import command_of_source
+from eidrive_scenario.experiments.hung_runs import hang_of, report_hung_runs
 from eidrive_scenario.experiments.repetitions import end_with_parent
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.experiments.sweeps.hang_reports import hang_of, report_hung_runs
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
 from eidrive_scenario.experiments.sweeps.store import (
     ABORTED,
@@ -40,7 +40,7 @@ from eidrive_scenario.experiments.sweeps.store import (
 from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import ConcreteRun
 from eidrive_scenario.perception.learned import image_memory
-from eidrive_scenario.simulation.result_views import typed
+from eidrive_scenario.simulation.result import typed
 from eidrive_scenario.wall_limit import running_line
 
 _is_worker = False
@@ -85,7 +85,7 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             record=False if files is None else files.record,
             wall_limit=wall_limit,
         )
-        unjudged = result.exit_code == exit_codes.NOT_JUDGED
+        unjudged = result.exit_code == errors.NOT_JUDGED
         return StoredRun(
             key=job.key,
             number=job.number,

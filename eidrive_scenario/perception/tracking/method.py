@@ -10,10 +10,9 @@ from pydantic import Field, PositiveInt, model_validator
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.extension_settings import validate_by_kind
 from eidrive_scenario.perception.tracking.association import BIRTH_DENSITY, DETECTION_PROBABILITY, LIFETIME
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
-from eidrive_scenario.settings import Settings, validate_nested
+from eidrive_scenario.settings import Settings, validate_by_kind, validate_nested
 
 NO_TRACKER = "none"
 """Kind that passes detections on unchanged."""

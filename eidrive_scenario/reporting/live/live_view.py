@@ -33,7 +33,7 @@ from eidrive_scenario.reporting.replay.frame_data import (
 from eidrive_scenario.reporting.replay.page import TEMPLATE, decisive_instant, page_values, station_settings
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
-from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.simulation.result import RunResult
 
 if TYPE_CHECKING:
     from eidrive_scenario.simulation.simulation import Simulation

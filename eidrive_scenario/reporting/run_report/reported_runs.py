@@ -15,7 +15,7 @@ from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.results import runs_with_stores
 from eidrive_scenario.experiments.sweeps.store import FAILED, FOLDER, PASSED, StoredRun
 from eidrive_scenario.recording.run_files import RESULT, read_result
-from eidrive_scenario.simulation.result_views import typed
+from eidrive_scenario.simulation.result import typed
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 if TYPE_CHECKING:

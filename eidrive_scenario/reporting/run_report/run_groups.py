@@ -9,12 +9,15 @@ from typing import Any, NamedTuple
 from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, flow_text, shorten
+from eidrive_scenario.run_options import OPTIONS
 
-_LEFT_OUT = ("seed", "run", "drawn", "varied", "scenario", "channel", "detector", "planner", "cooperate")
+_LEFT_OUT = {"seed", "run", "drawn", "varied", "scenario"} | {
+    option.name for option in OPTIONS if option.detail in ("channel_profile", "stations")
+}
 """Settings that differ within a group, and options that the settings of channel and stations contain."""
 _NAMES = ("channel_profile.name", "channel_profile.description")
-_OPTIONS = ("detector", "planner", "weather", "cooperate")
-"""Options of a run that change many settings of its stations."""
+_OPTIONS = [option.name for option in OPTIONS if option.detail and option.name != "channel"]
+"""Options of a run that change many of its settings; the channel is in each heading."""
 _SHOWN = 200
 """Maximum number of characters of a value in a heading."""
 

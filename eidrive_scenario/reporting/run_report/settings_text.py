@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from eidrive_scenario.run_options import OPTIONS, RunOption
+
 _MAX_DEPTH = 12
 _FRACTION = re.compile(r"[+-]?(0|[1-9]\d*)?\.\d+([eE][+-]?\d+)?", re.ASCII)
 _MAX_LENGTH = 2000
@@ -13,6 +15,8 @@ _MAX_LENGTH = 2000
 _MOST_VALUES = 8
 """Maximum number of displayed values of a setting that varies; of more numbers, the range is shown."""
 _ABSENT = "absent"
+_SHOWN_APART = {"channel", "parameters"} | {option.name for option in OPTIONS if option.detail == "stations"}
+"""Options of which a page lists more than their value: the content of the channel, stations, parameters."""
 
 
 def flow_text(value: Any, depth: int = 0) -> str:
@@ -89,23 +93,25 @@ def run_facts(settings: Mapping[str, Any]) -> dict[str, str]:
                 facts[f"detector settings of {name}"] = shorten(flow_text(station["detector_settings"]))
             senders = station.get("cooperates_with")
             facts[f"{name} receives from"] = "all" if senders is None else ", ".join(map(str, senders)) or "none"
-    if "weather" in settings:
-        facts["weather"] = flow_text(settings["weather"] or "of the scenario")
-    for key in ("dt", "time_limit"):
-        if settings.get(key) is not None:
-            facts[key.replace("_", " ")] = f"{flow_text(settings[key])} s"
-    for key in ("controllers", "user_values"):
-        for name, value in _entries(settings.get(key)):
-            facts[f"{key.removesuffix('s').replace('_', ' ')} {name}"] = shorten(flow_text(value))
-    for key in ("drive", "criteria"):
-        if settings.get(key):
-            facts[key] = shorten(flow_text(settings[key]))
+    for option in OPTIONS:
+        if option.in_result and option.name not in _SHOWN_APART and option.name in settings:
+            facts |= _option_facts(option, settings[option.name])
     for name, value in _entries(settings.get("parameters")):
         facts[f"${name}"] = shorten(short_number(str(value)))
     for key in ("versions", "extensions"):
         for name, value in _entries(settings.get(key)):
             facts[str(name)] = shorten(flow_text(value))
     return facts
+
+
+def _option_facts(option: RunOption, value: Any) -> dict[str, str]:
+    """Return the facts about an option: one for each name of a mapping; none for an option without a value."""
+    title = option.name.replace("_", " ")
+    if isinstance(value, Mapping):
+        return {f"{title.removesuffix('s')} {name}": shorten(flow_text(item)) for name, item in value.items()}
+    if value in (None, "", [], ()):
+        return {title: option.unset} if option.unset else {}
+    return {title: shorten(f"{flow_text(value)} {option.form.unit}".rstrip())}
 
 
 def _entries(value: Any) -> Iterator[tuple[str, Any]]:

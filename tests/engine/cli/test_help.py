@@ -12,7 +12,7 @@ from command_fixtures import Eidrive
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
-from eidrive_scenario.cli.short_help import RARE
+from eidrive_scenario.cli.options import RARE
 
 GROUP: Any = typer.main.get_command(app)
 NAMES = sorted(GROUP.commands)

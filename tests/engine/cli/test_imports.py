@@ -21,7 +21,7 @@ UNUSED = (
     "eidrive_scenario.rendering.renderer", "eidrive_scenario.rendering.scene",
 )  # fmt: skip
 """Modules for other runs: of distributions, with recording, background traffic or cameras."""
-OTHER_COMMANDS = tuple(f"eidrive_scenario.cli.{name}" for name in ("check", "compare", "init", "reproduce", "sweep"))
+OTHER_COMMANDS = tuple(f"eidrive_scenario.cli.{name}" for name in ("check", "init", "results", "sweep"))
 
 PROGRAM = """
 import sys

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from command_fixtures import Eidrive
 
-from eidrive_scenario.cli.output_paths import check_output_paths
+from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.errors import SettingError
 
 

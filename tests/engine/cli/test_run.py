@@ -13,8 +13,8 @@ from command_fixtures import Eidrive
 from openscenario_xml import agent_xml, object_xml, parameters_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, teleport_xml, world_position_xml
 
+from eidrive_scenario.cli.console import show
 from eidrive_scenario.cli.run import run
-from eidrive_scenario.cli.verdicts import show
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, load_for_seed
 

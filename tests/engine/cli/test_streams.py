@@ -15,8 +15,8 @@ from rich.text import Text
 from sweep_runs import RUN, opened
 
 from eidrive_scenario import cli
-from eidrive_scenario.cli.streams import echo
-from eidrive_scenario.cli.verdicts import console
+from eidrive_scenario.cli.console import console
+from eidrive_scenario.cli.output import echo
 from eidrive_scenario.files.encodable import printable
 
 FULL = Path("/dev/full")
@@ -75,7 +75,7 @@ def test_json_with_escaped_control_characters_has_the_same_values() -> None:
 def test_commands_print_by_functions_that_escape_control_characters() -> None:
     sources = {path.name: path.read_text(encoding="utf-8") for path in Path(cli.__file__).parent.glob("*.py")}
     direct = {name for name, text in sources.items() if re.search(r"typer\.s?echo\(|\bprint\((?<!\.print\()", text)}
-    assert direct == {"streams.py", "short_help.py"}
+    assert direct == {"output.py", "options.py"}
 
 
 def test_control_characters_of_a_store_are_escaped(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from eidrive_scenario.api.run import NOT_JUDGED, PASSED, RunSettings, judge_reco
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.statistics.sequential import success_rate
 from eidrive_scenario.experiments.success_rate import decide_rate
-from eidrive_scenario.gym.rewards import Rewards, RewardSettings
+from eidrive_scenario.gym.station_interface import Rewards, RewardSettings
 from eidrive_scenario.reporting.report_files import report_files
 
 WORDS = "the run is not judged: it has no criterion"

@@ -23,8 +23,8 @@ from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.files.atomic import FileLock
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording import TraceHash, read_recording
-from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation import RunResult, RunSettings
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 SHORT: dict[str, Any] = {"time_limit": 0.3}

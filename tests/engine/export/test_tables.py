@@ -12,7 +12,7 @@ import pyarrow.parquet as parquet
 import pytest
 from written_recording import Body, detected, step, view, write_run
 
-from eidrive_scenario.cli.export import TableName
+from eidrive_scenario.cli.recordings import TableName
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run

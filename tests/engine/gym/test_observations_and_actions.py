@@ -16,10 +16,16 @@ from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings
-from eidrive_scenario.gym.object_table import COLUMNS, few_object_rows, nearest_rows, object_rows, object_values
-from eidrive_scenario.gym.observation_settings import RouteSettings
-from eidrive_scenario.gym.observations import points_ahead
-from eidrive_scenario.gym.occupancy_grid import occupancy_grid
+from eidrive_scenario.gym.observations import (
+    COLUMNS,
+    few_object_rows,
+    nearest_rows,
+    object_rows,
+    object_values,
+    occupancy_grid,
+    points_ahead,
+)
+from eidrive_scenario.gym.settings import RouteSettings
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
 

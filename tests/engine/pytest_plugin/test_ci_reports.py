@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from eidrive_scenario.pytest_plugin.github import annotation, summary
+from eidrive_scenario.pytest_plugin.reports import annotation, summary
 
 pytest_plugins = ["pytester"]
 

@@ -13,8 +13,7 @@ from faulty_extensions import write_scenario
 
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.pytest_plugin.criterion_lines import line_of_criterion
-from eidrive_scenario.pytest_plugin.failure_text import explain, failure_text
+from eidrive_scenario.pytest_plugin.failures import explain, failure_text, line_of_criterion
 from eidrive_scenario.simulation import RunSettings
 
 pytest_plugins = ["pytester"]

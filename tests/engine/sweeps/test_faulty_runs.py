@@ -14,7 +14,7 @@ import pytest
 from command_fixtures import Eidrive, eidrive
 from sweep_workers import InProcess
 
-from eidrive_scenario.cli.interruption import interrupt_once
+from eidrive_scenario.cli.supervision import interrupt_once
 from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun

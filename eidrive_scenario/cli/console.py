@@ -1,0 +1,177 @@
+"""Output with colors and tables: verdicts of runs and recordings, and the tree of a storyboard."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook, RenderResult
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from eidrive_scenario.cli.output import print_warnings
+from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED
+from eidrive_scenario.evaluation import Verdict
+from eidrive_scenario.experiments.commands import reproduction_lines
+from eidrive_scenario.files.encodable import printable
+from eidrive_scenario.recording.text.run_log import describe_kind
+from eidrive_scenario.simulation import RunResult
+from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.storyboard.tree.elements import ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
+
+if TYPE_CHECKING:
+    from eidrive_scenario.experiments.judgement import Judgement
+
+
+_OUTCOMES = {
+    PASSED: ("passed", "bold green"),
+    FAILED: ("failed", "bold red"),
+    ABORTED: ("time limit", "bold red"),
+    NOT_JUDGED: ("not judged", "bold yellow"),
+}
+
+
+class _Output(Console):
+    """Console whose texts are neither markup nor control sequences, as names of files may contain both."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(highlight=False, markup=False, emoji=False, **options)
+        self.push_render_hook(_EscapeControls())
+
+    def on_broken_pipe(self) -> None:
+        """Raise BrokenPipeError for the command line: rich would end with the exit code of a failed criterion."""
+        raise BrokenPipeError
+
+
+class _EscapeControls(RenderHook):
+    """Escape control characters in all output except those that rich adds for styles and positions."""
+
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        """Return the same output with escapes."""
+        return [_Escaped(renderable) for renderable in renderables]
+
+
+class _Escaped:
+    def __init__(self, renderable: ConsoleRenderable) -> None:
+        self._renderable = renderable
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for segment in console.render(self._renderable, options):
+            yield segment if segment.control else segment._replace(text=printable(segment.text))
+
+
+def console(*, stderr: bool = False) -> Console:
+    """Return a console of the terminal width; for a file, wide enough for a reason on one line."""
+    plain = _Output(stderr=stderr)
+    if plain.is_terminal or "COLUMNS" in os.environ:
+        return plain
+    return _Output(stderr=stderr, width=180)
+
+
+def show(result: RunResult, varied: str = "") -> None:
+    """Print verdicts, end reason, trace hash and speed; for a run of a distribution, with its varied parameters."""
+    out = console()
+    word, style = _OUTCOMES[result.exit_code]
+    run = "" if result.run is None else f"  run {result.run} ({varied})"
+    title = Text.assemble(
+        (result.scenario, "bold"), f"{run}  seed {result.seed}  channel {result.channel}  ", (word, style)
+    )
+    out.print(title)
+    _print_table(out, result.criteria)
+    pace = result.simulated_s / result.wall_s if result.wall_s > 0 else 0.0
+    speed = f", {pace:.{0 if pace >= 10 else 1 if pace >= 1 else 2}f} times real time" if pace else ""
+    out.print(Text(f"end: {result.end_reason} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
+    out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
+    for line in reproduction_lines(result):
+        out.print(Text(line), soft_wrap=True)
+    print_warnings(result.warnings)
+
+
+def show_judgement(judgement: Judgement) -> None:
+    """Print the verdicts on a recording, and its warnings."""
+    out = console()
+    word, style = _OUTCOMES[judgement.exit_code]
+    if judgement.exit_code == ABORTED and judgement.end_reason != TIME_LIMIT:
+        word = "incomplete or damaged"
+    out.print(Text.assemble((judgement.scenario, "bold"), f"  seed {judgement.seed}  recorded  ", (word, style)))
+    _print_table(out, judgement.criteria)
+    out.print(Text(f"end: {judgement.end_reason} at {judgement.simulated_s:.2f} s"))
+    print_warnings(judgement.warnings)
+
+
+def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
+    if not criteria:
+        out.print("no criterion: nothing was evaluated", style="yellow")
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("criterion", "", "value", "limit", "reason"):
+        table.add_column(
+            heading, justify="right" if heading in ("value", "limit") else "left", no_wrap=heading != "reason"
+        )
+    for verdict in criteria:
+        table.add_row(*_row(verdict))
+    out.print(table)
+
+
+def _row(verdict: Verdict) -> tuple[Text, ...]:
+    mark = Text("passed", style="green") if verdict.passed else Text("failed", style="red")
+    return (
+        Text(verdict.name),
+        mark,
+        Text(_quantity(verdict.value, verdict.unit)),
+        Text(_quantity(verdict.limit, verdict.unit)),
+        Text(verdict.reason),
+    )
+
+
+def _quantity(value: float | None, unit: str) -> str:
+    return "" if value is None else f"{value:.3f} {unit}" if unit else f"{value:g}"
+
+
+def storyboard_tree(storyboard: Storyboard) -> Tree:
+    """Return the storyboard as a tree, with the actions of Init first."""
+    root = Tree(Text(storyboard.scenario.name, style="bold"), guide_style="dim")
+    init = root.add(_heading("init", "", ""))
+    for behavior in storyboard.init.children:
+        init.add(_action(behavior))
+    _add(root, storyboard.root)
+    return root
+
+
+def _add(branch: Tree, element: StoryElement) -> None:
+    name = "" if element.kind == "storyboard" else element.name
+    node = branch.add(_heading(describe_kind(element.kind), name, _remarks(element)))
+    for verb, leaf in (("starts", element.start_leaf), ("stops", element.stop_leaf)):
+        if leaf is not None:
+            node.add(Text.assemble((f"{verb} when ", "cyan"), leaf.trigger.describe() or "criteria end the run"))
+    if isinstance(element, ActionElement):
+        for behavior in element.children:
+            node.add(_action(behavior))
+    for child in element.elements:
+        _add(node, child)
+
+
+def _remarks(element: StoryElement) -> str:
+    remarks = []
+    if isinstance(element, EventElement):
+        remarks.append(element.priority)
+    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
+        remarks.append(f"up to {element.limit} times")
+    return ", ".join(remarks)
+
+
+def _heading(kind: str, name: str, remarks: str) -> Text:
+    parts = [(kind, "green"), (f" {name}" if name else "", "bold"), (f" ({remarks})" if remarks else "", "dim")]
+    return Text.assemble(*parts)
+
+
+def _action(behavior: object) -> Text:
+    if not isinstance(behavior, ActionBehaviour):
+        return Text(str(behavior))
+    actor = f"{behavior.actor_name}: " if behavior.actor_name else ""
+    return Text(f"{actor}{behavior.describe()}")

@@ -1,0 +1,174 @@
+"""Options of commands: those of a run, help that fits on a screen, and checks of values and output paths."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterable, Mapping
+from enum import StrEnum
+from functools import partial, wraps
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.run_options import RunOption, RunSettings, options_of
+
+RARE = "Further options"
+"""Panel of the options that only `--help-all` describes."""
+rare = partial(typer.Option, rich_help_panel=RARE)
+"""Define an option of this panel, as `typer.Option` does."""
+_DESCRIBED = "eidrive_scenario.cli.options"
+"""Key of the context under which `--help-all` is stored."""
+
+
+class ShortHelp(TyperCommand):
+    """Command whose help names the options of panel `RARE` in its last lines, and describes them with `--help-all`."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        hidden = [option for option in self.params if getattr(option, "rich_help_panel", None) == RARE]
+        described = bool(ctx.meta.get(_DESCRIBED))
+        for option in hidden:
+            option.hidden = not described  # type: ignore[attr-defined]
+        names = " ".join(option.opts[0] for option in hidden)
+        self.epilog = None if described else f"{RARE} (see --help-all): {names}"
+        super().format_help(ctx, formatter)
+
+
+def _describe_all(ctx: typer.Context, requested: bool) -> None:
+    if requested:
+        ctx.meta[_DESCRIBED] = True
+        typer.echo(ctx.get_help())
+        raise typer.Exit
+
+
+HelpAll = Annotated[
+    bool, typer.Option("--help-all", callback=_describe_all, is_eager=True, help="Show all options and exit.")
+]
+"""Option of commands of the class `ShortHelp`."""
+
+
+def takes_run_options(
+    command: str, *, at: str, before: Mapping[str, str]
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Let a command take the options of a run that the table `eidrive_scenario.run_options` gives it.
+
+    command  name of the command in the table
+    at       parameter of the command before which the options are in its help
+    before   other places of single options: the name of the parameter or option before which each is
+
+    The decorated function gets their values as its parameter `settings`, RunSettings.
+    """
+    options = options_of(command)
+
+    def decorate(function: Callable[..., None]) -> Callable[..., None]:
+        own = dict(inspect.signature(function, eval_str=True).parameters)
+        del own["settings"]
+        parameters: dict[str, inspect.Parameter] = {}
+
+        def place(name: str) -> None:
+            for option in options:
+                if before.get(option.name, at) == name:
+                    place(option.name)
+                    parameters[option.name] = _parameter(option)
+
+        for name, parameter in own.items():
+            place(name)
+            parameters[name] = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+
+        @wraps(function)
+        def call(**given: Any) -> None:
+            values = {option.name: option.form.parse(option.flag, given.pop(option.name)) for option in options}
+            function(settings=RunSettings(**values), **given)
+
+        call.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
+        call.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
+        return call
+
+    return decorate
+
+
+def _parameter(option: RunOption) -> inspect.Parameter:
+    """Return the parameter of a command for an option of a run."""
+    described = typer.Option(
+        option.flag,
+        metavar=option.metavar or option.form.metavar,
+        help=option.help,
+        envvar=option.envvar,
+        rich_help_panel=RARE if option.rare else None,
+    )
+    annotated: Any = Annotated
+    default = None if option.form.is_repeated else option.default
+    return inspect.Parameter(
+        option.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=default,
+        annotation=annotated[option.form.parameter, described],
+    )
+
+
+class Keep(StrEnum):
+    """Values of --record."""
+
+    always = "always"
+    on_failure = "on-failure"
+    never = "never"
+
+
+Record = Annotated[Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")]
+
+
+def check_record(record: Keep | None, out: Path | None) -> None:
+    """Raise SettingError for `--record` without `--out`."""
+    if record is not None and out is None:
+        raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))
+
+
+MOST_SEEDS = 1_000_000
+"""Maximum number of seeds of an option."""
+
+
+def parse_seeds(option: str, text: str) -> list[int]:
+    """Return the seeds of a text such as `1-10`, `3` or `1,2,5-8`. Raise SettingError for another text."""
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
+            raise SettingError(Diagnostic(f"{option}: no seeds (got {quoted(text)}; expected 1-10 or 1,2,5)"))
+        if dash and int(last) - int(first) >= MOST_SEEDS:
+            raise SettingError(Diagnostic(f"{option}: more than {MOST_SEEDS} seeds (got {quoted(text)})"))
+        found += range(int(first), int(last or first) + 1)
+    return found
+
+
+def parse_shard(text: str) -> tuple[int, int]:
+    """Return number and count of `2/8`. Raise SettingError unless the number is within 1 … count."""
+    number, slash, count = text.partition("/")
+    if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        raise SettingError(
+            Diagnostic(f"--shard: no part of a whole (got {quoted(text)}; expected I/N, from 1/N to N/N)")
+        )
+    return int(number), int(count)
+
+
+def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
+    """Raise SettingError if an output path is an input file, or if two options name the same file.
+
+    written  output paths by option; None for an omitted option
+    read     input files; other values of options, such as the name of a profile, are ignored
+    """
+    inputs = {os.path.realpath(path) for path in read if path is not None and os.path.isfile(path)}
+    taken: dict[str, str] = {}
+    for option, path in written.items():
+        if path is None or (os.path.exists(path) and not os.path.isfile(path)):
+            continue
+        real = os.path.realpath(path)
+        if real in inputs:
+            raise SettingError(Diagnostic(f"{option} would overwrite an input file", "choose another path", str(path)))
+        if real in taken:
+            message = f"{taken[real]} and {option} name the same file"
+            raise SettingError(Diagnostic(message, "give two different files", str(path)))
+        taken[real] = option

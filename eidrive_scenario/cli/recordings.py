@@ -1,0 +1,106 @@
+"""Commands on recordings: `judge` and `export`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from eidrive_scenario.cli.output import echo, print_warnings
+
+
+def judge(
+    recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
+    criterion: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="YAML|FILE",
+            help="Criteria instead of those of the run, such as '{collision: {of: Ego}}'; repeatable.",
+        ),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object only.")] = False,
+) -> None:
+    """Judge a recorded run again, with its own criteria or with other ones.
+
+    Example: eidrive judge reports/scenario_1 --criterion '{max_speed: {of: Ego, at_most: 10}}'
+
+    Exit codes as for eidrive run; 3 also for an incomplete or damaged recording.
+    """
+    from eidrive_scenario.cli.output import echo, has_all_characters
+    from eidrive_scenario.experiments.judgement import judge_recording
+    from eidrive_scenario.experiments.single_run import as_json_text
+
+    judgement = judge_recording(recording, criterion or None)
+    if json:
+        echo(as_json_text(judgement, ascii_only=not has_all_characters()))
+        print_warnings(judgement.warnings)
+    else:
+        from eidrive_scenario.cli.console import show_judgement
+
+        show_judgement(judgement)
+    raise typer.Exit(judgement.exit_code)
+
+
+class TableName(StrEnum):
+    """Tables of a run for CSV and Parquet files."""
+
+    actors = "actors"
+    objects = "objects"
+    plans = "plans"
+    messages = "messages"
+    transitions = "transitions"
+    verdicts = "verdicts"
+
+
+def export(
+    recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
+    osi: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="ASAM OSI trace: *.mcap (multi-channel) or *.osi (ground truth)."),
+    ] = None,
+    foxglove: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="MCAP file for Foxglove or Lichtblick: 3D scene, cameras, log, plots."),
+    ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The recording with the topics of --osi and --foxglove."),
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as CSV.")] = None,
+    parquet: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as Parquet.")] = None,
+    table: Annotated[TableName, typer.Option(help="Table of --csv and --parquet.")] = TableName.actors,
+) -> None:
+    """Write a recorded run as files of other tools.
+
+    Example: eidrive export reports/scenario_1 --mcap run.mcap --csv motion.csv
+    """
+    from functools import partial
+
+    from eidrive_scenario.cli.options import check_output_paths
+    from eidrive_scenario.errors import Diagnostic, SettingError
+    from eidrive_scenario.export.foxglove.writer import write_foxglove
+    from eidrive_scenario.export.osi.trace import write_osi
+    from eidrive_scenario.export.recorded_run import open_run
+    from eidrive_scenario.export.tables import write_csv, write_parquet
+    from eidrive_scenario.export.tool_topics import write_with_topics
+
+    writers: dict[str, tuple[Path | None, Callable[..., None]]] = {
+        "--osi": (osi, write_osi),
+        "--foxglove": (foxglove, write_foxglove),
+        "--mcap": (mcap, write_with_topics),
+        "--csv": (csv, partial(write_csv, table=table.value)),
+        "--parquet": (parquet, partial(write_parquet, table=table.value)),
+    }
+    given = {option: (path, write) for option, (path, write) in writers.items() if path is not None}
+    if not given:
+        raise SettingError(Diagnostic("no output is given", f"give one or several of {', '.join(writers)}"))
+    run = open_run(recording)
+    check_output_paths({option: path for option, (path, _) in given.items()}, [run.recording.path])
+    for path, write in given.values():
+        write(run, path)
+        echo(str(path))
+    for warning in dict.fromkeys(run.warnings):
+        echo(f"warning: {warning}", color="yellow", err=True)

@@ -1,0 +1,257 @@
+"""Records of the runs of a test, and the texts about those that failed: reasons, commands, places."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from eidrive_scenario.errors import ABORTED, NOT_JUDGED, EidriveError, ExtensionError, InputError
+from eidrive_scenario.files.bounded import MIB, read_regular_file
+from eidrive_scenario.files.encodable import encodable, printable
+
+if TYPE_CHECKING:
+    from eidrive_scenario.evaluation import Verdict
+    from eidrive_scenario.experiments.success_rate import RateVerdict
+    from eidrive_scenario.simulation import RunResult
+
+
+_SECTION = "eidrive"
+"""Title of the sections of test reports with failed runs."""
+_COMMAND = "reproduce: "
+_RECORDING = "recording: "
+WARNING = "warning"
+"""Name of the properties with the warnings of a run."""
+_records = pytest.StashKey["RunRecord"]()
+
+
+@dataclass
+class RunRecord:
+    """Facts about the runs of a test, most of them about those that did not pass.
+
+    properties   entries of `user_properties` that the plugin has added
+    reasons      one line for each reason
+    commands     command lines that reproduce the runs
+    attachments  recordings and results
+    folders      folders of the files of all runs
+    file, line   place of the first reason; line 0 if it is unknown
+    """
+
+    properties: list[tuple[str, object]] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    commands: list[str] = field(default_factory=list)
+    attachments: list[str] = field(default_factory=list)
+    folders: list[str] = field(default_factory=list)
+    file: str = ""
+    line: int = 0
+
+    def as_report(self) -> dict[str, Any]:
+        """Return the facts in types that pytest-xdist sends to its controller."""
+        return {
+            "reasons": self.reasons,
+            "commands": self.commands,
+            "attachments": self.attachments,
+            "folders": self.folders,
+            "file": self.file,
+            "line": self.line,
+        }
+
+    def place_at(self, file: str | Path, line: int | None) -> None:
+        """Set the place unless an earlier reason has set it."""
+        if not self.file:
+            self.file, self.line = str(file), line or 0
+
+
+def record_of(item: pytest.Item) -> RunRecord:
+    """Return the record of a test, which is empty before its first run."""
+    if _records not in item.stash:
+        item.stash[_records] = RunRecord()
+    return item.stash[_records]
+
+
+def add_properties(item: pytest.Item, entries: Iterable[tuple[str, object]]) -> None:
+    """Add properties to the report of a test."""
+    added = list(entries)
+    record_of(item).properties.extend(added)
+    item.user_properties.extend(added)
+
+
+def add_failed_run(item: pytest.Item, result: RunResult, file: Path) -> None:
+    """Record a run whose verdict is failed, or that is out of time."""
+    record = record_of(item)
+    record.reasons += reasons(result)
+    record.commands += [result.command] if result.command else []
+    if result.recording is not None:
+        record.attachments.append(str(result.recording))
+    if result.folder is not None:
+        record.attachments.append(str(result.folder / "result.json"))
+    failed = [verdict.name for verdict in result.criteria if not verdict.passed]
+    record.place_at(file, line_of_criterion(file, failed[0]) if failed else None)
+
+
+def add_error(item: pytest.Item, error: BaseException, file: Path) -> None:
+    """Record a run that was not started or was aborted."""
+    record = record_of(item)
+    if isinstance(error, InputError):
+        first = error.diagnostics[0]
+        record.place_at(first.source if Path(first.source).is_file() else file, first.line)
+    if isinstance(error, ExtensionError) and error.place.file:
+        record.place_at(error.place.file, error.place.line)
+    record.place_at(file, None)
+    record.reasons += (str(error) or type(error).__name__).splitlines()
+    add_notes(record, getattr(error, "__notes__", []))
+
+
+def add_notes(record: RunRecord, notes: Iterable[str]) -> None:
+    """Record the command and the recording that notes of an aborted run contain."""
+    for note in notes:
+        if note.startswith(_COMMAND):
+            record.commands.append(note.removeprefix(_COMMAND))
+        elif note.startswith(_RECORDING):
+            record.attachments.append(note.removeprefix(_RECORDING))
+
+
+def add_section(item: pytest.Item, text: str) -> None:
+    """Add a text about a failed run to the report of a test."""
+    item.add_report_section("call", _SECTION, text)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Remove the records of an earlier attempt, such as those of pytest-rerunfailures."""
+    if _records not in item.stash:
+        return
+    earlier = {id(entry) for entry in item.stash[_records].properties}
+    item.user_properties[:] = [entry for entry in item.user_properties if id(entry) not in earlier]
+    sections: list[tuple[str, str, str]] = getattr(item, "_report_sections", [])
+    sections[:] = [section for section in sections if section[1] != _SECTION]
+    del item.stash[_records]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Add the records of a test to its reports; workers of pytest-xdist send them to the controller."""
+    report = yield
+    if _records in item.stash:
+        report.eidrive = item.stash[_records].as_report()  # type: ignore[attr-defined]
+    return report
+
+
+_SHOWN_FAILURES = 5
+"""Number of failed runs that a failed test of the success rate explains."""
+
+
+class ScenarioFailed(Exception):
+    """Failed verdict of a run."""
+
+    def __init__(self, result: RunResult | RateVerdict) -> None:
+        super().__init__(explain_outcome(result))
+        self.result = result
+
+
+def explain_rate(verdict: RateVerdict) -> str:
+    """Return the reason of a failed or undecided test of the success rate, with its first failed runs."""
+    shown = [explain(failure) for failure in verdict.failures[:_SHOWN_FAILURES]]
+    more = len(verdict.failures) - len(shown)
+    return "\n\n".join([str(verdict), *shown, *([f"and {more} more failed runs"] if more else [])])
+
+
+def explain_outcome(result: RunResult | RateVerdict) -> str:
+    """Return the reason of a failed run, or of a failed test of the success rate."""
+    from eidrive_scenario.simulation import RunResult
+
+    return printable(explain(result) if isinstance(result, RunResult) else explain_rate(result))
+
+
+def explain(result: RunResult) -> str:
+    """Return the reasons of a failed run, its last state, the command that repeats it, and its recording."""
+    from eidrive_scenario.experiments.commands import reproduction_lines
+
+    run = "" if result.run is None else f"run {result.run} of "
+    outcome = "is not judged" if result.exit_code == NOT_JUDGED else "failed"
+    head = f"{run}{result.scenario} {outcome} with channel {result.channel}, seed {result.seed}"
+    return "\n".join([head, *reasons(result), *result.final_state, *reproduction_lines(result)])
+
+
+def reasons(result: RunResult) -> list[str]:
+    """Return a line for each failed criterion, and for a run without a verdict its reason."""
+    lines = [_reason(verdict) for verdict in result.criteria if not verdict.passed]
+    if not lines or has_no_verdict(result):
+        lines.append(_reason_without_verdict(result))
+    return lines
+
+
+def has_no_verdict(result: RunResult | RateVerdict) -> bool:
+    """Whether a single run has reached its limit of simulated time before a criterion failed, or has no criterion."""
+    return getattr(result, "exit_code", None) in (ABORTED, NOT_JUDGED)
+
+
+def failures_of(result: RunResult | RateVerdict) -> list[RunResult]:
+    """Return the failed runs that a report explains; none for a passed test."""
+    from eidrive_scenario.simulation import RunResult
+
+    if result.passed:
+        return []
+    return [result] if isinstance(result, RunResult) else list(result.failures[:_SHOWN_FAILURES])
+
+
+def _reason_without_verdict(result: RunResult) -> str:
+    if result.exit_code == NOT_JUDGED:
+        from eidrive_scenario.simulation.run_outcome import UNJUDGED
+
+        return (
+            f"{UNJUDGED}; add one to the scenario or by --eidrive-criterion '{{collision: {{of: Ego}}}}', or set the "
+            "ini option eidrive_without_criteria to warn or pass"
+        )
+    return f"ended by its {result.end_reason} after {result.simulated_s:.2f} s"
+
+
+def _reason(verdict: Verdict) -> str:
+    quantities = (("value", verdict.value, verdict.unit), ("limit", verdict.limit, verdict.unit))
+    facts = [f"{name} {value:g} {unit}".rstrip() for name, value, unit in quantities if value is not None]
+    if verdict.first_violation is not None:
+        facts.append(f"first violated at {verdict.first_violation:.2f} s")
+    return f"{verdict.name}: {verdict.reason}" + (f" ({', '.join(facts)})" if facts else "")
+
+
+def failure_text(error: BaseException) -> str | None:
+    """Return the text of a failure without traceback, or None for an error that requires a traceback."""
+    if isinstance(error, ScenarioFailed | InputError):
+        return printable(str(error))
+    notes: list[str] = getattr(error, "__notes__", [])
+    if isinstance(error, OSError) and notes:
+        return printable("\n".join([f"aborted: {error}", *notes]))
+    if not isinstance(error, EidriveError):
+        return None
+    lines = [str(error), *notes]
+    if isinstance(error, ExtensionError):
+        from eidrive_scenario.simulation.attribution import traceback_from_extension
+
+        lines += ["", encodable(traceback_from_extension(error))]
+    return printable("\n".join(lines).rstrip())
+
+
+_CRITERION = "eidrive.criterion"
+_END = "</CustomCommandAction>"
+_MAX_BYTES = 16 * MIB
+
+
+def line_of_criterion(file: Path, name: str) -> int | None:
+    """Return the line of the first command that declares criteria and contains the name, from 1; None without one."""
+    try:
+        lines = read_regular_file(file, _MAX_BYTES).decode(errors="replace").splitlines()
+    except (OSError, ValueError):
+        return None
+    word = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
+    is_inside = False
+    for number, line in enumerate(lines, 1):
+        is_inside = is_inside or _CRITERION in line
+        if is_inside and word.search(line.partition(_CRITERION)[2] if _CRITERION in line else line):
+            return number
+        if _END in line:
+            is_inside = False
+    return None

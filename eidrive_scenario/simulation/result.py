@@ -1,0 +1,199 @@
+"""Result of a run, and its views: JSON, one flat row for a table, and HTML for a notebook."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import NOT_JUDGED
+from eidrive_scenario.evaluation.criterion import Verdict
+from eidrive_scenario.run_options import OPTIONS
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+
+Scalar = str | int | float | bool | None
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,17})", re.ASCII)
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """Result of a run."""
+
+    scenario: str
+    seed: int
+    channel: str
+    passed: bool
+    """Whether all criteria passed before the time limit; False for a run that no criterion judges."""
+    end_reason: str
+    """Reason for the end: stop trigger, storyboard complete, criterion: NAME, command: NAME, or time limit."""
+    exit_code: int
+    criteria: tuple[Verdict, ...]
+    metrics: Mapping[str, float]
+    trace_hash: str
+    simulated_s: float
+    wall_s: float
+    warnings: tuple[str, ...] = ()
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Parameters of the scenario, with the values of the run."""
+    run: int | None = None
+    """Index among the runs of a parameter value distribution, from 0."""
+    links: Mapping[tuple[str, str], LinkStatistics] = field(default_factory=dict)
+    """Link statistics, by (sender, receiver)."""
+    final_links: tuple[LinkEvent, ...] = ()
+    """Message outcomes that became known in the last tick; those before are in `Frame.links`."""
+    settings: ResolvedSettings = field(default_factory=ResolvedSettings)
+    """All settings that determine the run."""
+    final_state: tuple[str, ...] = ()
+    """State of the storyboard and last decision of each driven station at the end of the run, as lines of text."""
+    command: str = ""
+    """Command line that reproduces the run; empty for a scenario without a file."""
+    folder: Path | None = None
+    """Folder of `result.json`; None if it was not written."""
+    recording: Path | None = None
+    """Recording; None if it was not written."""
+
+    def __str__(self) -> str:
+        """Return the outcome in one line."""
+        failed = [verdict.name for verdict in self.criteria if not verdict.passed]
+        outcome = f"failed by {', '.join(failed)}" if failed else outcome_word(self)
+        number = "" if self.run is None else f", run {self.run}"
+        warned = f", {len(self.warnings)} warning{'s' * (len(self.warnings) > 1)}" if self.warnings else ""
+        head = f"{self.scenario}{number}, seed {self.seed}, channel {self.channel}"
+        return f"{head}: {outcome} ({self.end_reason} at {self.simulated_s:.2f} s{warned})"
+
+    def _repr_html_(self) -> str:
+        """Return the outcome as HTML for notebooks; all texts are escaped."""
+        return result_html(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as one flat row: every value is a number, a text, a truth value or None.
+
+        Columns: the outcome; `parameter.NAME`, as a number if the value is one; `channel.KEY`, the content of the
+        channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names;
+        `warnings`, the number of them. `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
+        """
+        return result_row(self)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object that `--json` prints."""
+        return {
+            "scenario": self.scenario,
+            **({} if self.run is None else {"run": self.run}),
+            "parameters": dict(self.parameters),
+            "seed": self.seed,
+            "channel": self.channel,
+            "passed": self.passed,
+            "end_reason": self.end_reason,
+            "criteria": [
+                {
+                    "name": verdict.name,
+                    "passed": verdict.passed,
+                    "value": verdict.value,
+                    "limit": verdict.limit,
+                    "unit": verdict.unit,
+                    "reason": verdict.reason,
+                }
+                for verdict in self.criteria
+            ],
+            "final_state": list(self.final_state),
+            "warnings": list(self.warnings),
+            "metrics": dict(self.metrics),
+            "links": [
+                {"sender": sender, "receiver": receiver, **statistics.as_json()}
+                for (sender, receiver), statistics in self.links.items()
+            ],
+            "trace_hash": self.trace_hash,
+            "simulated_s": self.simulated_s,
+            "wall_s": self.wall_s,
+            "settings": self.settings.as_json(),
+            "settings_sha256": self.settings.digest,
+            "command": self.command,
+        }
+
+
+def result_row(result: RunResult) -> dict[str, Scalar]:
+    """Return the columns that `RunResult.to_dict` describes."""
+    row: dict[str, Scalar] = {
+        "scenario": result.scenario,
+        "run": result.run,
+        "seed": result.seed,
+        "channel": result.channel,
+        "passed": bool(result.passed),
+        "end_reason": result.end_reason,
+        "exit_code": result.exit_code,
+        "simulated_s": float(result.simulated_s),
+        "wall_s": float(result.wall_s),
+        "warnings": len(result.warnings),
+        **{option.name: getattr(result.settings, option.name) for option in OPTIONS if option.in_row},
+    }
+    row.update((f"parameter.{name}", typed(text)) for name, text in result.parameters.items())
+    row.update(_flat("channel", result.settings.channel_profile or {}))
+    for verdict in result.criteria:
+        row[f"{verdict.name}.passed"] = bool(verdict.passed)
+        row[f"{verdict.name}.value"] = None if verdict.value is None else float(verdict.value)
+        row[f"{verdict.name}.limit"] = None if verdict.limit is None else float(verdict.limit)
+    row.update((name, float(value)) for name, value in result.metrics.items())
+    return {**row, "settings_sha256": result.settings.digest, "trace_hash": result.trace_hash}
+
+
+def typed(text: str) -> Scalar:
+    """Return the text of a parameter as a number if it is one; `007` and words remain texts."""
+    if _WHOLE.fullmatch(text):
+        return int(text)
+    if _NUMBER.fullmatch(text) and not re.match(r"[+-]?0\d", text):
+        value = float(text)
+        return value if math.isfinite(value) else text
+    return text
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, Scalar]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _flat(f"{name}.{key}", item)
+    elif isinstance(value, list | tuple):
+        yield name, json.dumps(value)
+    else:
+        yield name, value if isinstance(value, str | int | float | bool) or value is None else str(value)
+
+
+def result_html(result: RunResult) -> str:
+    """Return the outcome as an HTML fragment: title, table of criteria, end, warnings."""
+    word = outcome_word(result)
+    color = {"passed": "#1a7f37", "not judged": "#9a6700"}.get(word, "#b42318")
+    title = f"{escape(result.scenario)}, seed {result.seed}, channel {escape(result.channel)}"
+    rows = "".join(
+        f"<tr><td>{escape(verdict.name)}</td><td>{'passed' if verdict.passed else 'failed'}</td>"
+        f"<td>{_quantity(verdict.value, verdict.unit)}</td><td>{_quantity(verdict.limit, verdict.unit)}</td>"
+        f'<td style="text-align:left">{escape(verdict.reason)}</td></tr>'
+        for verdict in result.criteria
+    )
+    heads = "".join(f"<th>{head}</th>" for head in ("criterion", "", "value", "limit", "reason"))
+    table = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
+    warnings = "".join(f"<li>{escape(warning)}</li>" for warning in result.warnings)
+    mark = escape(result.trace_hash[:12])
+    return (
+        f'<div><p><b>{title}</b>: <b style="color:{color}">{word}</b></p>{table}'
+        f"<p>{escape(result.end_reason)} at {result.simulated_s:.2f} s, trace <code>{mark}</code></p>"
+        + (f"<p>warnings:</p><ul>{warnings}</ul>" if warnings else "")
+        + "</div>"
+    )
+
+
+def outcome_word(result: RunResult) -> str:
+    """Return `passed`, `not passed`, or `not judged` for a run without criteria."""
+    if result.exit_code == NOT_JUDGED:
+        return "not judged"
+    return "passed" if result.passed else "not passed"
+
+
+def _quantity(value: float | None, unit: str) -> str:
+    return "" if value is None else escape(f"{value:.3f} {unit}" if unit else f"{value:g}")
