@@ -107,7 +107,7 @@ def test_detect_omits_image_boxes_that_no_body_fills(
     found = network.find(readings.cameras["camera"].rgb)
     stripe = np.concatenate([found.boxes, [[161.0, 313.0, 262.0, 384.0]]])
     false = ImageDetections(stripe, np.append(found.scores, 0.5), (*found.classes, "truck"))
-    monkeypatch.setattr(network, "find", lambda image: false)
+    monkeypatch.setattr(network, "find_in", lambda reading: false)
     detected = detector.detect(replace(readings, lidars={}))
     assert "truck" not in detected.classes
     assert len(detected) == len(found.boxes) > 0
