@@ -28,6 +28,7 @@ def test_every_block_of_a_page_is_listed(page: str) -> None:
     assert check_page(page, LISTED[page], slow=True).errors == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("page", [page for page in EXECUTED if check_page(page, LISTED[page], slow=False).steps])
 def test_quick_commands_of_a_page_keep_their_promises(page: str, tmp_path: Path) -> None:

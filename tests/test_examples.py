@@ -50,6 +50,7 @@ def test_step_by_hand_shows_why_the_ego_brakes(tmp_path: Path, channel: str, bra
     assert any("conflict area" in row["reason"] and float(row["brake"]) > 0.0 for row in before) is braked
 
 
+@pytest.mark.statistical
 def test_policy_is_better_than_the_rule_under_latency(tmp_path: Path) -> None:
     pytest.importorskip("gymnasium")
     _, late, none = run("evaluate_policy.py", "--seeds", "8", "--latency", "0.45", folder=tmp_path)
@@ -60,6 +61,7 @@ def test_policy_is_better_than_the_rule_under_latency(tmp_path: Path) -> None:
     assert int(blind.split("/")[0]) < int(policy.split("/")[0])
 
 
+@pytest.mark.statistical
 def test_training_writes_a_policy_that_can_be_evaluated(tmp_path: Path) -> None:
     pytest.importorskip("gymnasium")
     small = ("--generations", "1", "--population", "2", "--episodes", "1", "--workers", "1")

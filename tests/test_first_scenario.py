@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.process
+
 PAGE = (Path(__file__).parents[1] / "docs" / "first_scenario.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(console|xml)\n(.*?)```", PAGE, re.DOTALL)
 FAILING = ("--channel none", "pytest ")

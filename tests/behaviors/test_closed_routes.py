@@ -85,6 +85,7 @@ def test_open_route_ends_at_its_last_waypoint(run: Run) -> None:
     assert watched.frames[-1].view.position[0][:2] == pytest.approx((250.0, -2.0), abs=0.1)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.element("AssignRouteAction")
 @pytest.mark.parametrize("relieved", [False, True], ids=["alone", "switched off for two seconds"])
 def test_closed_route_of_driven_vehicle_is_driven_in_laps(run: Run, relieved: bool) -> None:

@@ -58,6 +58,7 @@ def drive(folder: Path, action: str, *, init: str = "", seconds: float = 25, rig
     return np.array(rows), complete
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("dimension", "value"), [("time", 4), ("distance", 60), ("rate", WIDTH * np.pi / 8)])
 def test_driven_vehicle_follows_the_transition_and_drives_on(tmp_path: Path, dimension: str, value: float) -> None:
     """All three are a sine of 4 s at 15 m/s. Half of the offset of 3.5 m is reached after 2 s."""
@@ -86,6 +87,7 @@ def test_driven_vehicle_keeps_its_direction_in_an_oncoming_lane(tmp_path: Path) 
     assert np.diff(rows[:, 1]).min() > 0.5, "it never turns round"
 
 
+@pytest.mark.exhaustive
 def test_route_continues_in_the_new_lane_to_its_end(tmp_path: Path) -> None:
     """The route of 380 m ends at s = 400 m, where the vehicle stops."""
     goal = private_xml(

@@ -60,6 +60,7 @@ def write(folder: Path, action: str, *, driven: bool = True) -> Path:
     return path
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(
     ("action", "kilometers"),
     [(POLYLINE, "1,000,000"), (CLOTHOID, "1,000,000"), (ACQUIRE, "1,000,000"), (ROUTE, "210")],

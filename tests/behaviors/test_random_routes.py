@@ -34,6 +34,7 @@ def fork() -> str:
     return map_xml(*roads, rest=junction_xml("9", "1", {"11": -1, "12": -1, "13": -1}))
 
 
+@pytest.mark.statistical
 @pytest.mark.element("RandomRouteAction")
 @pytest.mark.parametrize("driven", [False, True], ids=["scripted", "driven"])
 def test_random_route_over_seeds_takes_all_branches_reproducibly(run: Run, driven: bool) -> None:

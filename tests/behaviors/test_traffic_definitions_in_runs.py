@@ -42,6 +42,7 @@ def test_traffic_mix_follows_shares_of_categories_and_entities(run: Run) -> None
     assert max(frame.view.speed[rows]) <= 5.01
 
 
+@pytest.mark.exhaustive
 def test_traffic_controller_properties_set_the_driver_model(run: Run) -> None:
     def lead_gap(time_gap: float) -> float:
         mix = definition(module="eidrive.traffic", time_gap=time_gap)

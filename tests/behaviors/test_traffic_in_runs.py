@@ -134,6 +134,7 @@ def test_traffic_stop_ends_the_named_or_all_traffic(run: Run) -> None:
     assert [len(crowd(every, 9.5, name)) for name in ("one", "two")] == [2, 2]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.element("TrafficSourceAction", "TrafficSinkAction")
 def test_sink_removes_vehicles_of_a_source(run: Run) -> None:
     played = run(
@@ -259,6 +260,7 @@ def test_collision_condition_by_type_includes_background_traffic(run: Run) -> No
     assert played.begun("event 0") == [pytest.approx(contacts[0], abs=1e-9)]
 
 
+@pytest.mark.process
 def test_traffic_with_equal_seed_has_equal_trace_in_another_process(run: Run, tmp_path: Path) -> None:
     played = run(4.0, driven=False, globally=traffic(swarm(15)), seed=3)
     other = run(4.0, driven=False, globally=traffic(swarm(15)), seed=4)

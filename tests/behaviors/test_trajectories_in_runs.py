@@ -130,6 +130,7 @@ ON_IT = f'<TrajectoryPosition s="3.61"><TrajectoryRef>{CROSSING}</TrajectoryRef>
 STEADY = '<AbsoluteSpeed value="1.389"><TargetDistanceSteadyState distance="3"/></AbsoluteSpeed>'
 
 
+@pytest.mark.exhaustive
 @pytest.mark.element("SynchronizeAction")
 @pytest.mark.parametrize("mode", ["position", "follow"])
 @pytest.mark.parametrize("target", [ON_IT, world(150.0, -2.39)])

@@ -41,6 +41,7 @@ def test_driven_vehicle_without_a_position_appears_on_its_trajectory(run: Run, m
     assert row(played, 3.0, "Second") == pytest.approx((355.0, -2.0, 10.0), abs=1.0)
 
 
+@pytest.mark.statistical
 @pytest.mark.element("SynchronizeAction")
 @pytest.mark.parametrize("target", [STRAIGHT, None], ids=["trajectory", "lane"])
 def test_partner_arrives_together_with_driven_master_on_trajectory(run: Run, target: str | None) -> None:

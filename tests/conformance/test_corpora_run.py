@@ -58,6 +58,7 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("EIDRIVE_MAPS", str(corpora_folder() / "carla_towns"))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
 @pytest.mark.filterwarnings("default")

@@ -33,6 +33,7 @@ def test_distribution_files_are_all_covered() -> None:
     assert counts[next(path for path in counts if path.name == LARGEST)] == 52_500
 
 
+@pytest.mark.exhaustive
 def test_largest_distribution_iterates_in_constant_memory() -> None:
     path = next(path for path in distributions() if path.name == LARGEST)
     started = time.process_time()
@@ -52,6 +53,7 @@ def test_largest_distribution_iterates_in_constant_memory() -> None:
     assert late - early < 8 * 2**20, "the hashes themselves take about 5 MB"
 
 
+@pytest.mark.exhaustive
 @pytest.mark.filterwarnings("default")
 def test_cut_in_at_negative_gap_never_starts() -> None:
     """In run 12,394 `dx0_m` is 0, and free space is never negative; the stop trigger waits for the cut-in."""
@@ -71,6 +73,7 @@ def test_cut_in_at_negative_gap_never_starts() -> None:
     )
 
 
+@pytest.mark.exhaustive
 def test_check_distribution_reports_impossible_conditions() -> None:
     """In the other runs the condition can hold."""
     path = next(path for path in distributions() if path.name == LARGEST)
@@ -80,6 +83,7 @@ def test_check_distribution_reports_impossible_conditions() -> None:
     assert what.startswith("condition 'CutInStartCondition' is never true: a distance is never negative")
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
 def test_every_value_loads_as_scenario(path: Path) -> None:
     """No file has errors; some combinations violate constraints, which is a warning."""

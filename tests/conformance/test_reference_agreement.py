@@ -57,6 +57,7 @@ def names() -> list[str]:
     return comparable(CORPORA) if CORPORA else ["none"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(240)
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("name", names())

@@ -287,6 +287,7 @@ def test_reader_and_schema_agree_on_every_file(judge: Validator, capsys: pytest.
     assert_explained(judged, capsys)
 
 
+@pytest.mark.exhaustive
 def test_reader_and_schema_agree_on_mutants(judge: Validator, capsys: pytest.CaptureFixture[str]) -> None:
     judged = []
     for path, kind, xml in mutants(MUTANTS_OF_A_KIND, SEED):
@@ -298,6 +299,7 @@ def test_reader_and_schema_agree_on_mutants(judge: Validator, capsys: pytest.Cap
     assert_explained(judged, capsys)
 
 
+@pytest.mark.exhaustive
 def test_mutants_raise_only_scenario_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     """The file is loaded with its catalogs and the path of its road file, or expanded."""
     folders = sorted({str(path.parent) for path in corpora_folder().rglob("*.xodr")})

@@ -87,6 +87,7 @@ def test_every_criterion_has_runs() -> None:
     assert set(CASES) | set(BY_CHANNEL) | SEPARATE == set(registry("criteria"))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("kind", sorted(BY_CHANNEL))
 def test_criterion_in_runs_of_scenario_1(kind: str) -> None:
     settings, passing, failing = BY_CHANNEL[kind]

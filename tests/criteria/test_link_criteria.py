@@ -173,6 +173,7 @@ def test_channel_busy_ratio(traffic: list[Any]) -> None:
     assert not busy(links, of="Stranger").passed
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(
     ("kind", "settings", "passing", "failing"),
     [

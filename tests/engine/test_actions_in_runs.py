@@ -36,6 +36,7 @@ def controlled(
         return simulation.result(), frames
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("source", [ONE, "coop/scenario_5", "coop/scenario_8", "corner_cases/jammer"])
 def test_run_in_half_ticks_is_that_of_whole_ticks(source: str) -> None:
     settings = RunSettings(time_limit=6.0)

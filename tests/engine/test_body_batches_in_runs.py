@@ -8,6 +8,8 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.physics import body_group
 
+pytestmark = pytest.mark.exhaustive
+
 
 @pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_5", "coop/scenario_7"])
 def test_trace_is_independent_of_the_number_from_which_bodies_move_together(

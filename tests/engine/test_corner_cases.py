@@ -31,6 +31,7 @@ def detection(result: RunResult, actor: str) -> float:
     return verdict.value
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", HIDDEN)
 def test_ego_with_messages_passes_and_knows_the_actor_early(name: str) -> None:
     participants, actor = HIDDEN[name]

@@ -44,6 +44,7 @@ def test_library_has_the_scenarios_of_ei_drive() -> None:
     assert [path.stem for path in sorted(FOLDER.glob("*.xosc"))] == [f"scenario_{number}" for number in OTHERS]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize(("number", "other"), OTHERS.items())
 def test_lane_follower_collides(number: str, other: str, seed: int) -> None:

@@ -112,6 +112,7 @@ def test_guide_examples_are_short_and_import_the_api_only(name: str) -> None:
     assert all(line.startswith("from eidrive_scenario.api.") for line in ours)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("command", "expected"), commands(), ids=[command for command, _ in commands()])
 def test_guide_commands_print_the_expected_lines(
     folder: Path, command: str, expected: tuple[str, ...], request: pytest.FixtureRequest

@@ -81,6 +81,7 @@ def test_height_separates() -> None:
 _box = st.tuples(*[st.floats(-8, 8)] * 3, *[st.floats(0.1, 6)] * 3, st.floats(-4, 4))  # x y z, length width height, yaw
 
 
+@pytest.mark.exhaustive
 @settings(max_examples=150, deadline=None)
 @given(a=_box, b=_box)
 def test_box_distance_is_least_distance_of_points(a: tuple[float, ...], b: tuple[float, ...]) -> None:

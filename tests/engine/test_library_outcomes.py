@@ -17,6 +17,7 @@ def passed(result: RunResult) -> dict[str, bool]:
     return {verdict.name: verdict.passed for verdict in result.criteria}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("number", [5, 6, 7, 8])
 @pytest.mark.parametrize(("participants", "avoided"), [("none", False), ("rsu", True)])
 def test_roadside_unit_avoids_the_collision_in_traffic(number: int, participants: str, avoided: bool) -> None:
@@ -25,12 +26,14 @@ def test_roadside_unit_avoids_the_collision_in_traffic(number: int, participants
     assert not result.warnings
 
 
+@pytest.mark.exhaustive
 def test_spectator_behind_the_bus_does_not_help() -> None:
     """The variation of the start of the bus hides the incoming car in one seed, and not in the other."""
     assert not passed(play("coop/scenario_5", seed=7, Participants="vehicle"))["collision"]
     assert passed(play("coop/scenario_5", seed=3, Participants="vehicle"))["collision"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("number", [7, 8])
 def test_spectator_behind_three_buses_does_not_help(number: int) -> None:
     """With buses that start 95 m farther back, and without other traffic, it sees the incoming car."""
@@ -39,6 +42,7 @@ def test_spectator_behind_three_buses_does_not_help(number: int) -> None:
     assert passed(play(scenario, seed=7, Participants="vehicle", BusStart="-120", Traffic="0"))["collision"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("number", "participants"), [(3, "vehicle"), (4, "rsu")])
 def test_participants_increase_the_number_of_known_vehicles(number: int, participants: str) -> None:
     alone, joined = (play(f"coop/scenario_{number}", Participants=name) for name in ("none", participants))
@@ -48,6 +52,7 @@ def test_participants_increase_the_number_of_known_vehicles(number: int, partici
     assert joined.metrics["detection_count.Ego.mean"] > alone.metrics["detection_count.Ego.mean"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("number", "participants"), [(1, "rsu"), (2, "vehicle")])
 def test_participants_decide_on_the_collision_without_traffic(number: int, participants: str) -> None:
     alone, joined = (play(f"coop/scenario_{number}", Participants=name) for name in ("none", participants))
@@ -57,6 +62,7 @@ def test_participants_decide_on_the_collision_without_traffic(number: int, parti
     assert joined.metrics["messages.sent"] > 0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("number", "other"), [(1, "First"), (2, "Lead")])
 def test_lane_follower_hits_the_slower_vehicle(number: int, other: str, seed: int) -> None:
@@ -65,12 +71,14 @@ def test_lane_follower_hits_the_slower_vehicle(number: int, other: str, seed: in
     assert f"Ego and {other} hit each other" in result.criteria[0].reason
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("detector", "seed"), [("ssd", 1), ("yolov5", 2)])
 def test_images_are_sufficient_to_overtake(detector: str, seed: int) -> None:
     """Every such run of the paper completes the task."""
     assert run_file("pipeline/scenario_1", seed=seed, settings=RunSettings(detector=detector)).passed
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("number", "rule"), [(3, "running_red_light"), (4, "running_stop_sign")])
 def test_signal_criterion_depends_on_obedience_only(number: int, rule: str, seed: int) -> None:
@@ -89,6 +97,7 @@ def test_time_at_the_stop_line_is_that_of_the_original_distance() -> None:
     assert float(at[1]) == pytest.approx(expected, abs=0.75 / 3.3333 + 0.05)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "name", ["coop/scenario_1", "coop/scenario_2", *(f"pipeline/scenario_{number}" for number in range(1, 5))]
 )

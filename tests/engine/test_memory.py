@@ -36,6 +36,7 @@ def is_connected(client: int) -> bool:
     return bool(bullet.getConnectionInfo(client)["isConnected"])
 
 
+@pytest.mark.exhaustive
 def test_runs_on_road_with_many_objects_leave_no_objects_behind(scenario: Path) -> None:
     """2,000 posts are 16,000 vertices; of each, pybullet leaked a list per run."""
     counts = []

@@ -36,6 +36,7 @@ def braking_time(name: str, **parameters: str) -> float:
     raise AssertionError("the ego did not brake")
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("name", "speeds"),
     [

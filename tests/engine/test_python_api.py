@@ -17,6 +17,7 @@ def test_page_has_no_other_blocks() -> None:
     assert {kind for kind, _ in BLOCKS} == {"python", "text", "xml"}
 
 
+@pytest.mark.statistical
 def test_blocks_of_the_page_run_and_print_the_stated_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,6 +22,8 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 
+pytestmark = pytest.mark.process
+
 TURN, EAST, NORTH = math.radians(217.3), 310.0, -85.0
 ROUNDING = 1e-9
 """Tolerance of positions [m], headings [rad] and path loss [dB]; a decision one tick later would change 0.4 m."""

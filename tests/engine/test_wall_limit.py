@@ -41,6 +41,7 @@ def hung(tmp_path: Path, detector: str) -> WallLimitError:
     return caught.value
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("detector", "name", "time", "lines"),
     [
@@ -121,6 +122,7 @@ def test_hung_constructor_is_interrupted_while_loading(package: Path, tmp_path: 
         run_file(write_scenario(tmp_path / "s.xosc", detector="hangs_when_built"), wall_limit=3.0)
 
 
+@pytest.mark.exhaustive
 def test_hung_run_leaves_a_readable_partial_recording(package: Path, tmp_path: Path) -> None:
     """0.5 s of frames at 0.05 s, and the hung tick is not among them."""
     scenario = write_scenario(tmp_path / "s.xosc", detector="hangs")

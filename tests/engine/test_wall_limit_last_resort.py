@@ -46,6 +46,7 @@ def test_interruption_waits_until_notes_are_saved() -> None:
     assert saved == ["a note"]
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("is_main", [True, False])
 @pytest.mark.parametrize(("closing", "ends"), [(0.2, 1), (3600.0, 0)])
 def test_interrupted_run_has_more_time_to_close_its_files(

@@ -22,6 +22,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, tuple[boo
     return out, printed.getvalue(), tuple(check.holds for table in tables for check in evaluate_claims(table)[:2])
 
 
+@pytest.mark.exhaustive
 def test_demo_confirms_order_of_cooperation_none_and_latency(
     done: tuple[Path, str, tuple[bool, ...]],
 ) -> None:

@@ -25,6 +25,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in found if path.name != "provenance.json"}
 
 
+@pytest.mark.process
 @pytest.mark.timeout(300)
 def test_table_2_continues_after_a_kill_and_repeats_its_tables(
     eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -39,6 +39,7 @@ def check(folder: Path, *arguments: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.exhaustive
 def test_check_beyond_wall_limit_exits_with_3_and_reports_each_file(folder: Path) -> None:
     """No file is checked within a microsecond."""
     names = ("coop/scenario_1", "coop/scenario_2")
@@ -50,10 +51,12 @@ def test_check_beyond_wall_limit_exits_with_3_and_reports_each_file(folder: Path
     assert out == "2 files, 0 errors, 0 warnings\n"
 
 
+@pytest.mark.exhaustive
 def test_check_within_wall_limit_has_unchanged_output(folder: Path) -> None:
     assert check(folder, "coop/scenario_1", "--wall-limit", "600") == check(folder, "coop/scenario_1")
 
 
+@pytest.mark.exhaustive
 def test_check_hanging_extension_is_reported_and_other_files_checked(folder: Path) -> None:
     write_scenario(folder / "hangs.xosc", detector="hangs_when_built")
     code, out, err = check(folder, "hangs.xosc", "z_right.xosc", "--wall-limit", "10")
@@ -66,6 +69,7 @@ def test_check_hanging_extension_is_reported_and_other_files_checked(folder: Pat
     assert "no criterion demands" in out
 
 
+@pytest.mark.exhaustive
 def test_check_hanging_native_code_exits_with_3(folder: Path) -> None:
     write_scenario(folder / "hangs.xosc", detector="hangs_in_c_when_built")
     code, _, err = check(folder, "hangs.xosc", "--wall-limit", "6")
@@ -75,6 +79,7 @@ def test_check_hanging_native_code_exits_with_3(folder: Path) -> None:
     assert f"{place} (faulty:HangsInCWhenBuilt): still running in __init__ after 6 s of wall time" in err
 
 
+@pytest.mark.exhaustive
 def test_check_exiting_extension_is_reported_and_other_files_checked(folder: Path) -> None:
     write_scenario(folder / "exits.xosc", detector="exits_when_built")
     code, out, err = check(folder, "exits.xosc", "z_right.xosc")

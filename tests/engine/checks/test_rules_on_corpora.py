@@ -82,6 +82,7 @@ def found(maps: None) -> dict[str, Counter[str]]:
     return counts
 
 
+@pytest.mark.exhaustive
 def test_corpora_diagnostics_equal_the_examined_ones(found: dict[str, Counter[str]]) -> None:
     relevant = {path: set(rules) - FREQUENT for path, rules in found.items()}
     assert {path: rules for path, rules in relevant.items() if rules} == {

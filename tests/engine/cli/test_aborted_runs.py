@@ -48,6 +48,7 @@ def run(folder: Path, *arguments: str) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
+@pytest.mark.statistical
 def test_sys_exit_of_detector_aborts_only_its_run(folder: Path) -> None:
     """Each of two seeds has its own JSON line and message."""
     code, out, err = run(folder, "s.xosc", "--detector", "exits", "--repeat", "2", "--json", "--out", "runs")
@@ -80,6 +81,7 @@ def test_sys_exit_of_detector_aborts_only_its_run(folder: Path) -> None:
         pytest.fail("no note names the recording")
 
 
+@pytest.mark.exhaustive
 def test_aborted_run_of_distribution_does_not_end_other_runs(folder: Path) -> None:
     """The action fails for a parameter of 4, and not for 5."""
     declared = parameters_xml(Speed=("double", "5"))
@@ -93,6 +95,7 @@ def test_aborted_run_of_distribution_does_not_end_other_runs(folder: Path) -> No
     assert "2 runs in d.xosc: 1 passed, 1 not passed" in err
 
 
+@pytest.mark.exhaustive
 def test_uninterruptible_run_ends_with_exit_code_3(folder: Path) -> None:
     code, out, err = run(folder, "s.xosc", "--detector", "hangs_in_c", "--wall-limit", "6", "--json")
     assert code == 3
@@ -101,6 +104,7 @@ def test_uninterruptible_run_ends_with_exit_code_3(folder: Path) -> None:
     assert json.loads(out)["error"]["name"] == "hangs_in_c"
 
 
+@pytest.mark.exhaustive
 def test_uninterruptible_run_keeps_recording_except_last_second(folder: Path) -> None:
     """The detector hangs at 2.5 s, and the process ends without closing its files."""
     write_scenario(folder / "s.xosc", detector="hangs_in_c_later", end=5.0)
@@ -118,6 +122,7 @@ def test_uninterruptible_run_keeps_recording_except_last_second(folder: Path) ->
     assert times[-1] >= 2.5 - 1.05
 
 
+@pytest.mark.exhaustive
 def test_run_waiting_in_native_code_ends_with_closed_recording(folder: Path) -> None:
     code, _, err = run(folder, "s.xosc", "--detector", "deadlocks", "--wall-limit", "6", "--out", "runs")
     assert code == 3
@@ -130,12 +135,14 @@ def test_run_waiting_in_native_code_ends_with_closed_recording(folder: Path) -> 
     assert f"recording: {recording.relative_to(folder)}" in err
 
 
+@pytest.mark.exhaustive
 def test_os_exit_of_extension_under_wall_limit_is_reported(folder: Path) -> None:
     """Without a limit there is no parent process that could report it."""
     code, _, err = run(folder, "s.xosc", "--detector", "ends_process", "--wall-limit", "600")
     assert (code, err) == (3, "run aborted: an extension ended its process (os._exit)\n")
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 3)])
 def test_signal_under_wall_limit_ends_run(folder: Path, number: signal.Signals, code: int) -> None:
     process = start(folder, "s.xosc", "--detector", "sleeps", "--wall-limit", "600", "--out", "runs")
@@ -147,6 +154,7 @@ def test_signal_under_wall_limit_ends_run(folder: Path, number: signal.Signals, 
     assert process.returncode == code
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
 def test_wall_limit_of_run_not_positive_is_invalid_input(folder: Path, limit: str) -> None:
     code, _, err = run(folder, "s.xosc", "--wall-limit", limit)

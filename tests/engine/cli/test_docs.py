@@ -47,6 +47,7 @@ def test_documented_keys_equal_keys_of_result(eidrive: Eidrive, passing_by: Path
     assert ",".join(COLUMNS) in text
 
 
+@pytest.mark.process
 def test_documented_reading_of_recording_is_executable(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path / "run")
     code = re.findall(r"```python\n(.*?)```", RESULTS.read_text(encoding="utf-8"), re.DOTALL)[0]

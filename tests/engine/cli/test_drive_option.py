@@ -14,6 +14,7 @@ from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings
 
 
+@pytest.mark.process
 def test_command_of_a_driven_run_repeats_it(tmp_path: Path, eidrive: Eidrive, passing_by: Path) -> None:
     (tmp_path / "stack.yaml").write_text("target_speed: 7\nrange: 1.0e-05\n")
     settings = RunSettings(

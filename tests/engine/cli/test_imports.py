@@ -34,6 +34,7 @@ print("imported:", *sys.modules)
 """
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("arguments", "excluded"),
     [

@@ -18,6 +18,7 @@ from eidrive_scenario.errors import RegistryError
 from eidrive_scenario.registry import register, registry
 
 
+@pytest.mark.process
 @pytest.mark.timeout(300)
 def test_new_project_passes_its_tests(eidrive: Eidrive, tmp_path: Path) -> None:
     """The scenario as a test item, three gaps, and a success rate; another process, as a user has it."""
@@ -109,6 +110,7 @@ def test_full_disk_leaves_no_part_of_project(eidrive: Eidrive, tmp_path: Path, m
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.process
 @pytest.mark.timeout(300)
 def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive, tmp_path: Path) -> None:
     folder = tmp_path / "demo"
@@ -132,6 +134,7 @@ def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive
         assert (f"or with eidrive --project {folder}" in done.stderr) is not named
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -164,6 +164,7 @@ class Reader(threading.Thread):
                 self.has_ended.set()
 
 
+@pytest.mark.process
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_interruption_of_live_run_ends_the_page(start: Callable[..., subprocess.Popen[str]]) -> None:
     """The run would take three hours."""
@@ -179,6 +180,7 @@ def test_interruption_of_live_run_ends_the_page(start: Callable[..., subprocess.
     assert "The run was aborted" in page.text
 
 
+@pytest.mark.process
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("more", [[], ["--wall-limit", "60"]])
 def test_interruption_after_the_end_keeps_the_exit_code(
@@ -196,6 +198,7 @@ def test_interruption_after_the_end_keeps_the_exit_code(
     page.join(PATIENCE)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(os.name == "nt", reason="a program in the variable BROWSER is a shell script")
 def test_live_run_opens_its_address_in_the_browser(
     start: Callable[..., subprocess.Popen[str]], passing_by: Path, tmp_path: Path

@@ -179,6 +179,7 @@ def test_run_of_invalid_file_reports_line(eidrive: Eidrive, passing_by: Path, tm
     assert f"{broken}:47: unknown setting 'ofe'; did you mean 'of'?" in result.stderr
 
 
+@pytest.mark.process
 def test_trace_hash_of_equal_seed_is_equal_in_other_process(eidrive: Eidrive, passing_by: Path) -> None:
     here = json.loads(eidrive("run", passing_by, "--json").stdout)
     command = [sys.executable, "-m", "eidrive_scenario", "run", str(passing_by), "--json"]

@@ -30,6 +30,7 @@ def eidrive(
     return subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, env=environment, check=False)
 
 
+@pytest.mark.process
 def test_characters_missing_in_encoding_are_escaped(passing_by: Path) -> None:
     log = eidrive("run", passing_by, "--no-record", "--log", "-", PYTHONIOENCODING="ascii")
     assert log.returncode == 0, log.stderr
@@ -37,6 +38,7 @@ def test_characters_missing_in_encoding_are_escaped(passing_by: Path) -> None:
     assert eidrive("tree", passing_by, PYTHONIOENCODING="latin-1").returncode == 0
 
 
+@pytest.mark.process
 def test_json_output_is_valid_in_any_encoding(passing_by: Path, tmp_path: Path) -> None:
     folder = tmp_path / "späß"
     folder.mkdir()
@@ -78,6 +80,7 @@ def test_commands_print_by_functions_that_escape_control_characters() -> None:
     assert direct == {"output.py", "options.py"}
 
 
+@pytest.mark.process
 def test_control_characters_of_a_store_are_escaped(tmp_path: Path) -> None:
     path = tmp_path / "s.db"
     with opened(path) as store:
@@ -88,6 +91,7 @@ def test_control_characters_of_a_store_are_escaped(tmp_path: Path) -> None:
         assert not set("\x1b\x07\x9b\u202e\x7f") & set(printed.stdout.decode())
 
 
+@pytest.mark.process
 def test_control_characters_of_a_scenario_are_escaped(passing_by: Path, tmp_path: Path) -> None:
     """XML 1.0 permits C1, but not C0."""
     copy = tmp_path / "c1.xosc"
@@ -110,6 +114,7 @@ def test_file_name_with_undecodable_bytes_is_invalid_input(passing_by: Path, tmp
     assert message in result.stderr
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "FILE"], ["run", "FILE", "--csv", str(FULL)]])
 def test_full_disk_is_reported_in_one_line(passing_by: Path, arguments: list[str]) -> None:
@@ -124,6 +129,7 @@ def test_full_disk_is_reported_in_one_line(passing_by: Path, arguments: list[str
     assert b"Traceback" not in result.stderr
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("arguments", [["run", "FILE", "--json"], ["tree", "FILE"]])
 def test_closed_standard_output_is_not_an_error(passing_by: Path, arguments: list[str]) -> None:
     given = " ".join(f"'{passing_by}'" if argument == "FILE" else argument for argument in arguments)
@@ -132,6 +138,7 @@ def test_closed_standard_output_is_not_an_error(passing_by: Path, arguments: lis
     assert (result.returncode, result.stderr) == (0, b"")
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("arguments", [["run", "--help"], ["list", "criteria"]])
 def test_reader_that_closes_the_pipe_is_not_an_error(arguments: list[str]) -> None:
     reader, writer = os.pipe()

@@ -86,6 +86,7 @@ def test_invalid_input_writes_no_files(eidrive: Eidrive, passing_by: Path, tmp_p
     assert "cannot write" in result.stderr
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("arguments", [["list", "conditions"], ["run", "{file}"], ["tree", "{file}"]])
 def test_closed_pipe_of_reader_prints_no_error(passing_by: Path, arguments: list[str]) -> None:
     reading, writing = os.pipe()
@@ -138,6 +139,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("arguments", "name"),
     [

@@ -128,6 +128,7 @@ def test_pages_state_missing_criteria(eidrive: Eidrive, bare: Path, passing_by: 
     assert WORDS in shown.xpath("//div[@id='verdict']")[0].text_content()
 
 
+@pytest.mark.process
 def test_sweep_has_no_verdict(eidrive: Eidrive, bare: Path, tmp_path: Path) -> None:
     store = tmp_path / "s.db"
     options: list[str | Path] = ["--vary", "OtherY=5,6", "--workers", "1", "--store", store]

@@ -108,6 +108,7 @@ def moved(path: Path, actor: str, folder: Path) -> Path | None:
     return target
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("name", "channel"), CASES)
 def test_hidden_actor_has_no_influence_before_its_detection(name: str, channel: str, tmp_path: Path) -> None:
     check_hidden_actors(name, channel, tmp_path)

@@ -63,6 +63,7 @@ def test_mean_of_normal_values(count: int) -> None:
     assert LEAST <= coverage([(one.low, one.high) for one in intervals], 12.0) <= MOST
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("compare", "truth"), [(paired_difference, 2.0), (paired_ratio, 1.2), (paired_spread, 1.0)])
 @pytest.mark.parametrize("count", COUNTS)
 def test_comparison_of_normal_pairs(compare: Compare, truth: float, count: int) -> None:
@@ -141,6 +142,7 @@ def population() -> list[PerceptionRecord]:
     return perception_runs(2000)
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("count", COUNTS)
 def test_average_precision_and_recall_of_runs(population: list[PerceptionRecord], count: int) -> None:
     """A quarter of the samples: the standard error of a share of 95 % is 0.8 %."""
@@ -152,6 +154,7 @@ def test_average_precision_and_recall_of_runs(population: list[PerceptionRecord]
     assert LEAST <= coverage([(one.low, one.high) for one in recalls], whole.hidden_recall(0).value) <= MOST
 
 
+@pytest.mark.statistical
 def test_boundary_of_success() -> None:
     """Credible intervals cover at least 95 % in the mean over the prior within the range.
 

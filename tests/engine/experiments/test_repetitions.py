@@ -33,6 +33,7 @@ def test_run_jobs_returns_results_in_job_order(tasks: ModuleType) -> None:
     assert [(arm, seed) for arm, seed, _ in results] == [(job.arm, job.seed) for job in JOBS]
 
 
+@pytest.mark.exhaustive
 def test_run_jobs_results_depend_neither_on_workers_nor_order(tasks: ModuleType) -> None:
     alone = run_jobs(JOBS, tasks.draw, workers=1)
     assert run_jobs(JOBS, tasks.draw, workers=2) == alone
@@ -79,6 +80,7 @@ def test_run_jobs_raises_error_of_task(tasks: ModuleType, workers: int) -> None:
         run_jobs(JOBS[:2], tasks.fail, workers=workers)
 
 
+@pytest.mark.process
 def test_workers_of_a_killed_process_end(tmp_path: Path) -> None:
     """Each worker writes its process number and sleeps; after the kill of their parent both end within seconds."""
     code = (

@@ -171,6 +171,7 @@ def _commands() -> Iterator[list[str]]:
         yield ["--channel", f"{{delay: {{kind: constant, seconds: {late}}}}}", "--time-limit", "2"]
 
 
+@pytest.mark.process
 def test_concurrent_runs_write_consistent_results_and_recordings(tmp_path: Path) -> None:
     running = [
         subprocess.Popen(
@@ -208,6 +209,7 @@ def test_concurrent_runs_write_consistent_results_and_recordings(tmp_path: Path)
     assert "a copy of another" in text or "copies of another" in text
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("source", "options"),
     [

@@ -54,6 +54,7 @@ def scenario_3(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return result.recording, folder / "trace.mcap"
 
 
+@pytest.mark.statistical
 def test_positions_of_trace_equal_those_of_the_run(scenario_3: tuple[Path, Path]) -> None:
     """The box center, less its rotated offset, is the reference point of OpenSCENARIO."""
     frames = list(read_recording(scenario_3[0]).frames())

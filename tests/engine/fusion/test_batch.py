@@ -93,6 +93,7 @@ def bits(found: Detections) -> tuple[Any, ...]:
     return (found.time, found.classes, found.tracks, *(array.tobytes() for array in arrays))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("size", [1, 4, 100])
 def test_fuse_batch_equals_separate_calls(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(covariance_intersection, "_BATCH", size)

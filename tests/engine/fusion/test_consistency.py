@@ -91,6 +91,7 @@ def test_fusion_of_late_positions_is_consistent(report: Make, fuse: Fuse) -> Non
     assert 0.9 < np.mean(found) < UPPER
 
 
+@pytest.mark.exhaustive
 def test_fusion_with_pose_error_of_the_sender_is_consistent(report: Make, fuse: Fuse) -> None:
     """Ten reports with the same pose error: filtering does not reduce it, and the covariance includes it."""
     rng = generator(13, "pose")

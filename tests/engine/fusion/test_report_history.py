@@ -125,6 +125,7 @@ def test_report_history_has_bounded_size(report: Make) -> None:
     assert len(history.tracks(("A",))) == 1
 
 
+@pytest.mark.exhaustive
 def test_evict_stale_does_not_change_the_fused_objects(report: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """A new station passes every second for a minute; one station returns later with out-of-sequence reports."""
     rng = generator(1, "passers-by")

@@ -32,6 +32,7 @@ from eidrive_scenario.simulation import RunSettings
 ALL_PARTS = {"own": True, "senders": True, "grid": True}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("normalized", [True, False])
 @pytest.mark.parametrize("scenario", ["coop/scenario_5", "driving/roundabout", "corner_cases/wrong_clock"])
 def test_spaces_contain_all_observations_of_an_episode(scenario: str, normalized: bool) -> None:

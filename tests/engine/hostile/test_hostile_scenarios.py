@@ -123,6 +123,7 @@ def test_check_and_run_200_000_attributes_are_refused(write: Write) -> None:
     refused(path, "more than 200 attributes")
 
 
+@pytest.mark.exhaustive
 def test_check_and_run_millions_of_unknown_elements_are_refused(write: Write) -> None:
     path = write()
     path.write_text(path.read_text().replace("<Entities>", "<Entities>" + "<UnknownThing/>\n" * 3_500_000))
@@ -176,6 +177,7 @@ def routes_of(tmp_path: Path, declared: str, assigned: str, count: int) -> tuple
     return f'<RouteCatalog><Directory path="{tmp_path}"/></RouteCatalog>', action
 
 
+@pytest.mark.exhaustive
 def test_check_and_run_catalog_entries_that_multiply_are_refused(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -188,6 +190,7 @@ def test_check_and_run_catalog_entries_that_multiply_are_refused(
     refused(write(catalogs=catalogs, init=action), "R.xosc:", "the entries of catalogs have more than", line=False)
 
 
+@pytest.mark.exhaustive
 def test_check_and_run_positions_in_routes_of_positions_are_refused(write: Write, tmp_path: Path) -> None:
     """Each place of a route is a place on the next one: to find the first takes 2^24 routes."""
     catalogs, action = routes_of(tmp_path, "", "", 2)

@@ -135,6 +135,7 @@ def outside(found: dict[str, object], folder: Path | None) -> list[list[str]]:
     ]
 
 
+@pytest.mark.exhaustive
 def test_check_with_torchscript_writes_nothing_starts_nothing_and_imports_no_torch(
     write: Write, torchscript: Path, tmp_path: Path
 ) -> None:
@@ -152,6 +153,7 @@ def test_check_with_torchscript_writes_nothing_starts_nothing_and_imports_no_tor
         assert allowed == "" or installed or missing in str(found["output"])
 
 
+@pytest.mark.exhaustive
 def test_run_with_torchscript_is_refused_and_writes_only_to_its_output_folder(
     write: Write, torchscript: Path, tmp_path: Path
 ) -> None:
@@ -166,6 +168,7 @@ def test_run_with_torchscript_is_refused_and_writes_only_to_its_output_folder(
     assert written(tmp_path) == set()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("by", ["option", "environment"])
 def test_run_with_permission_executes_torchscript(write: Write, torchscript: Path, tmp_path: Path, by: str) -> None:
     """Torch writes without Python, so that an audit hook cannot see it: the files prove what is refused above."""
@@ -206,6 +209,7 @@ def test_run_with_onnx_weights_writes_nothing_into_the_home_directory(write: Wri
     assert list(home.rglob("*")) == []
 
 
+@pytest.mark.exhaustive
 def test_check_of_shipped_and_onnx_weights_loads_none(write: Write, tmp_path: Path) -> None:
     """A file that is no model at all passes `check`, which does not read it; `run` refuses it."""
     broken = tmp_path / "broken.onnx"
@@ -239,6 +243,7 @@ def test_run_with_permission_loads_torchscript(write: Write, tmp_path: Path, mon
     assert Simulation(load_scenario(scenario), settings=settings).run().end_reason == "time limit"
 
 
+@pytest.mark.exhaustive
 def test_library_scenarios_are_checked_without_torch(tmp_path: Path) -> None:
     found = watched(tmp_path, "check", str(library_path() / "coop"))
     assert found["torch"] is False

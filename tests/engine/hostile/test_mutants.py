@@ -17,6 +17,7 @@ from mutants import mutant
 COUNT = os.environ.get("EIDRIVE_MUTANTS", "24")
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the limits of a trial need Linux")
 @pytest.mark.timeout(0)
 def test_check_and_run_of_mutants_end_without_internal_error_or_hang(tmp_path: Path) -> None:

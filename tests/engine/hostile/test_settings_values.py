@@ -135,6 +135,7 @@ def test_tables_contain_every_numeric_setting() -> None:
     assert missing == with_files  # weights and a delay trace, which have separate tests
 
 
+@pytest.mark.exhaustive
 def test_setting_with_hostile_value_is_accepted_or_refused() -> None:
     counts = {True: 0, False: 0}
     for kind, name, what, data in all_variants():
@@ -146,6 +147,7 @@ def test_setting_with_hostile_value_is_accepted_or_refused() -> None:
     assert counts[False] > 5000
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the limits of a trial need Linux")
 @pytest.mark.timeout(0)
 def test_runs_with_accepted_hostile_values_end_without_internal_error(tmp_path: Path) -> None:

@@ -214,6 +214,7 @@ def test_audit_hook_records_python_operations(audit_log: AuditLog) -> None:
     audit_log.events.clear()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(300)
 def test_expressions_execute_no_python_code(audit_log: AuditLog) -> None:
     for text in BREAKOUTS:
@@ -267,6 +268,7 @@ def test_concatenation_accepts_only_texts() -> None:
             assert len(concatenate(text, texts)) <= len(text) + 310 * text.count("$")
 
 
+@pytest.mark.exhaustive
 def test_scenario_expressions_execute_no_python_code(audit_log: AuditLog) -> None:
     """The texts are parameter defaults, assigned values and attributes."""
     dice = random.Random(3)

@@ -33,6 +33,7 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("EIDRIVE_MAPS", os.pathsep.join(folders))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("maps")
 def test_corpora_files_are_read() -> None:
     refused = {}

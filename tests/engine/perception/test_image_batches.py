@@ -124,6 +124,7 @@ def test_image_in_the_memory_is_not_computed_again(
     assert [count for count in calls if count] == [1, 1]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("kind", ["yolov5", "ssd"])
 def test_run_with_batches_has_the_same_trace(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a CPU, where an image is computed alone."""

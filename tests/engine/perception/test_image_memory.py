@@ -182,6 +182,7 @@ def test_images_are_drawn_once_in_runs_with_equal_images(memory: ImageMemory, mo
     assert len(drawn) == count
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("weather", ["midnight", "foggy_morning"])
 def test_order_of_runs_does_not_change_their_traces(weather: str) -> None:
     arms = [RunSettings(detector="ssd", channel=name, weather=weather, time_limit=0.3) for name in ("none", "ideal")]

@@ -193,6 +193,7 @@ def images_and_targets() -> tuple[Any, Targets]:
     return image, Targets(one.boxes.repeat(2, 1, 1), one.classes.repeat(2, 1))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["yolov5", "ssd"])
 def test_network_overfits_single_image_and_fold_preserves_outputs(name: str) -> None:
     network = yolo() if name == "yolov5" else ssd()

@@ -79,6 +79,7 @@ def test_runtime_outputs_equal_trained_network_of_torch(name: str, runtime: Runt
         np.testing.assert_allclose(found, wanted, atol=1e-3)
 
 
+@pytest.mark.process
 @RUNTIMES
 def test_runtime_returns_equal_bits_in_separate_processes(runtime: Runtime) -> None:
     need(runtime)
@@ -187,6 +188,7 @@ def assert_independent_of_the_batch(infer: Infer) -> None:
                 np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.exhaustive
 @NETWORKS
 def test_outputs_do_not_depend_on_other_images_of_the_batch(name: str) -> None:
     pytest.importorskip("torch", reason="needs the extra 'learned'")

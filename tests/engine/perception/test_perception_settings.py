@@ -172,6 +172,7 @@ def test_runs_with_filter_tracker_and_latency_are_repeatable(write: Write) -> No
     assert frames[-1].steps["RSU"].estimate is None
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("scenario", "helper"), [("coop/scenario_1", "RSU"), ("coop/scenario_2", "Spectator")])
 def test_lidar_detector_finds_incoming_car_in_time(scenario: str, helper: str) -> None:
     """Lidar only: no collision, and the helper detects the hidden car no later than the ego can at the crossing."""

@@ -235,6 +235,7 @@ def test_ctrv_has_smaller_error_than_cv_in_curve() -> None:
     assert means["ctrv"] < 0.7 * means["cv"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
 def test_track_nees_is_within_chi_square_bounds(kind: str) -> None:
     """NEES of the position over 60 simulated drives with the assumed noise, from the second second on.

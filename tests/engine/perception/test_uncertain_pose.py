@@ -85,6 +85,7 @@ class NoisyDetector(Detector):
         return Detections(readings.time, boxes, np.full(1, 0.9), ("car",), UNKNOWN, NOISE)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("span", [0.0, 0.3, 3.0])
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
 def test_parked_car_is_tracked_consistently(kind: str, span: float) -> None:

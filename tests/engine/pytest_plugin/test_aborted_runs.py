@@ -49,6 +49,7 @@ def cases_of(junit: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.process
 def test_faulty_extensions_over_two_workers_do_not_affect_other_runs(project: pytest.Pytester) -> None:
     """5 of 12 runs end with an error of an extension, which the JUnit file names."""
     arguments = ("xosc", "-n", "2", "--junitxml", "junit.xml", "--eidrive-out", "runs", "-p", "no:cacheprovider")
@@ -73,6 +74,7 @@ def test_faulty_extensions_over_two_workers_do_not_affect_other_runs(project: py
         assert "recording.partial.mcap" in cases[name]
 
 
+@pytest.mark.process
 def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytest.Pytester) -> None:
     """The worker is replaced, and its report names the extension and the line."""
     folder = project.mkdir("hung")
@@ -90,6 +92,7 @@ def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytes
     assert not any(cases[name] for name in SOUND[:3])
 
 
+@pytest.mark.process
 def test_wall_limit_option_overrides_ini_option(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_wall_limit = never\neidrive_without_criteria = pass\n")
     refused = project.runpytest_subprocess("xosc/sound_0.xosc", "-p", "no:cacheprovider")
@@ -129,6 +132,7 @@ def test_aborted_run_scenario_shows_lines_of_test_and_extension(project: pytest.
         assert file not in text
 
 
+@pytest.mark.process
 def test_run_scenario_beyond_wall_limit_raises_error(project: pytest.Pytester) -> None:
     project.makepyfile(
         """

@@ -59,6 +59,7 @@ def test_examples_run_the_same_commands() -> None:
     assert commands("GitHub Actions") == commands("GitLab CI")
 
 
+@pytest.mark.process
 def test_commands_of_example_pass_in_new_project(tmp_path: Path) -> None:
     project = tmp_path / "demo"
     environment = {name: text for name, text in os.environ.items() if not name.startswith(("GITHUB", "CI", "PYTEST"))}

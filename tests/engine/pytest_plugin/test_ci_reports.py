@@ -41,6 +41,7 @@ def attached(texts: list[str]) -> list[str]:
     return re.findall(r"^\[\[ATTACHMENT\|(.*)\]\]$", text, re.MULTILINE)
 
 
+@pytest.mark.process
 def test_failed_run_has_absolute_attachments(project: pytest.Pytester) -> None:
     """Jenkins requires absolute paths. The files exist, and only the failed run has them."""
     arguments = ("--junitxml", "junit.xml", "--eidrive-out", "runs", "-n", "2", "-p", "no:cacheprovider")
@@ -73,6 +74,7 @@ def test_attachments_of_gitlab_are_relative_to_project(
     assert all(not Path(path).is_absolute() and (project.path / path).is_file() for path in paths)
 
 
+@pytest.mark.process
 def test_github_session_writes_annotations_and_summary_once(
     project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -79,6 +79,7 @@ def test_distribution_without_omitted_runs_prints_no_report(
     result.stdout.no_fnmatch_line("*omitted*")
 
 
+@pytest.mark.process
 def test_omitted_runs_of_xdist_workers_are_reported(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     vary(values_xml("OtherY", "5", "4.5", "4"))
     arguments = ("vary.xosc", "--eidrive-max-runs", "2", "-n", "2", "-p", "no:cacheprovider")

@@ -92,6 +92,7 @@ def test_driven(run_scenario):
     run(project, "test_own.py", *options, text=text).assert_outcomes(passed=1)
 
 
+@pytest.mark.exhaustive
 def test_planner_of_all_driven_stations(project: pytest.Pytester) -> None:
     text = """
 def test_driven(run_scenario):

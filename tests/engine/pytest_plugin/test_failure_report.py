@@ -54,6 +54,7 @@ def test_running_event_is_part_of_state(tmp_path: Path) -> None:
     assert "ended by its time limit after 0.75 s" in explain(result)
 
 
+@pytest.mark.process
 def test_command_of_options_reproduces_run(pytester: pytest.Pytester) -> None:
     """The pasted command gives the same verdict in another folder, with every option that needs quotes."""
     folder = pytester.mkdir("it's a folder")
@@ -75,6 +76,7 @@ def test_command_of_options_reproduces_run(pytester: pytest.Pytester) -> None:
     assert '"seconds": 0.2' in again.stdout
 
 
+@pytest.mark.process
 def test_command_of_scenario_without_file_reproduces_test(pytester: pytest.Pytester) -> None:
     """The pytest command has the options that select and change the run."""
     shutil.copy(PASSING_BY, pytester.path / "scene.xosc")

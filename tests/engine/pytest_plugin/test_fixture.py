@@ -78,6 +78,7 @@ def test_missing(run_scenario):
     result.stdout.no_fnmatch_line("*Traceback*")
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("marker", "message"),
     [('"none/*.xosc"', "no scenario matches 'none/*.xosc'"), ("", "marker scenario: no pattern")],
@@ -153,6 +154,7 @@ def test_wrong(run_scenario):
     assert kept == {"kept/test_own/test_object", "kept/drives/first"}
 
 
+@pytest.mark.exhaustive
 def test_marked_test_without_fixture_is_an_error(project: pytest.Pytester) -> None:
     alone = "@pytest.mark.scenario('drives/first.xosc')\ndef test_alone(): pass"
     result = run(project, alone)
@@ -162,6 +164,7 @@ def test_marked_test_without_fixture_is_an_error(project: pytest.Pytester) -> No
     run(project, whole).assert_outcomes(passed=1)
 
 
+@pytest.mark.exhaustive
 def test_second_marker_of_test_is_an_error(project: pytest.Pytester) -> None:
     """pytest would use the closest marker only, so the scenarios of the other one would be ignored silently."""
     text = """

@@ -58,6 +58,7 @@ def junit(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root / "junit.xml"
 
 
+@pytest.mark.exhaustive
 def test_broken_runs_are_reported_as_what_they_are(junit: Path) -> None:
     cases = {str(case.get("name")): case for case in ElementTree.parse(junit).iter("testcase")}
     assert len(cases) == 100

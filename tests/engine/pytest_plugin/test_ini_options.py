@@ -56,6 +56,7 @@ def test_command_line_takes_precedence_over_ini_options(project: pytest.Pytester
     assert collected(project, "drives", *arguments) == ["channel=none-planner=behavior-seed=1]"]
 
 
+@pytest.mark.statistical
 def test_marker_takes_precedence_over_ini_options(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_channel = ideal\neidrive_success_rate = 0.9\n")
     project.makepyfile(
@@ -93,6 +94,7 @@ def test_ini_options_configure_runs(project: pytest.Pytester) -> None:
     assert [name for entry in settings["criteria"] for name in entry] == ["max_speed"]
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
@@ -118,6 +120,7 @@ def test_invalid_ini_value_is_usage_error(project: pytest.Pytester, name: str, v
     result.stderr.fnmatch_lines([pattern])
 
 
+@pytest.mark.process
 def test_invalid_option_value_is_usage_error(project: pytest.Pytester) -> None:
     for arguments, message in (
         (("--eidrive-detector", "lidra"), "*--eidrive-detector: unknown detector 'lidra'*"),

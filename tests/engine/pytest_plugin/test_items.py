@@ -33,6 +33,7 @@ def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> N
     result.stdout.no_fnmatch_line("*.py:*: *Error*")
 
 
+@pytest.mark.process
 def test_junit_file_of_two_workers_contains_all_runs(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-seeds", "2", "--eidrive-channel", "ideal,none", "-n", "2", "--junitxml", "junit.xml")
     result = project.runpytest_subprocess("xosc/far.xosc", "xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
@@ -85,6 +86,7 @@ def test_record_option_keeps_recordings_of_failed_runs(project: pytest.Pytester)
     ]
 
 
+@pytest.mark.process
 def test_topics_option_adds_topics_of_other_tools(project: pytest.Pytester) -> None:
     arguments = ("xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-topics", "osi,foxglove")
     project.runpytest_subprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1)
@@ -97,6 +99,7 @@ def test_topics_option_adds_topics_of_other_tools(project: pytest.Pytester) -> N
     wrong.stderr.fnmatch_lines(["*--eidrive-topics: not some of foxglove, osi (got 'rviz')*"])
 
 
+@pytest.mark.process
 def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> None:
     def hashes(*arguments: str) -> dict[str, str]:
         project.runpytest_subprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
@@ -112,6 +115,7 @@ def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> N
     assert len(set(forwards.values())) == 2
 
 
+@pytest.mark.process
 def test_failure_prints_reproducing_command_and_recording(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-channel", "{delay: {kind: constant, seconds: 0.1}}", "--eidrive-out", "kept runs")
     result = project.runpytest_subprocess("xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
@@ -133,6 +137,7 @@ def test_failure_prints_reproducing_command_and_recording(project: pytest.Pytest
     assert (printed["trace_hash"], printed["settings"]) == (kept["trace_hash"], kept["settings"])
 
 
+@pytest.mark.process
 def test_junit_properties_contain_all_settings(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-channel", "{loss: {kind: bernoulli, probability: 0.5}}", "--junitxml", "junit.xml")
     project.runpytest_subprocess("xosc/far.xosc", *arguments, "--eidrive-out", "runs", "-p", "no:cacheprovider")
@@ -147,6 +152,7 @@ def test_junit_properties_contain_all_settings(project: pytest.Pytester) -> None
     assert len(properties["settings_sha256"]) == 64
 
 
+@pytest.mark.process
 def test_failed_python_test_prints_command_of_run(project: pytest.Pytester) -> None:
     project.makepyfile(
         test_own="""

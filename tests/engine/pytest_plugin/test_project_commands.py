@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.process
+
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 CONFTEST = """\
 from eidrive_scenario.api.common import register

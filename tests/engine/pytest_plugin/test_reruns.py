@@ -27,6 +27,7 @@ def pytest_runtest_teardown(item):
 """
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("broken", [('value="5.0"', 'value="0.0"'), ('"step"', '"stp"')])
 def test_rerun_reads_and_runs_scenario_again(pytester: pytest.Pytester, broken: tuple[str, str]) -> None:
     """The scenario is corrected after the second attempt; failures and errors are both repeated."""
@@ -43,6 +44,7 @@ def test_rerun_reads_and_runs_scenario_again(pytester: pytest.Pytester, broken: 
     assert {entry.get("name"): entry.get("value") for entry in case.iter("property")}["min_distance.passed"] == "True"
 
 
+@pytest.mark.process
 def test_rerun_of_python_test_reports_last_attempt(pytester: pytest.Pytester) -> None:
     shutil.copy(PASSING_BY, pytester.path / "scene.xosc")
     pytester.makepyfile(
@@ -64,6 +66,7 @@ def test_rerun_of_python_test_reports_last_attempt(pytester: pytest.Pytester) ->
     assert "failed with channel none, seed 2" not in result.stdout.str()
 
 
+@pytest.mark.process
 def test_killed_worker_with_reruns_does_not_affect_other_runs(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -78,6 +81,7 @@ def test_killed_worker_with_reruns_does_not_affect_other_runs(
     result.stdout.fnmatch_lines(["*the process of the run was ended by SIGKILL"])
 
 
+@pytest.mark.process
 def test_ended_worker_is_reported_with_signal_or_exit_code(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """

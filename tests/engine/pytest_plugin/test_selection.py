@@ -75,6 +75,7 @@ def test_folder_named_like_effective_marker_has_no_marker(project: pytest.Pytest
     assert collected(project, "more", "-m", "slow") == ["slow/drive[seed=1]"]
 
 
+@pytest.mark.process
 def test_names_with_spaces_and_brackets_run(project: pytest.Pytester) -> None:
     """The name of the test has no space and no bracket but those of the settings."""
     folder = project.mkdir("my [odd] folder")
@@ -98,6 +99,7 @@ def test_empty_folder_has_no_tests(project: pytest.Pytester) -> None:
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
 
 
+@pytest.mark.process
 def test_last_failures_of_workers_run_again(project: pytest.Pytester) -> None:
     """A scenario that is corrected between two sessions passes in the second one."""
     path = project.path / "xosc" / "near" / "drive.xosc"

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from lxml import html
 
+pytestmark = pytest.mark.process
+
 pytest_plugins = ["pytester"]
 
 

@@ -85,6 +85,7 @@ def test_decide_rate_passes_errors_of_runs() -> None:
         decide_rate(run, success_rate(0.5))
 
 
+@pytest.mark.process
 def test_marker_decides_rate_over_seeds(project: pytest.Pytester) -> None:
     """A test that is not decided at its limit fails, and the report lists the first failed runs with their commands."""
     project.makepyfile(test_rates=TEXT)
@@ -122,6 +123,7 @@ def test_rate_of_runs_that_reach_their_time_limit_is_an_error(project: pytest.Py
     done.stdout.fnmatch_lines(["seed 1: ended by its time limit after 0.50 s", "reproduce: eidrive run*--seed 1*"])
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("argument", "expected"),
     [

@@ -41,6 +41,7 @@ def test_option_that_replaces_marker_list_warns(pytester: pytest.Pytester) -> No
     assert warnings_of(pytester.path / "junit.xml") == [CHANNEL, SEEDS]
 
 
+@pytest.mark.process
 def test_warning_of_worker_is_reported_by_controller(pytester: pytest.Pytester) -> None:
     options = ("--eidrive-channel", "latency_300ms", "-n", "2", "--junitxml", "junit.xml")
     result = session(pytester, [CHANNEL], *options)
@@ -49,6 +50,7 @@ def test_warning_of_worker_is_reported_by_controller(pytester: pytest.Pytester) 
     assert warnings_of(pytester.path / "junit.xml") == [CHANNEL] * 3
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("options", [(), ("--eidrive-channel", "ideal,none"), ("--eidrive-seeds", "3")])
 def test_option_equal_to_marker_list_does_not_warn(pytester: pytest.Pytester, options: tuple[str, ...]) -> None:
     result = session(pytester, [], *options)

@@ -28,6 +28,7 @@ def run(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
     return project.runpytest_subprocess("xosc", "-p", "no:cacheprovider", *arguments)
 
 
+@pytest.mark.exhaustive
 def test_run_without_criteria_is_an_error(bare: pytest.Pytester) -> None:
     result = run(bare, "--junitxml", "junit.xml")
     result.assert_outcomes(errors=1)
@@ -45,6 +46,7 @@ def test_run_without_criteria_is_an_error(bare: pytest.Pytester) -> None:
     run(bare, "--eidrive-criterion", "{collision: {of: Ego}}").assert_outcomes(passed=1)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("outcome", "warned"), [("warn", True), ("pass", False)])
 def test_ini_option_accepts_run(bare: pytest.Pytester, outcome: str, warned: bool) -> None:
     bare.makeini(f"[pytest]\neidrive_without_criteria = {outcome}")

@@ -91,6 +91,7 @@ def test_read_recording_of_undamaged_file_reports_no_damage(originals: list[Path
         assert "This recording is damaged" not in page
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(0 if COUNT > 100 else 600)
 def test_view_of_damaged_recordings_reports_the_damage(originals: list[Path], tmp_path: Path) -> None:
     outcomes: Counter[str] = Counter()

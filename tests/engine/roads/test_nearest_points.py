@@ -54,6 +54,7 @@ def test_nearest_points_with_pivots_equal_comparison_with_all(dimensions: int) -
     np.testing.assert_array_equal(distance, np.sqrt(square.min(axis=1)))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_tree_of_often_used_set_gives_the_same_points_as_comparisons(dimensions: int) -> None:
     generator = np.random.default_rng(dimensions)

@@ -17,6 +17,7 @@ from eidrive_scenario.roads import RoadNetwork, surface_meshes
 TOWNS = ("Town01", "Town03", "Town04", "Town05", "Town06")
 
 
+@pytest.mark.exhaustive
 def test_every_corpus_map_loads_and_has_surfaces(corpora: Path) -> None:
     files = sorted(corpora.rglob("*.xodr"))
     assert len(files) >= 40

@@ -29,6 +29,7 @@ def falling(x: float) -> float:
     return float(expit(-(x - 0.37) / 0.05))
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("runs", "error"), [(40, 0.0267), (80, 0.0172)])
 def test_error_is_at_most_that_of_probabilistic_bisection(runs: int, error: float) -> None:
     """Root mean square errors of probabilistic bisection on the same curve, from 400 repetitions in other code."""
@@ -36,6 +37,7 @@ def test_error_is_at_most_that_of_probabilistic_bisection(runs: int, error: floa
     assert math.sqrt(np.mean(np.square(found))) <= 1.25 * error
 
 
+@pytest.mark.statistical
 def test_interval_covers_boundary() -> None:
     """30 searches of 80 runs: 95 % credible intervals contain the boundary in at least 85 % of them."""
     found = [searched(seed, 80, falling) for seed in range(100, 130)]

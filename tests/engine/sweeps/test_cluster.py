@@ -38,6 +38,7 @@ def cluster() -> Iterator[object]:
         yield found
 
 
+@pytest.mark.statistical
 def test_sweep_on_cluster_equals_local_one_with_killed_worker(cluster: object, scenario: Path, tmp_path: Path) -> None:
     """One of two workers is killed while the sweep runs; its runs are repeated, and all rows are there."""
     points = points_of(parse_axes(["Speed=1:30:1"]), "grid", None, 1)

@@ -248,6 +248,7 @@ def test_killed_worker_is_a_row_and_others_are_unharmed(
     assert not progress.is_complete
 
 
+@pytest.mark.process
 def test_killed_sweep_continues_to_the_same_results(scenario: Path, tmp_path: Path) -> None:
     """SIGKILL of the command at 4 and at 20 rows; then all rows are those of an uninterrupted sweep."""
     store = tmp_path / "s.db"

@@ -29,6 +29,7 @@ def gaps(placements: dict[str, Placement]) -> list[float]:
     return [float(angle) * (RADIUS + 2.0) - LENGTH for angle in between]
 
 
+@pytest.mark.exhaustive
 def test_ring_of_cars_converges_to_equilibrium_gap(loop: RoadNetwork) -> None:
     driver = IntelligentDriver(lateral_acceleration=9.0)
     fleet = Fleet(loop, driver=driver)
@@ -141,6 +142,7 @@ def crossing_fleet(library_roads: RoadNetwork, seed: int) -> Fleet:
     return fleet
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_cars_pass_a_crossing_without_contact(library_roads: RoadNetwork, seed: int) -> None:
     fleet = crossing_fleet(library_roads, seed)

@@ -61,6 +61,7 @@ def test_each_car_starts_at_its_place() -> None:
         assert y == pytest.approx(lane_center, abs=1e-6)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("share", "low", "high"), [(0.0, 0, 0), (0.3, 8, 28), (1.0, 60, 60)])
 def test_share_of_drivers_ignores_red_lights(share: float, low: int, high: int) -> None:
     """Limits for 0.3 are three standard deviations of a binomial distribution of 60 drivers."""

@@ -26,6 +26,8 @@ from eidrive_scenario.v2x.radio.events import ReceptionBlock
 from eidrive_scenario.v2x.radio.reception import CAUSES
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
+pytestmark = pytest.mark.exhaustive
+
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "v2x_analytic_models.json").read_text(encoding="utf-8"))
 DISTANCES = (100, 200, 300)
 LENGTH, MIDDLE = 2000.0, 600.0

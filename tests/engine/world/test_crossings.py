@@ -30,6 +30,7 @@ def inside(world: World, begin: Array, end: Array, row: int, shrunk: float) -> b
     return bool((np.abs(local) < view.size[row] / 2.0 - shrunk).all(axis=1).any())
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("tilt", [0.0, 0.3])
 def test_crossed_actors_contain_points_of_the_line(car: CarFactory, seed: int, tilt: float) -> None:

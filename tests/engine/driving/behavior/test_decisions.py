@@ -88,6 +88,7 @@ def test_distant_ghost_is_approached_as_an_object(roads: RoadNetwork) -> None:
     assert ghost.front == pytest.approx(certain.front, abs=0.5)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("deviation", [0.5, 1.0])
 def test_doubled_covariance_increases_the_gap_by_its_growth(roads: RoadNetwork, deviation: float) -> None:
     fronts = [

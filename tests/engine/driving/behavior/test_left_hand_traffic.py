@@ -15,6 +15,8 @@ from eidrive_scenario.api.run import run_file
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.recording.frame import Frame
 
+pytestmark = pytest.mark.exhaustive
+
 LIBRARY = Path(__file__).parents[4] / "xosc"
 ROUNDING = 1e-9
 """Tolerance of positions [m] and headings [rad]."""

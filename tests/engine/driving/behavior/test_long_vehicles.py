@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from eidrive_scenario.api.run import RunSettings, Simulation, load_scenario
 from eidrive_scenario.library import library_path
+
+pytestmark = pytest.mark.exhaustive
 
 
 def test_bus_does_not_stop_in_the_way_of_a_car_that_appears(tmp_path: Path) -> None:

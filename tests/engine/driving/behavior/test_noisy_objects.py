@@ -231,6 +231,7 @@ def noise(seed: int, boxes: Sequence[KnownBox]) -> Callable[[float], Sequence[Kn
     return seen
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", range(3))
 def test_parked_vans_of_noisy_place_and_velocity_are_passed(roads: RoadNetwork, seed: int) -> None:
     vans = [PARKED, PARKED._replace(x=66.5)]

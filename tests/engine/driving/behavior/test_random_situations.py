@@ -64,6 +64,7 @@ def check(plan: Plan, count: int) -> None:
     assert all(0 <= row < count for row in plan.objects)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", range(24))
 def test_plans_are_finite_and_their_objects_exist(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -18,6 +18,7 @@ def test_library_has_the_scenes() -> None:
     assert len(SCENES) == 25
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("scene", SCENES)
 def test_behavior_arrives_without_collision_by_own_fault(scene: str) -> None:
     result = run_file(f"driving/{scene}", seed=1)
@@ -27,6 +28,7 @@ def test_behavior_arrives_without_collision_by_own_fault(scene: str) -> None:
     assert not result.warnings
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("scene", [scene for scene in SCENES if scene != "parked_cars"])
 def test_lane_follower_collides(scene: str) -> None:
     """Each scene contains a conflict: without a reaction there is a contact. Beside parked cars none is needed."""
