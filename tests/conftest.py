@@ -1,4 +1,7 @@
-"""Stacks of crashes: pytest sessions within tests redirect those of faulthandler to files that no longer exist."""
+"""Markers and crashes of all tests.
+
+Pytest sessions within tests redirect the stacks of faulthandler to files that no longer exist.
+"""
 
 from __future__ import annotations
 
@@ -20,3 +23,10 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     """Write the stack of a crash to the error output of the session again."""
     if item.config.pluginmanager.has_plugin("faulthandler"):
         faulthandler.enable(file=item.config.stash[_ERROR_OUTPUT])
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that start pytest sessions."""
+    for item in items:
+        if "pytester" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.process)
