@@ -122,7 +122,10 @@ class Perception:
         if self._pose_noise is not None:
             readings = self._pose_noise.displaced(readings)
         if (covariance := self.pose_covariance) is not None:
-            self.pose = self._pose_uncertainty(readings, covariance)
+            x, y, _ = readings.ego.position.tolist()
+            lagged = sum((source.lagged_covariance for source in self._pose_sources), np.zeros((3, 3)))
+            before = np.linalg.pinv(self._pose_errors.last_covariance, hermitian=True)
+            self.pose = PoseUncertainty(readings.time, x, y, covariance, lagged @ before)
             self._pose_errors.add(self.pose)
             self.set_pose(self.pose)
         return readings
@@ -131,13 +134,6 @@ class Perception:
         """Pass the uncertainty of the assumed pose in a time step to the tracker."""
         if self._tracker is not None:
             self._tracker.set_pose(pose)
-
-    def _pose_uncertainty(self, readings: Readings, covariance: Array) -> PoseUncertainty:
-        """Return the uncertainty of the assumed pose in these readings, with this covariance (3, 3)."""
-        x, y, _ = readings.ego.position.tolist()
-        lagged = sum((source.lagged_covariance for source in self._pose_sources), np.zeros((3, 3)))
-        before = self._pose_errors.last_covariance
-        return PoseUncertainty(readings.time, x, y, covariance, lagged @ np.linalg.pinv(before, hermitian=True))
 
     def pose_change(self, time: float) -> Array | None:
         """Return the covariance (3, 3) of the change of the pose error since the last call, until `time` [s].

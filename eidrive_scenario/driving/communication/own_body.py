@@ -150,12 +150,6 @@ class OwnBody:
                 self._tracks[station] = detections.tracks[inside[0]]
         return without_rows(detections, inside)
 
-    def _may_be_body(self, kind: str) -> bool:
-        """Return whether the body may be reported with this class. A roadside unit is no road user."""
-        if self._spec.category == "misc":
-            return kind == "misc"
-        return (kind in VULNERABLE) is (self._spec.category in VULNERABLE)
-
     def _likeliest_row(
         self,
         detections: Detections,
@@ -170,7 +164,9 @@ class OwnBody:
         body: Array | None = None
         best: tuple[float, int] | None = None
         for row, kind in enumerate(detections.classes):
-            if not self._may_be_body(kind):
+            # A station may be reported as of its group: a roadside unit, a vulnerable road user, or a vehicle.
+            category = self._spec.category
+            if kind != category and (category == "misc" or (kind in VULNERABLE) is not (category in VULNERABLE)):
                 continue
             covariance = detections.covariance[row]
             if not math.isfinite(covariance[0, 0]):

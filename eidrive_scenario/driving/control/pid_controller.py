@@ -104,7 +104,13 @@ class PidController(VehicleController):
             self._speed.reset()
             braking = max(plan.braking + _downhill(ego), 0.0)
             return Control(0.0, _pedal(braking, self.spec.max_deceleration), steering)
-        acceleration = self._accelerate(ego, plan) - _downhill(ego)
+        target, falling = _speed_here(ego, plan)
+        if target < STANDSTILL and ego.speed < STANDSTILL:
+            self._speed.reset()
+            acceleration = -HOLDING
+        else:  # fed forward with the deceleration of the speed profile
+            acceleration = self._speed.update(target - ego.speed, falling or plan.acceleration)
+        acceleration -= _downhill(ego)
         if acceleration >= 0.0:
             return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
         return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
@@ -112,14 +118,6 @@ class PidController(VehicleController):
     def hold_standstill(self) -> Control:
         """Return full brake with the last steering angle."""
         return Control(0.0, 1.0, self._steering)
-
-    def _accelerate(self, ego: EgoState, plan: Plan) -> float:
-        """Return the requested acceleration [m/s²], fed forward with the deceleration of the speed profile."""
-        target, falling = _speed_here(ego, plan)
-        if target < STANDSTILL and ego.speed < STANDSTILL:
-            self._speed.reset()
-            return -HOLDING
-        return self._speed.update(target - ego.speed, falling or plan.acceleration)
 
     def _steer(self, ego: EgoState, plan: Plan) -> float:
         x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)

@@ -52,7 +52,10 @@ class PlannedPath:
 
         Raise ValueError if the line has no length, or returns to its start within SPACING.
         """
-        self.points = _apart(_smooth(_resample(line)))
+        points = _resample(line)
+        for _ in range(SMOOTHING_PASSES):  # the first and the last point are unchanged
+            points[1:-1] = (points[:-2] + 2.0 * points[1:-1] + points[2:]) / 4.0
+        self.points = _apart(points)
         self.ends = ends
         self.limits = self._speed_limits()
         self.heights: Array | None = None
@@ -143,14 +146,6 @@ def _apart(points: Array) -> Array:
     if len(kept) < 2:
         raise ValueError("a path needs two different points")
     return kept
-
-
-def _smooth(points: Array) -> Array:
-    """Return smoothed points; the first and the last are unchanged."""
-    for _ in range(SMOOTHING_PASSES):
-        points = points.copy()
-        points[1:-1] = (points[:-2] + 2.0 * points[1:-1] + points[2:]) / 4.0
-    return points
 
 
 NEAR_PATH = 30.0

@@ -195,7 +195,11 @@ class RoutePlanner(Planner):
             return self._path
         self._goal = goal
         way = (None, None, None) if goal is None else (goal.path, goal.waypoints, goal.lap)
-        if self._path is None or not all(map(_same, way, self._way)):
+        is_same = all(
+            new is old or (new is not None and old is not None and np.array_equal(new, old))
+            for new, old in zip(way, self._way, strict=True)
+        )
+        if self._path is None or not is_same:
             self._way, self._progress, self._lane = way, 0, []
             self._path = self._build_path(ego, *way)
         return self._path
@@ -285,12 +289,6 @@ def _check_length(line: Array) -> None:
         x, y = line[-1, :2].tolist()
         message = f"the way to the destination at ({x:g}, {y:g}) m has a length of {length / 1000.0:,.0f} km"
         raise RouteError(Diagnostic(message, f"a way has at most {LONGEST_WAY / 1000.0:.0f} km: check the position"))
-
-
-def _same(first: Array | None, second: Array | None) -> bool:
-    if first is None or second is None:
-        return first is second
-    return first is second or np.array_equal(first, second)
 
 
 def _curve(x: float, y: float, yaw: float, waypoints: Array) -> Array:

@@ -185,7 +185,11 @@ def yolov5_onnx(arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tu
     middle = _cross_stage(graph, x, "middle.1", w4, d4)
     x = graph.conv_unit(middle, "coarse.0", w5, 3, 2)
     x = _cross_stage(graph, x, "coarse.1", w5, d5)
-    coarse = graph.conv_unit(_pyramid_pooling(graph, x, "coarse.2", w5), "lateral_coarse", w4)
+    pooled = [graph.conv_unit(x, "coarse.2.reduce", w5 // 2)]
+    for _ in range(3):
+        pooled.append(graph.max_pool(pooled[-1], 5))
+    x = graph.conv_unit(graph.concatenation(*pooled), "coarse.2.merge", w5)
+    coarse = graph.conv_unit(x, "lateral_coarse", w4)
     x = graph.concatenation(graph.doubled(coarse), middle)
     middle = graph.conv_unit(_cross_stage(graph, x, "merge_middle", w4, 1, shortcut=False), "lateral_middle", w3)
     x = graph.concatenation(graph.doubled(middle), fine)
@@ -210,10 +214,3 @@ def _cross_stage(graph: Graph, source: str, name: str, outputs: int, depth: int,
         x = graph.sum(x, out) if shortcut else out
     bypass = graph.conv_unit(source, f"{name}.around", half)
     return graph.conv_unit(graph.concatenation(x, bypass), f"{name}.merge", outputs)
-
-
-def _pyramid_pooling(graph: Graph, source: str, name: str, channels: int) -> str:
-    pooled = [graph.conv_unit(source, f"{name}.reduce", channels // 2)]
-    for _ in range(3):
-        pooled.append(graph.max_pool(pooled[-1], 5))
-    return graph.conv_unit(graph.concatenation(*pooled), f"{name}.merge", channels)

@@ -67,7 +67,9 @@ def ssd_candidates(scales: Iterable[tuple[Floats, Floats]], confidence: float) -
     boxes, scores, classes = [], [], []
     for level, (encoded, logits) in enumerate(scales):
         line, column, shape = np.nonzero(logits[..., 1:].max(axis=-1) - logits[..., 0] >= least)
-        probability = _softmax(logits[line, column, shape])[:, 1:]
+        chosen = logits[line, column, shape]
+        odds = np.exp((chosen - chosen.max(axis=1, keepdims=True, initial=-np.inf)).astype(float))
+        probability = (odds / odds.sum(axis=1, keepdims=True))[:, 1:]
         sizes = _default_sizes(level)[shape]
         stride = ssd_sizes.STRIDES[level]
         offset, scale = np.split(encoded[line, column, shape].astype(float), 2, axis=1)
@@ -99,11 +101,6 @@ def _corners(center: Array, size: Array) -> Array:
 def _sigmoid(raw: Floats) -> Array:
     with np.errstate(over="ignore"):  # infinity gives 0
         return np.asarray(1.0 / (1.0 + np.exp(-raw.astype(float))))
-
-
-def _softmax(raw: Floats) -> Array:
-    shares = np.exp((raw - raw.max(axis=1, keepdims=True, initial=-np.inf)).astype(float))
-    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
 def _logit(probability: float) -> float:

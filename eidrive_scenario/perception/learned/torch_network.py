@@ -104,16 +104,11 @@ class TorchNetwork:
         outputs: list[list[Floats]] = []
         for start in range(0, len(images), self._batch):
             part = images[start : start + self._batch]
-            together = self._outputs(part)
+            batch = np.zeros((self._batch, *part[0].shape), dtype=np.uint8)
+            batch[: len(part)] = part
+            with torch.inference_mode():
+                pixels = torch.from_numpy(batch).to(self._device).permute(0, 3, 1, 2)
+                found = self._network.raw_outputs(pixels.to(torch.float32).div_(255.0))
+                together = [output.cpu().numpy() for output in found]
             outputs += [[output[row : row + 1] for output in together] for row in range(len(part))]
         return outputs
-
-    def _outputs(self, images: Sequence[NDArray[np.uint8]]) -> list[Floats]:
-        """Return the outputs of a batch that these images begin."""
-        together = np.zeros((self._batch, *images[0].shape), dtype=np.uint8)
-        for row, image in enumerate(images):
-            together[row] = image
-        with torch.inference_mode():
-            pixels = torch.from_numpy(together).to(self._device).permute(0, 3, 1, 2)
-            outputs = self._network.raw_outputs(pixels.to(torch.float32).div_(255.0))
-            return [output.cpu().numpy() for output in outputs]

@@ -225,7 +225,8 @@ def fit_box(
             if heading_cost is not None:
                 turned = heading_cost(yaw)
             else:
-                turned = 0.0 if heading is None else _axis_cost(yaw - heading)
+                off = 0.0 if heading is None else (yaw - heading + math.pi / 2.0) % math.pi - math.pi / 2.0
+                turned = (off / LANE_DEVIATION) ** 2
             for name in classes:
                 cost = _cost(prior_of(name), spans, lengthwise, top, highest)
                 hypotheses.append(_Hypothesis(cost, turned, name, lengthwise, shape, spans))
@@ -294,12 +295,6 @@ def _hypothesis_spread(
             off = np.array([there[0] - center[0], there[1] - center[1]])
             spread += weight * np.outer(off, off)
     return spread / total
-
-
-def _axis_cost(angle: float) -> float:
-    """Return the squared deviation of an axis from its expected direction."""
-    off = (angle + math.pi / 2.0) % math.pi - math.pi / 2.0
-    return (off / LANE_DEVIATION) ** 2
 
 
 def _spans(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -60,7 +59,13 @@ def ground_height(points: Array, foot: float) -> Array:
     offset, where = np.full((SECTORS, bins), np.inf), np.zeros((SECTORS, bins))
     offset.ravel()[cell[low]] = points[low, 2] - plane[low]
     where.ravel()[cell[low]] = distance[low]
-    is_ground = _follow_ground(offset, where)
+    # Outward along each sector: a point is ground if it is hardly higher or lower than the last one that is.
+    is_ground = np.zeros(offset.shape, dtype=bool)
+    last, at = np.zeros(SECTORS), np.zeros(SECTORS)
+    for number in range(bins):
+        fits = np.abs(offset[:, number] - last) <= BEND * (where[:, number] - at) + ROUGHNESS
+        is_ground[:, number] = fits
+        last, at = np.where(fits, offset[:, number], last), np.where(fits, where[:, number], at)
     order = np.argsort(sector, kind="stable")
     bounds = np.searchsorted(sector[order], np.arange(SECTORS + 1))
     for number in range(SECTORS):
@@ -104,18 +109,6 @@ def _plane(plan: Array, rise: Array) -> Array:
             break
         best = np.asarray(np.linalg.lstsq(plan[on], rise[on], rcond=None)[0], dtype=np.float64)
     return best
-
-
-def _follow_ground(offset: Array, where: Array) -> NDArray[np.bool_]:
-    """Return whether the lowest point of each bin (SECTORS, bins) is ground, from plane offsets and distances."""
-    found = np.zeros(offset.shape, dtype=bool)
-    last, at = np.zeros(SECTORS), np.zeros(SECTORS)
-    for number in range(offset.shape[1]):
-        step = where[:, number] - at
-        fits = np.abs(offset[:, number] - last) <= BEND * step + ROUGHNESS
-        found[:, number] = fits
-        last, at = np.where(fits, offset[:, number], last), np.where(fits, where[:, number], at)
-    return found
 
 
 CELL = 0.1

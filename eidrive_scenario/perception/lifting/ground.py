@@ -97,12 +97,6 @@ def _hull(*quarter: tuple[float, float, float]) -> Array:
     return np.array([(a * x, b * y, z) for x, y, z in quarter for a, b in signs])
 
 
-def _sliced(hull: Array) -> Array:
-    """Return the points of a hull and points between its two ends, as a truncated body has its own outline."""
-    rear = hull * (-1.0, 1.0, 1.0)
-    return np.concatenate([hull + share * (rear - hull) for share in (0.0, 0.125, 0.25, 0.375, 0.5)])
-
-
 _BOX = _hull((0.5, 0.5, 0.0), (0.5, 0.5, 1.0))
 _CAR = _hull(
     (0.31, 0.45, 0.0), (0.5, 0.42, 0.15), (0.5, 0.42, 0.55), (0.4, 0.49, 0.2), (0.4, 0.49, 0.6), (0.22, 0.32, 1.0)
@@ -194,7 +188,9 @@ class _View:
         hulls = [_HULLS.get(name, _BOX) for name in classes]
         self._known = edges_in_image(boxes, camera)
         if not self._known[:, [0, 2]].all():
-            hulls = [_sliced(hull) for hull in hulls]
+            # A truncated body has its own outline: points between the two ends of each hull are added.
+            shares, mirrored = (0.0, 0.125, 0.25, 0.375, 0.5), np.array([-1.0, 1.0, 1.0])
+            hulls = [np.concatenate([hull + share * (hull * mirrored - hull) for share in shares]) for hull in hulls]
         most = max(map(len, hulls))
         self._hulls = np.array([np.resize(hull, (most, 3)) for hull in hulls])
         focal = float(camera.intrinsics[0, 0])

@@ -70,7 +70,9 @@ class Asn1Encoder:
             raise SettingError(Diagnostic(message, "check the file", source, line)) from error
         except Exception as error:  # asn1tools raises errors of many types for invalid modules
             names = ", ".join(str(file) for file in files)
-            message = f"{names}: {_without_quotes(error)}"
+            # The message of asn1tools quotes the line, which may be confidential.
+            place = re.search(r"line (\d+)", str(error))
+            message = f"{names}: not a valid ASN.1 module" + (f" in line {place[1]}" if place else "")
             raise SettingError(Diagnostic(message, "correct the module", source, line)) from error
         for kind in kinds:
             if TYPES[kind] not in self._modules.types:
@@ -110,12 +112,6 @@ class Asn1Encoder:
     def decode(self, kind: str, data: bytes) -> Any:
         """Return the content of an encoded message in the representation of asn1tools."""
         return self._modules.decode(TYPES[kind], data)
-
-
-def _without_quotes(error: Exception) -> str:
-    """Return the message of an asn1tools error without the quoted line, because the file may be confidential."""
-    place = re.search(r"line (\d+)", str(error))
-    return "not a valid ASN.1 module" + (f" in line {place[1]}" if place else "")
 
 
 def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -347,7 +347,10 @@ def _around(
     room = every - outer - 2.0 * body.half_width
     if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
-    value = max(outer + _beside_obstacle(room, clearance) + body.half_width, 0.0)
+    # As far beside the obstacle as it should be, else in the middle of the room, else at the least clearance.
+    beside = (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
+    beside = clearance + SPARE if room >= clearance + SPARE else beside
+    value = max(outer + beside + body.half_width, 0.0)
     stands = all(situation.objects[one.owner].still_since is not None for one in obstacle.objects)
     profile = passing(
         f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
@@ -361,13 +364,6 @@ def _around(
     if profile is not None and value + body.half_width > own:
         return msgspec.structs.replace(profile, uses_oncoming=True, passes_standing=stands)
     return profile
-
-
-def _beside_obstacle(room: float, clearance: float) -> float:
-    """Return the distance from an obstacle [m] if the road leaves `room` [m] in addition to the vehicle."""
-    if room >= clearance + SPARE:
-        return clearance + SPARE
-    return (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
 
 
 def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:

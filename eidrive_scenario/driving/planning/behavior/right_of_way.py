@@ -90,7 +90,10 @@ class JunctionRules:
         found = [self._passage(*run, along, heading, signs) for run in _runs(inside)]
         if not covered:
             return tuple(found)
-        roads = [_followed_road(*run, covered) for run in _runs(inside)]
+        roads: list[str | None] = []
+        for junction, first, last in _runs(inside):  # the connecting road that covers most points of a stay
+            counts = Counter(road for place, name, road in covered if name == junction and first <= place <= last)
+            roads.append(max(counts, key=lambda road: (counts[road], road), default=None))
         return tuple([passage._replace(road=road) for passage, road in zip(found, roads, strict=True)])
 
     def _lines_near(self, points: Array) -> list[StopLine]:
@@ -165,15 +168,6 @@ class JunctionRules:
         known = self._priorities.get(own.junction, frozenset())
         yields, precedes = (other.road, own.road) in known, (own.road, other.road) in known
         return None if yields == precedes else yields
-
-
-def _followed_road(junction: str, first: int, last: int, covered: list[tuple[int, str, str]]) -> str | None:
-    """Return the connecting road that covers most points of a stay in a junction; None without priorities there.
-
-    covered  points on connecting roads: index, junction and road
-    """
-    counts = Counter(road for owner, name, road in covered if name == junction and first <= owner <= last)
-    return max(counts, key=lambda road: (counts[road], road), default=None)
 
 
 def _runs(inside: list[set[str]]) -> Iterator[tuple[str, int, int]]:
