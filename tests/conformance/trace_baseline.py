@@ -3,7 +3,8 @@
     python tests/conformance/trace_baseline.py write baseline.json      # in the old checkout
     python tests/conformance/trace_baseline.py compare baseline.json    # in the new one; exit status 1 if any differs
 
-The runs cover all channel profiles and detectors of the library and the corpora under EIDRIVE_CORPORA, if that is set.
+The runs cover all scenarios of the library with three seeds, all channel profiles and detectors with two of them, and
+the corpora under EIDRIVE_CORPORA, if that is set.
 Only the command line is used, so that both checkouts may differ in any internal name. A hash depends on the versions
 of numpy and pybullet and on the processor; a baseline holds for the machine that wrote it.
 """
@@ -21,7 +22,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-LIBRARY = ("coop/scenario_1", "coop/scenario_2", "coop/scenario_1_late_rsu")
+SCENARIOS = Path(__file__).parents[2] / "xosc"
+LIBRARY = ("coop/scenario_1", "coop/scenario_2")
+"""Scenarios that are run with all channels and detectors."""
 CHANNELS = (
     "none", "ideal", "paper", "congested", "cv2x_highway", "80211p_urban", "5g_uu", "bursty", "error_30pct",
     "latency_300ms", "stochastic_latency", "paper_error_30pct", "paper_latency_300ms",
@@ -34,14 +37,20 @@ TIME_LIMIT = "30"
 
 def runs() -> Iterator[tuple[str, ...]]:
     """Yield the arguments of `eidrive run`, one tuple a run."""
-    for scenario in LIBRARY[:2]:
+    for scenario in LIBRARY:
         for channel in CHANNELS:
             for seed in SEEDS if channel in ALL_SEEDS else SEEDS[:1]:
                 yield scenario, "--channel", channel, "--seed", str(seed)
         for detector in DETECTORS:
             for channel in ("none", "paper"):
                 yield scenario, "--detector", detector, "--channel", channel
-    yield (LIBRARY[2],)
+    for path in sorted(SCENARIOS.rglob("*.xosc")):
+        name = path.relative_to(SCENARIOS).with_suffix("").as_posix()
+        if b"<ParameterValueDistribution" in path.read_bytes():
+            yield name, "--max-runs", "2"
+        elif b"<Storyboard" in path.read_bytes():
+            for seed in SEEDS:
+                yield name, "--seed", str(seed)
     for weather in ("foggy_morning", "storm"):
         yield LIBRARY[0], "--weather", weather, "--detector", "lidar"
     for path in corpus("*.xosc"):
@@ -93,9 +102,9 @@ def measure(workers: int) -> dict[str, Any]:
     """Return the outcomes of all runs by their arguments, and the number of diagnostics by file."""
     wanted = list(runs())
     with ThreadPoolExecutor(workers) as pool:
-        found = list(pool.map(outcome, wanted))
+        outcomes = list(pool.map(outcome, wanted))
     return {
-        "runs": {" ".join(arguments): one for arguments, one in zip(wanted, found, strict=True)},
+        "runs": {" ".join(arguments): given for arguments, given in zip(wanted, outcomes, strict=True)},
         "diagnostics": diagnostics(),
     }
 
