@@ -106,6 +106,7 @@ def worktrees() -> str:
     return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not is_repository(), reason="not a checkout of git")
 def test_comparison_measures_commits_and_removes_checkouts() -> None:
     before = worktrees()
@@ -135,6 +136,7 @@ def test_ratios_of_suites_are_those_of_sums_and_their_geometric_mean() -> None:
     assert "ratio of the sums 0.800, geometric mean of the ratios 1.000 (0.50 to 2.00)" in line
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not is_repository(), reason="not a checkout of git")
 def test_comparison_of_suites_counts_scenarios_that_end_by_themselves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import pytest
 from coverage_table import PAGE, SECTIONS, WITHOUT_EFFECT, marked_tests, page, unread
 
 from eidrive_scenario.registry import registry
 
 
+@pytest.mark.exhaustive
 def test_page_equals_generated_page() -> None:
     text = PAGE.read_text(encoding="utf-8")
     assert page(text) == text, "run `make docs`"
 
 
+@pytest.mark.exhaustive
 def test_rows_and_test_marks_match() -> None:
     names = {row.name for rows in SECTIONS.values() for row in rows}
     tests = marked_tests()

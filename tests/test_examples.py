@@ -26,12 +26,14 @@ def test_every_script_has_a_row_in_the_readme() -> None:
     )
 
 
+@pytest.mark.statistical
 def test_latency_sweep_high_latency_causes_collisions(tmp_path: Path) -> None:
     _, ideal, late = run("latency_sweep.py", "--seeds", "2", "--latency", "0", "0.3", folder=tmp_path)
     assert (ideal.split()[1], late.split()[1]) == ("2/2", "0/2")
     assert float(ideal.split()[-1]) > float(late.split()[-1])
 
 
+@pytest.mark.statistical
 def test_channel_load_increases_busy_ratio_and_age(tmp_path: Path) -> None:
     _, low, high = run("channel_load.py", "--density", "0.01", "0.12", folder=tmp_path)
     (_, busy, delivered, age, _), (_, busy_high, delivered_high, age_high, _) = low.split(), high.split()
@@ -40,6 +42,7 @@ def test_channel_load_increases_busy_ratio_and_age(tmp_path: Path) -> None:
     assert float(age) < float(age_high)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("channel", "braked"), [("none", False), ("ideal", True)])
 def test_step_by_hand_shows_why_the_ego_brakes(tmp_path: Path, channel: str, braked: bool) -> None:
     run("step_by_hand.py", "coop/scenario_1", "--channel", channel, "--out", "ego.csv", folder=tmp_path)

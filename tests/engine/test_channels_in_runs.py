@@ -54,6 +54,7 @@ def test_run_with_truck_between_antennas_has_the_model_blockage_loss(tmp_path: P
     assert read == blocked
 
 
+@pytest.mark.statistical
 def test_run_command_prints_statistics_of_every_link() -> None:
     done = CliRunner().invoke(app, ["run", str(ONE), "--channel", "cv2x_highway", "--no-record", "--json"])
     assert done.exit_code == 0, done.output
@@ -96,6 +97,7 @@ class SharedMemory(Channel):
         raise AssertionError("the channel is not replaced")
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("scenario", ["coop/scenario_1", "coop/scenario_2"])
 def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
     path = resolve_scenario(scenario)
@@ -120,6 +122,7 @@ def test_channel_that_cannot_continue_another_is_error_with_line() -> None:
             simulation.stack.request_channel("ideal", source="a.xosc", line=7)
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(
     "loss", ["{kind: bernoulli, probability: 1}", "{kind: by_distance, distances: [0], reception: [0]}"]
 )
@@ -143,6 +146,7 @@ def test_run_deliveries_with_more_loss_are_a_subset() -> None:
     assert received[0] > received[1] > received[2]
 
 
+@pytest.mark.exhaustive
 def test_run_with_reversed_entities_has_equal_links(tmp_path: Path) -> None:
     text = ONE.read_text()
     entities = re.findall(r"      <ScenarioObject .*?</ScenarioObject>\n", text, re.DOTALL)

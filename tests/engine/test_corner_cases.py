@@ -41,20 +41,24 @@ def test_ego_with_messages_passes_and_knows_the_actor_early(name: str) -> None:
     assert detection(result, actor) < 5.0
 
 
+@pytest.mark.exhaustive
 def test_ego_without_messages_knows_the_child_late_and_collides() -> None:
     result = play("pedestrian_parked_cars", "none")
     assert "collision" in failed(result)
     assert detection(result, "Child") > 7.0
 
 
+@pytest.mark.exhaustive
 def test_ghost_stops_the_ego() -> None:
     assert failed(play("ghost", "rsu")) == {"min_speed"}
 
 
+@pytest.mark.exhaustive
 def test_wrong_place_is_not_corrected_by_a_right_report() -> None:
     assert failed(play("contradicting_senders", "both")) == {"min_speed"}
 
 
+@pytest.mark.exhaustive
 def test_clock_behind_by_more_than_the_report_lifetime_hides_the_crossing_car() -> None:
     result = play("wrong_clock", "rsu", ClockOffset="-2.3")
     assert "collision" in failed(result)
@@ -62,6 +66,7 @@ def test_clock_behind_by_more_than_the_report_lifetime_hides_the_crossing_car() 
     assert any("does not use" in warning for warning in result.warnings)
 
 
+@pytest.mark.exhaustive
 def test_jammer_blocks_the_unit_from_its_start_on() -> None:
     result = play("jammer", "rsu")
     assert "collision" in failed(result)

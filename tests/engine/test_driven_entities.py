@@ -95,6 +95,7 @@ def test_controller_of_another_tool_is_replaced_with_a_warning(tmp_path: Path, a
     assert result.trace_hash == run_file(write(tmp_path, speed_xml(6)), settings=RunSettings(drive="Ego")).trace_hash
 
 
+@pytest.mark.exhaustive
 def test_stack_of_an_option_equals_that_of_the_file(tmp_path: Path) -> None:
     properties = {"detector": "lidar", "sensors": "{lidar: {channels: 8}}", "target_speed": 4}
     in_file = run_file(write(tmp_path, controller=agent_xml(**properties)))

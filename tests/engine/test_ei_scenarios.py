@@ -57,6 +57,7 @@ def test_lane_follower_collides(number: str, other: str, seed: int) -> None:
     assert not result.warnings
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("number", "time"), [("01", 2.77), ("03", 6.45), ("06", 6.45), ("11", 6.35), ("12", 4.0)])
 def test_time_of_collision_is_that_of_the_original_paths(number: str, time: float) -> None:
     # Contact of the boxes on EI-Drive's paths if all actors accelerate from standstill at 3 m/s²; in scenario 1 the
@@ -67,6 +68,7 @@ def test_time_of_collision_is_that_of_the_original_paths(number: str, time: floa
     assert float(at[1]) == pytest.approx(time, abs=0.25)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.xosc")), ids=lambda path: path.stem)
 def test_file_has_no_diagnostics(path: Path) -> None:
     report = check_scenario(path)
@@ -79,6 +81,7 @@ def test_files_are_valid_by_the_schema() -> None:
         schema.assertValid(etree.parse(path))
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("number", ["03", "05", "06", "09", "11"])
 def test_station_knows_the_hidden_vehicle_before_the_ego_sees_it(number: str) -> None:
     with Simulation(f"ei/scenario_{number}", seed=1, settings=WITH_ROUTE) as simulation:

@@ -116,6 +116,7 @@ def test_link_without_receptions_has_no_warning() -> None:
     assert texts({}) == []
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("latency", [1.1, 1.25, 1.4])
 def test_success_over_latency_ends_where_the_planner_expects_to_pass_first(latency: float) -> None:
     """At 4 s, the braking distance before the crossing, the planner gives way to a car that it expects before 6.1 s.

@@ -65,6 +65,7 @@ def test_braking_begins_when_the_message_about_the_area_arrives(name: str, laten
     assert braking_time(name, **given) == pytest.approx(expected, abs=0.16)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("name", "parameter"), [("crossing_car", "OtherKmh"), ("crossing_child", "WalkerKmh")])
 def test_latency_costs_the_gain_at_high_speeds_only(name: str, parameter: str) -> None:
     slow, fast = {"crossing_car": (25, 60), "crossing_child": (3, 8)}[name]

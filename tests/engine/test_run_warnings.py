@@ -43,6 +43,7 @@ def ours(warnings: tuple[str, ...]) -> list[str]:
     return [warning for warning in warnings if any(word in warning for word in words)]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_2", "coop/scenario_1_late_rsu"])
 @pytest.mark.parametrize("channel", ["none", "ideal", "latency_300ms"])
 def test_library_scenarios_run_without_warnings(name: str, channel: str) -> None:

@@ -94,6 +94,7 @@ def test_ego_receives_detection_of_hidden_car_before_line_of_sight() -> None:
     assert first("detections") > 3.0
 
 
+@pytest.mark.process
 def test_equal_seed_gives_equal_trace_in_any_order_and_process() -> None:
     first, other, again = play(seed=3).trace_hash, play(seed=4).trace_hash, play(seed=3).trace_hash
     assert first == again

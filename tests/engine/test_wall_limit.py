@@ -62,6 +62,7 @@ def test_hung_detector_is_interrupted_and_named(
     assert (package / "faulty.py").read_text().splitlines()[error.place.line - 1].strip() in lines
 
 
+@pytest.mark.exhaustive
 def test_hung_detector_in_another_thread_is_interrupted(package: Path, tmp_path: Path) -> None:
     errors: list[WallLimitError] = []
     thread = threading.Thread(target=lambda: errors.append(hung(tmp_path, "hangs")))
@@ -71,6 +72,7 @@ def test_hung_detector_in_another_thread_is_interrupted(package: Path, tmp_path:
     assert errors[0].place.name == "hangs"
 
 
+@pytest.mark.process
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("is_main", [True, False])
 def test_interruption_in_a_finalizer_aborts_the_run_at_its_next_step(
@@ -117,6 +119,7 @@ def test_run_that_ends_after_its_limit_is_aborted(
         simulation.run(wall_limit=1e-6)
 
 
+@pytest.mark.exhaustive
 def test_hung_constructor_is_interrupted_while_loading(package: Path, tmp_path: Path) -> None:
     with pytest.raises(WallLimitError, match=r"detector 'hangs_when_built'.*still running in __init__"):
         run_file(write_scenario(tmp_path / "s.xosc", detector="hangs_when_built"), wall_limit=3.0)
@@ -189,6 +192,7 @@ def test_interruption_while_a_block_ends_leaves_no_limit() -> None:
     assert 8 < event < 99
 
 
+@pytest.mark.exhaustive
 def test_limits_that_end_with_their_blocks_leave_none() -> None:
     """The limit is reached about when the block ends, in the main thread and in another one."""
 

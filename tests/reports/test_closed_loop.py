@@ -28,6 +28,7 @@ def test_jobs_of_seed_contain_all_arms() -> None:
     assert {job.settings.detector for job in jobs(("yolov5",), ("none",), 3)} == {"yolov5"}
 
 
+@pytest.mark.statistical
 def test_main_with_oracle_avoids_collisions_only_by_cooperation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -224,6 +224,7 @@ def trial() -> PerceptionRecord:
     return run_trial("coop/scenario_4", 1, settings, "Ego", [*arms, *faulty("none"), *faulty("early")])[1]
 
 
+@pytest.mark.exhaustive
 def test_no_fusion_is_equal_under_all_faults(trial: PerceptionRecord) -> None:
     alone = trial.tallies[Condition("none").name]
     assert len(alone.scores) > 0

@@ -68,6 +68,7 @@ def test_page_escapes_bars_of_tables() -> None:
     assert "car \\| truck |" in library_page([LibraryScenario("a/b", "a", "car | truck")])
 
 
+@pytest.mark.exhaustive
 def test_command_draws_selected_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["pipeline/scenario_1", "--root", str(tmp_path)]) == 0
     (path,) = (tmp_path / "docs" / "library").iterdir()

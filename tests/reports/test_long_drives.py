@@ -96,6 +96,7 @@ def test_table_lists_long_stops_with_their_reason() -> None:
     ]
 
 
+@pytest.mark.exhaustive
 def test_main_drives_a_ring_with_traffic_to_the_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Half a minute at 70 % of 50 km/h are 292 m, plus the rest of the last half circle."""
     arguments = [str(ring(tmp_path)), "--minutes", "0.5", "--vehicles", "4", "--out", str(tmp_path), "--workers", "1"]

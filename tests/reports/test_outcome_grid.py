@@ -29,6 +29,7 @@ def write(tmp_path: Path) -> Write:
     return file
 
 
+@pytest.mark.exhaustive
 def test_grid_holds_each_value_in_each_arm(write: Write) -> None:
     path = write(values_xml("EgoKmh", "55", "20"), values_xml("OtherKmh", "50"))
     arms = {"alone": {"Participants": "none"}, "together": {"Participants": "rsu"}}
@@ -76,6 +77,7 @@ def test_heat_map_shows_speeds_and_counts() -> None:
     np.testing.assert_array_equal(np.ma.filled(speeds, np.nan), [[np.nan, 18.0], [np.nan, np.nan]])
 
 
+@pytest.mark.exhaustive
 def test_command_writes_one_figure_per_distribution(write: Write, tmp_path: Path) -> None:
     path = write(values_xml("EgoKmh", "20"), values_xml("OtherKmh", "50"))
     assert main([str(path), "--out", str(tmp_path / "maps"), "--workers", "1", "--param", "LeadTime=2"]) == 0

@@ -41,6 +41,7 @@ def episodes() -> list[Episode]:
     ]
 
 
+@pytest.mark.statistical
 def test_report_states_precision_recall_and_volume(tmp_path: Path) -> None:
     report = perception.report(episodes(), perception.DETECTORS)
     data = report.data()

@@ -76,6 +76,7 @@ def test_episode_without_metric_is_an_error() -> None:
         table_2.report(runs, ("oracle",))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("arm", ["oracle conflict_area ideal", "oracle behavior latency_300ms"])
 def test_table_2_measures_nothing_after_the_end_of_an_episode(arm: str) -> None:
     """The same run without the time limit, to the goal of the ego, has the same distances and collisions."""

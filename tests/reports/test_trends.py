@@ -32,6 +32,7 @@ def test_precision_by_delay_with_prediction_stays_1() -> None:
     assert curve.measured.tolist() == [1.0, 1.0]
 
 
+@pytest.mark.statistical
 def test_reception_by_distance_equals_expected_ratio_with_truck() -> None:
     """Five standard deviations of a proportion of 400 messages are at most 0.125."""
     distances = (300.0, 700.0, 1200.0, 2100.0)
@@ -42,6 +43,7 @@ def test_reception_by_distance_equals_expected_ratio_with_truck() -> None:
     assert clear.measured[1] - blocked.measured[1] > 0.4
 
 
+@pytest.mark.exhaustive
 def test_age_by_burst_grows_in_mean_but_not_in_peak() -> None:
     mean, peak = age_by_burst((1 / 0.7, 2.0, 10.0), messages=40_000)
     assert mean.expected == pytest.approx([0.11286, 0.130, 0.370], abs=5e-4)
@@ -50,6 +52,7 @@ def test_age_by_burst_grows_in_mean_but_not_in_peak() -> None:
     assert peak.measured == pytest.approx(peak.expected, rel=0.04)
 
 
+@pytest.mark.exhaustive
 def test_main_draws_all_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, few in (("DELAYS", (0.005, 0.2)), ("DISTANCES", (500,)), ("BURSTS", (2.0,)), ("SPEEDS", (15.0,))):
         monkeypatch.setattr(figures, name, few)

@@ -114,6 +114,7 @@ def test_hidden_actor_has_no_influence_before_its_detection(name: str, channel: 
     check_hidden_actors(name, channel, tmp_path)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", CAUTIOUS)
 def test_hidden_actor_has_no_influence_on_caution(name: str, tmp_path: Path) -> None:
     check_hidden_actors(name, "none", tmp_path, Caution="true")
@@ -141,6 +142,7 @@ def check_hidden_actors(name: str, channel: str, tmp_path: Path, **parameters: s
             assert before[:3] == after[:3], f"{actor} at step {step}"
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("name", "actor"),
     [

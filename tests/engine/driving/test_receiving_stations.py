@@ -113,6 +113,7 @@ def test_mast_receives_over_radio_channel(tmp_path: Path) -> None:
     assert any(item.message.sender == "Ego" for frame in frames for item in frame.steps["RSU"].inbox)
 
 
+@pytest.mark.exhaustive
 def test_mast_merges_points_of_selected_senders(tmp_path: Path) -> None:
     frames = {}
     for names in ("none", "Ego"):

@@ -209,6 +209,7 @@ class Track:
         pass
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("obeys", [True, False])
 def test_scenario_with_light_stops_obeying_car_until_green(tmp_path: Path, obeys: bool) -> None:
     """Light of the storyboard at 80 m: red from the start, green from 18 s on."""

@@ -46,6 +46,7 @@ def test_anytime_interval_without_runs_is_complete() -> None:
     assert math.isnan(found.share)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("rate", [0.5, 0.8, 0.95, 0.99])
 def test_confidence_sequence_covers_at_all_times(rate: float) -> None:
     """2,000 series of 200 runs: all 200 intervals of a series contain the rate in at least 95 % of them.

@@ -74,6 +74,7 @@ def test_run_jobs_with_dead_worker_raises_error(tasks: ModuleType) -> None:
         run_jobs(JOBS, tasks.die, workers=2)
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("workers", [1, 2])
 def test_run_jobs_raises_error_of_task(tasks: ModuleType, workers: int) -> None:
     with pytest.raises(ValueError, match="seed 0 is invalid"):

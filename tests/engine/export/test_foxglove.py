@@ -41,6 +41,7 @@ def scenario_1(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Frame], T
     return list(read_recording(result.recording).frames()), *decoded(folder / "f.mcap")
 
 
+@pytest.mark.exhaustive
 def test_topics_have_published_schemas(scenario_1: tuple[list[Frame], Topics, dict[str, str]]) -> None:
     _, _, schemas = scenario_1
     assert schemas["/tf"] == "foxglove.FrameTransforms"

@@ -79,6 +79,7 @@ def test_file_remains_an_undamaged_recording(recording: Path, complete: Path) ->
     assert judge_recording(complete).criteria == judge_recording(recording).criteria
 
 
+@pytest.mark.exhaustive
 def test_added_topics_replace_former_ones(recording: Path, complete: Path, tmp_path: Path) -> None:
     path = tmp_path / "recording.mcap"
     path.write_bytes(recording.read_bytes())

@@ -178,6 +178,7 @@ def several_reports(draw: st.DrawFn) -> tuple[list[Detections], list[int]]:
     return reports, labels
 
 
+@pytest.mark.exhaustive
 @settings(max_examples=150, deadline=None)
 @given(several_reports())
 def test_fuse_average_of_any_reports_is_the_mean_of_the_known_values(given: tuple[list[Detections], list[int]]) -> None:

@@ -24,6 +24,7 @@ def random_tracks(rng: np.random.Generator, count: int, spread: float) -> Table:
     return tracks
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("same_station", [True, False])
 @pytest.mark.parametrize("spread", [5.0, 60.0, 3000.0])
 def test_candidates_of_many_tracks_equal_those_of_one_by_one(spread: float, same_station: bool) -> None:

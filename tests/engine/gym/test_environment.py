@@ -34,6 +34,7 @@ def play(env: EidriveEnv, action: Any, seed: int | None = None, **options: Any) 
     return observations, rewards, info
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -59,6 +60,7 @@ def test_constant_target_speed_equals_run_of_route_planner_at_that_speed(speed: 
     assert info["end_reason"] == expected.end_reason == "stop trigger"
 
 
+@pytest.mark.process
 def test_same_seed_gives_the_same_episode_in_another_process() -> None:
     env = EidriveEnv(ONE, max_steps=80)
     observations, rewards, info = play(env, [0.2], seed=11)

@@ -25,6 +25,7 @@ def test_blocks_of_the_page_run_and_print_the_stated_output(capsys: pytest.Captu
             assert printed == expected, text
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("module", "library"), [("gymnasium", "Gymnasium"), ("pettingzoo", "PettingZoo")])
 def test_missing_library_is_an_error_with_the_command_that_installs_it(module: str, library: str) -> None:
     program = (

@@ -217,6 +217,7 @@ def test_read_arrays_returns_arrays_of_numpy_files() -> None:
         assert found[name].dtype == value.dtype
 
 
+@pytest.mark.exhaustive
 def test_read_arrays_hostile_archives_are_refused() -> None:
     with pytest.raises(ValueError, match="Python objects"):
         read_arrays(archive(a=array(np.array([{}], dtype=object))))

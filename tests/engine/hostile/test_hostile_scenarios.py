@@ -100,6 +100,7 @@ def test_check_and_run_excessive_sensor_memory_is_refused(write: Write, sensors:
     refused(write({"sensors": sensors}), words)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", [LONG, "/" + LONG, "../" * 2000 + "x", "a/" * 2000])
 def test_check_and_run_path_of_5000_letters_is_refused(write: Write, name: str) -> None:
     refused(write(road=name), "is neither in the folder of the scenario")
@@ -131,6 +132,7 @@ def test_check_and_run_millions_of_unknown_elements_are_refused(write: Write) ->
     refused(path, "more than 2000000 elements and attributes")
 
 
+@pytest.mark.exhaustive
 def test_check_and_run_diagnostics_are_limited(write: Write) -> None:
     path = write()
     path.write_text(path.read_text().replace("<Entities>", "<Entities>\n" + "<UnknownThing/>\n" * 100_000))

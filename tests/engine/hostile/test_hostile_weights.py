@@ -193,6 +193,7 @@ def test_run_without_weights_writes_only_to_its_output_folder(write: Write, tmp_
     assert [event for event in found["events"] if event[0] == "writes"]  # type: ignore[attr-defined]
 
 
+@pytest.mark.process
 def test_run_with_onnx_weights_writes_nothing_into_the_home_directory(write: Write, tmp_path: Path) -> None:
     """ONNX Runtime writes from native code, which an audit hook cannot see, and stops doing so under CI services."""
     pytest.importorskip("onnxruntime", reason="needs the extra 'onnx'")

@@ -114,6 +114,7 @@ def test_random_expressions_raise_only_expression_errors(text: str) -> None:
     assert math.isfinite(result)
 
 
+@pytest.mark.exhaustive
 @given(st.text(max_size=80))
 def test_python_names_in_expressions_raise_error(text: str) -> None:
     try:

@@ -295,6 +295,7 @@ def test_scenario_expressions_execute_no_python_code(audit_log: AuditLog) -> Non
     assert refused > LOADED / 4
 
 
+@pytest.mark.exhaustive
 @settings(deadline=None, max_examples=500)
 @given(st.text(max_size=MAX_LENGTH + 50), st.dictionaries(st.text("abc_", min_size=1), st.floats() | st.integers()))
 def test_parameter_values_execute_no_python_code(text: str, parameters: dict[str, float]) -> None:

@@ -57,6 +57,7 @@ def located(scenario: Scenario) -> Iterator[tuple[Element, int, str]]:
             yield element, element.line, element.source
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", scenarios())
 def test_library_scenarios_are_read_again_as_before(name: str) -> None:
     first, *again = (load_scenario(name) for _ in range(4))

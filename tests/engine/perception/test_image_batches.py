@@ -75,6 +75,7 @@ def assert_equal(found: Detections, expected: Detections) -> None:
     assert found.classes == expected.classes
 
 
+@pytest.mark.exhaustive
 def test_prepared_detectors_return_the_same_with_one_computation_per_network(
     images: Sequence[CameraReading], memory: ImageMemory | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

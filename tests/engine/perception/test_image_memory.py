@@ -81,6 +81,7 @@ def test_least_recently_used_image_is_removed(memory: ImageMemory, monkeypatch: 
     assert processed == [1]
 
 
+@pytest.mark.statistical
 def test_runs_with_the_memory_have_the_same_trace() -> None:
     """The second arm differs by its messages only, and reuses the images before its vehicle drives differently."""
     plain = RunSettings(detector="yolov5", channel="ideal", time_limit=0.5)

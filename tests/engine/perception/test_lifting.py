@@ -86,6 +86,7 @@ def test_lift_from_mast_has_small_position_error() -> None:
     assert np.percentile(errors, 90) < 1.2
 
 
+@pytest.mark.exhaustive
 def test_lift_covariance_grows_with_distance_and_is_consistent() -> None:
     """Cars of varied size, box errors of a pixel: squared Mahalanobis distances of two degrees of freedom."""
     view, rng = camera(z=1.5), np.random.default_rng(6)

@@ -39,6 +39,7 @@ def test_lift_box_that_no_body_fills_has_score_zero(name: str, edges: list[float
     assert found.scores.tolist() == [0.0, 0.8]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("size", [0.85, 1.0, 1.15])
 @pytest.mark.parametrize("name", ["car", "truck", "pedestrian"])
 def test_lift_bodies_of_unusual_size_keeps_scores(name: str, size: float) -> None:

@@ -85,6 +85,7 @@ def found(boxes: Sequence[Sequence[float]], scores: Sequence[float], classes: tu
 NOTHING = found([], [], ())
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("weather", [None, NIGHT, RAIN], ids=["day", "night", "rain"])
 @pytest.mark.parametrize("state", ["red", "redYellow", "yellow", "green"])
 def test_read_without_boxes_returns_lamp_states_at_map_positions(state: str, weather: Weather | None) -> None:

@@ -153,6 +153,7 @@ def effective_samples(series: np.ndarray) -> float:
     return series.size / (1.0 + 2.0 * sum(correlation[1:vanishes]) / correlation[0])
 
 
+@pytest.mark.statistical
 def test_localizer_nees_in_simulated_world_is_within_chi_square_bounds() -> None:
     """Twelve drives of 20 s of the single-track model with tire slip, with simulated sensors.
 

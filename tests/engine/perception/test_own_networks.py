@@ -61,6 +61,7 @@ def test_onnx_model_passes_the_checker_of_onnx(name: str) -> None:
     assert shapes[0][2:] == [48, 64]
 
 
+@pytest.mark.exhaustive
 @NETWORKS
 @RUNTIMES
 def test_runtime_outputs_equal_trained_network_of_torch(name: str, runtime: Runtime) -> None:

@@ -197,6 +197,7 @@ def resolved_versions(path: Path) -> dict[str, str]:
         return dict(simulation.resolved.versions)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("runtime", ["onnxruntime", "openvino", "opencv"])
 def test_process_can_be_interrupted_after_another_thread_freed_a_network(runtime: Runtime) -> None:
     """OpenVINO sets a stack for signals of its thread, and frees the memory of this stack with its core."""

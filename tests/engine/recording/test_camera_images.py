@@ -69,6 +69,7 @@ def test_projected_box_is_drawn_at_its_projected_corners() -> None:
     np.testing.assert_array_equal(draw(ahead, behind), changed)
 
 
+@pytest.mark.exhaustive
 def test_run_writes_camera_images_of_all_stations(tmp_path: Path) -> None:
     """Cameras of 10 Hz expose in every second tick. The trace hash does not depend on image files."""
     pytest.importorskip("torch", reason="needs the extra 'learned'")

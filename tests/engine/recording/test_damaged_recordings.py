@@ -204,6 +204,7 @@ def _forged(path: Path, source: Path, change: Callable[[bytes], bytes]) -> Path:
     return path
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("number", range(11))
 def test_view_of_forged_recording_raises_no_internal_error(originals: list[Path], tmp_path: Path, number: int) -> None:
     import random
@@ -217,6 +218,7 @@ def test_view_of_forged_recording_raises_no_internal_error(originals: list[Path]
     assert "internal error" not in error
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("number", range(11))
 def test_picture_of_forged_recording_raises_no_internal_error(
     originals: list[Path], tmp_path: Path, number: int

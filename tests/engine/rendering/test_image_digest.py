@@ -186,6 +186,7 @@ def image_of(street: Street) -> tuple[bytes, bytes]:
 CASES = [(part, name) for part, values in ALTERED.items() for name in values]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("part", "name"), CASES)
 def test_every_visible_change_of_an_input_changes_the_digest(part: str, name: str) -> None:
     usual = Street()

@@ -51,6 +51,7 @@ def kept_scenery(world: World) -> int:
     return len(world._pictures._renderer._kept)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("weather", names("weather"))
 @pytest.mark.parametrize(("pose", "ignore"), [(MAST, ()), (WAITING, ("Ego",))], ids=["mast", "waiting"])
 def test_traffic_is_drawn_into_cached_scenery(

@@ -184,6 +184,7 @@ def test_aborted_run_ends_the_page_without_verdicts() -> None:
     assert not events[-1][1]["verdict"].strip()
 
 
+@pytest.mark.exhaustive
 def test_run_waits_for_the_first_page() -> None:
     """The page is opened when the address is announced, and the wait would take an hour without it."""
     opened: list[threading.Thread] = []

@@ -211,6 +211,7 @@ def test_links_bypass_a_section_of_zero_length() -> None:
         assert network.roads["1"].sections[0].lanes[number].successors == (number,)
 
 
+@pytest.mark.exhaustive
 def test_corpus_maps_have_only_known_warnings(corpora: Path) -> None:
     """Each map has at most one warning per kind. The expected ones were verified in the files."""
     found: dict[tuple[str, str], list[int | None]] = {}

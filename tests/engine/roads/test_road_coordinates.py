@@ -83,6 +83,7 @@ def networks(draw: st.DrawFn, most: int = 3) -> RoadNetwork:
     return RoadNetwork(RoadMap("drawn", Header(), {road.id: road for road in drawn}, {}, {}, {}, ()))
 
 
+@pytest.mark.exhaustive
 @settings(max_examples=150, deadline=None)
 @given(networks(), st.data())
 def test_locate_inverts_pose_on_random_roads(network: RoadNetwork, data: st.DataObject) -> None:
@@ -107,6 +108,7 @@ def test_locate_inverts_pose_on_random_roads(network: RoadNetwork, data: st.Data
         assert (found.road, found.lane) == (road.id, lane)
 
 
+@pytest.mark.exhaustive
 @settings(max_examples=40, deadline=None)
 @given(networks())
 def test_array_poses_equal_scalar_poses(network: RoadNetwork) -> None:

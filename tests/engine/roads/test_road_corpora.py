@@ -29,6 +29,7 @@ def test_every_corpus_map_loads_and_has_surfaces(corpora: Path) -> None:
             assert all(np.all(np.isfinite(mesh.vertices)) for mesh in surface_meshes(network)), file
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("town", TOWNS)
 def test_lane_centers_equal_carla(corpora: Path, carla: Any, town: str) -> None:
     file = corpora / "carla_towns" / f"{town}.xodr"
@@ -45,6 +46,7 @@ def test_lane_centers_equal_carla(corpora: Path, carla: Any, town: str) -> None:
         assert network.lane_width(road, lane, waypoint.s) == pytest.approx(waypoint.lane_width, abs=1e-3)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("town", ["Town03", "Town05"])
 def test_lane_successors_equal_carla(corpora: Path, carla: Any, town: str) -> None:
     file = corpora / "carla_towns" / f"{town}.xodr"
@@ -60,6 +62,7 @@ def test_lane_successors_equal_carla(corpora: Path, carla: Any, town: str) -> No
     assert missing == 0
 
 
+@pytest.mark.exhaustive
 def test_locate_hundred_thousand_points_of_a_town(corpora: Path) -> None:
     network = RoadNetwork.load(corpora / "carla_towns" / "Town04.xodr")
     rng = np.random.default_rng(4)

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -53,6 +54,7 @@ def stations(boxes: Any, view: WorldView) -> list[TruthSensor]:
     return [TruthSensor(TruthSettings(**kind), boxes.spec(name)) for kind, name in zip(kinds, view.names, strict=False)]
 
 
+@pytest.mark.exhaustive
 def test_few_candidates_and_visibilities_equal_arrays(boxes: Any) -> None:
     draws = np.random.default_rng(11)
     shares: list[float] = []

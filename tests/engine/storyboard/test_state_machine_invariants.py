@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -172,6 +173,7 @@ def test_every_change_is_a_legal_transition(plan: Any, stop: Any, fresh: Any) ->
                 assert (change.before, change.after) in LEGAL[change.transition]
 
 
+@pytest.mark.exhaustive
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
 def test_children_are_active_only_in_running_parents(plan: Any, stop: Any, fresh: Any) -> None:
@@ -230,6 +232,7 @@ def test_one_action_controls_a_domain_of_an_actor(plan: Any, stop: Any, fresh: A
         assert len(held) == len(set(held))
 
 
+@pytest.mark.exhaustive
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
 def test_running_action_has_running_behaviours(plan: Any, stop: Any, fresh: Any) -> None:
@@ -255,6 +258,7 @@ def test_stopped_storyboard_does_not_change(plan: Any, stop: Any, fresh: Any) ->
         over = over or tree.root.state is ElementState.COMPLETE
 
 
+@pytest.mark.exhaustive
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
 def test_equal_plans_have_equal_changes(plan: Any, stop: Any, fresh: Any) -> None:

@@ -183,6 +183,7 @@ def test_spline_with_excess_equal_knots_ends_before_last_point() -> None:
     assert (way.at(0.0).x, way.at(5.0).x, way.at(way.length).x) == pytest.approx((0.0, 5.0, 20.0))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("order", "spacing"), [(4, 1.0), (20, 0.05)])
 def test_spline_of_many_points_is_sampled_in_linear_time(order: int, spacing: float) -> None:
     """With the knots 0, 1, 2, … point i is at the mean i + order / 2 of its inner knots: the curve is linear in its

@@ -98,6 +98,7 @@ def starts(storyboard: Storyboard) -> dict[tuple[str, ...], float]:
     return first
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("seed", range(10))
 def test_elements_start_not_before_their_earliest_time(build: Callable[..., Storyboard], seed: int) -> None:
     unreachable = reached = 0

@@ -44,6 +44,7 @@ def test_interval_covers_boundary() -> None:
     assert np.mean([one.low <= 0.37 <= one.high for one in found]) >= 0.85
 
 
+@pytest.mark.statistical
 def test_sharp_boundary_needs_few_runs() -> None:
     """A step at 0.113 within ±0.02 after at most 40 runs; a grid of this resolution has 26 values of several runs."""
     for seed in range(8):
@@ -59,6 +60,7 @@ def test_rising_rate_and_other_range_are_found() -> None:
     assert found.rising > 0.99
 
 
+@pytest.mark.statistical
 def test_bound_selects_other_place_of_curve() -> None:
     """The rate of 0.9 is at 0.37 - 0.05 ln 9 = 0.260."""
     found = [searched(seed, 160, falling, bound=0.9) for seed in range(10)]
@@ -72,6 +74,7 @@ def test_constant_outcome_has_no_boundary_in_range(always: bool) -> None:
     assert not is_found(found, 0.1)
 
 
+@pytest.mark.statistical
 def test_lapses_do_not_move_boundary() -> None:
     """One outcome in twenty is random; the median of ten searches is at the boundary."""
     found = [searched(seed, 120, lambda x: 0.025 + 0.95 * float(x < 0.6)).value for seed in range(10)]

@@ -89,6 +89,7 @@ def test_workers_use_project_of_command(
         workers.close()
 
 
+@pytest.mark.exhaustive
 def test_hung_run_on_cluster_is_one_row_and_waiting_runs_have_results(
     cluster: object, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -198,6 +199,7 @@ def test_end_of_scheduler_keeps_earlier_runs(scenario: Path, tmp_path: Path) -> 
         assert [run.status for run in store.runs()] == ["passed"]
 
 
+@pytest.mark.exhaustive
 def test_connect_without_scheduler_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("eidrive_scenario.experiments.sweeps.cluster.START", 0.5)
     with pytest.raises(SimulationError, match="no worker"):

@@ -47,6 +47,7 @@ def test_compare_counts_pairs_by_identity_across_versions(tmp_path: Path) -> Non
     assert not found.is_worse
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("second", "code", "expected"),
     [

@@ -46,6 +46,7 @@ def run_with(
         workers.close()
 
 
+@pytest.mark.exhaustive
 def test_hung_run_is_one_aborted_row_with_its_line(
     scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

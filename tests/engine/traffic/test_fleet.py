@@ -74,6 +74,7 @@ def test_car_added_between_decisions_reacts_in_the_next_step(loop: RoadNetwork) 
     assert fleet.speeds["first"] < before - 0.05
 
 
+@pytest.mark.exhaustive
 def test_string_of_cars_stops_for_obstacle_and_restarts_after_its_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     for k in range(5):
@@ -195,6 +196,7 @@ def test_add_with_used_name_is_an_error_until_removal(loop: RoadNetwork) -> None
     assert fleet.names == ("car",)
 
 
+@pytest.mark.exhaustive
 def test_cars_keep_their_order_over_a_long_run(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     wishes = (6.0, 14.0, 9.0, 12.0)

@@ -157,6 +157,7 @@ def test_lateral_path_is_a_quintic_of_stated_duration() -> None:
     assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
 
 
+@pytest.mark.statistical
 def test_dense_traffic_changes_lanes_without_contact() -> None:
     roads = street(right=3, length=3000.0)
     rng = np.random.default_rng(3)
@@ -193,6 +194,7 @@ def ending_lane() -> RoadNetwork:
     )
 
 
+@pytest.mark.exhaustive
 def test_cars_leave_ending_lane() -> None:
     """The lane is narrower than 2.2 m from s = 250 + 1.3/0.07 = 268.6 m on; the next sample is at 270 m."""
     roads = ending_lane()

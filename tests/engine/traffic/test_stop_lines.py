@@ -62,6 +62,7 @@ def test_following_car_stops_behind_waiting_car() -> None:
     assert places["me"].x - places["next"].x - 4.6 == pytest.approx(2.0, abs=0.3)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("orientation", "validity", "lane", "stops"),
     [

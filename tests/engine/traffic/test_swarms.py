@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from background_scene import DT, Scene, swarm
 from fleet_scene import view_of
 
@@ -12,6 +13,7 @@ from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.actor import Placement
 
 
+@pytest.mark.exhaustive
 def test_swarm_is_complete_in_first_step_and_keeps_its_number() -> None:
     """Cars may be outside the ellipse in the step in which they leave it, and are missing in the next one."""
     scene = Scene()
@@ -91,6 +93,7 @@ def test_swarm_around_absent_entity_spawns_no_cars() -> None:
     assert not [changes for changes in scene.run(1.0) if changes.additions]
 
 
+@pytest.mark.statistical
 def test_traffic_depends_on_the_seed_only() -> None:
     def trace(seed: int, *, company: bool = False) -> list[Placement]:
         scene = Scene(seed=seed)

@@ -50,6 +50,7 @@ def reach(distances: list[float], ratios: NDArray[np.float64], level: float) -> 
     return float(np.interp(-level, -np.asarray(ratios), distances))
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("fading", FADING)
 def test_80211p_delivery_ratio_over_distance_agrees_with_ns3(fading: str) -> None:
     """With equal packet error models: PDR within 0.03, distances of 90, 50 and 10 % within 5 %."""
@@ -61,6 +62,7 @@ def test_80211p_delivery_ratio_over_distance_agrees_with_ns3(fading: str) -> Non
         assert reach(table["distance_m"], ratios, level) == pytest.approx(expected, rel=0.05), level
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("fading", FADING)
 def test_80211p_range_with_default_curve_exceeds_ns3_by_the_snr_difference(fading: str) -> None:
     """The error rate is 50 % at 1.08 dB with the default curve (WiLabV2Xsim, soft decisions), at 5.99 dB with NIST.

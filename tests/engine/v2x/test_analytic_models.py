@@ -21,6 +21,7 @@ CAUSES = {"err_sen": "sensing", "err_rxb": "busy", "err_pro": "propagation", "er
 TOLERANCE = 1e-3
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("golden", GOLDEN["ieee80211p"], ids=lambda g: f"{g['veh_per_m']}-{g['rate_hz']}-{g['bytes']}")
 def test_ieee80211p_errors_equal_reference_curves(golden: dict[str, Any]) -> None:
     table = ieee80211p_errors(
@@ -63,6 +64,7 @@ def test_delivery_ratio_falls_with_density_at_every_distance() -> None:
     assert dense.channel_busy_ratio > sparse.channel_busy_ratio
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(
     "settings",
     [

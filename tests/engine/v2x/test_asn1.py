@@ -102,6 +102,7 @@ def test_encoder_with_invalid_modules_raises_with_source_and_reason(tmp_path: Pa
         Asn1Encoder([more], ["cam"])
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "types",
     [

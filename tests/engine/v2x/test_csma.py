@@ -52,12 +52,14 @@ def expected_share_of_two() -> float:
     return 2.0 * both / (1.0 + both)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("begin", [0.0, 3600.0, 50_000.0])
 def test_two_saturated_stations_overlap_as_often_as_their_markov_chain(begin: float) -> None:
     """A station that has one slot left senses the other one, at any time of a run."""
     assert share_of_overlaps(2, begin) == pytest.approx(expected_share_of_two(), abs=0.02)
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("stations", [5, 10])
 def test_saturated_stations_overlap_as_in_the_model_of_bianchi(stations: int) -> None:
     """G. Bianchi, IEEE JSAC 18(3), 2000: a station sends in a slot with probability 2 / (W + 1)."""

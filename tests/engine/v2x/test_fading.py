@@ -47,6 +47,7 @@ def test_nakagami_invalid_settings_raise(invalid: dict[str, object]) -> None:
         RadioProfile.model_validate({"fading": {"kind": "nakagami", **invalid}})
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
 def test_fading_changes_the_signal_of_each_message_and_not_the_path_loss(technology: str) -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}

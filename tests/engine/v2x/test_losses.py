@@ -37,6 +37,7 @@ def burst(probability: float, length: float) -> dict[str, object]:
     return {"kind": "gilbert_elliott", "probability": probability, "burst": length}
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("probability", "length"), [(0.05, 2.0), (0.1, 10.0), (0.3, 2.0), (0.3, 10.0)])
 def test_burst_loss_has_its_probability_and_burst_length(probability: float, length: float) -> None:
     """Burst lengths are geometric, so the standard error of their mean is length / sqrt(bursts)."""
@@ -82,6 +83,7 @@ def test_messages_delivered_with_more_bursts_are_delivered_with_fewer() -> None:
     assert all(larger > smaller for larger, smaller in pairwise(sets))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("length", "mean"), [(1 / 0.7, 0.11286), (2.0, 0.130), (10.0, 0.370)])
 def test_mean_age_depends_on_bursts_and_peak_age_does_not(length: float, mean: float) -> None:
     """d + T E[K²] / 2 E[K] with E[K] = 1 + p/r, E[K²] = 1 + p (2 + r) / r²; 30 % lost, T = 0.1 s, d = 0.02 s."""

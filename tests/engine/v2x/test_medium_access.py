@@ -96,6 +96,7 @@ def test_congestion_control_includes_background_traffic(congestion: dict[str, st
     assert len(starts) == pytest.approx(20.0 / max(least, DT), abs=1.5)
 
 
+@pytest.mark.statistical
 def test_limeric_saturated_channel_converges_to_the_fixed_point() -> None:
     """With 25 saturated stations the channel busy ratio converges to 0.4435 (see test_congestion).
 
@@ -115,6 +116,7 @@ def test_limeric_saturated_channel_converges_to_the_fixed_point() -> None:
     assert (times[2399] - times[1999]) / 4.0 == pytest.approx(0.4435, rel=0.01)
 
 
+@pytest.mark.statistical
 def test_background_traffic_reduces_deliveries_and_raises_busy_ratio() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (150.0, 0.0, 1.5)}
     free = radio(1, **QUIET)

@@ -31,6 +31,7 @@ PROFILES: list[dict[str, object]] = [
 ]
 
 
+@pytest.mark.statistical
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(PROFILES), st.integers(0, 5), st.sampled_from([(300,), (121, 3000)]), st.floats(0, 40))
 def test_radio_channel_delivers_each_message_once_after_arrival_and_counts_all(
@@ -106,6 +107,7 @@ def test_radio_channel_in_rotated_and_mirrored_scene_returns_equal_outcomes(prof
     assert outcomes(lambda x, y, z: (x, -y, z)) == original
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
 def test_radio_channel_on_rotated_lattice_returns_equal_outcomes(technology: str) -> None:
     """Equal powers stay equal although the distances of the rotated positions differ in their last digits."""

@@ -22,6 +22,7 @@ def test_reselection_counter_range_depends_on_the_interval(interval: float, low:
     assert SidelinkSettings(interval=interval).counter_range == (low, high)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("interval", "tick"), [(0.02, 0.01), (0.05, 0.05), (0.1, 0.1)])
 def test_resource_is_used_once_per_interval_for_the_reselection_counter(interval: float, tick: float) -> None:
     air = Air(radio(3, **MODE_4, sidelink={"interval": interval}), TWO, tick)
@@ -52,6 +53,7 @@ def test_last_transmission_on_a_resource_makes_no_reservation() -> None:
         assert kept or not first.reserves
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("keep", [0.0, 0.4, 0.8])
 def test_resource_is_kept_with_the_set_probability(keep: float) -> None:
     """A counter has a mean of 10 uses, and a resource 1 / (1 - keep) counters."""

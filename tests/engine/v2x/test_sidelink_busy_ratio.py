@@ -12,6 +12,7 @@ from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("rate", "size"), [(1, 190), (1, 760), (5, 190), (2, 400)])
 def test_busy_ratio_is_the_occupancy_of_subchannels(rate: int, size: int) -> None:
     """The ratio that 40 stations measure agrees with the used subchannels in their measured subframes."""

@@ -12,6 +12,7 @@ from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
+@pytest.mark.exhaustive
 def test_collisions_between_sensing_stations_are_rare() -> None:
     """60 stations share 400 resources: after the first seconds only selections in the same 100 ms collide."""
     places = many(60)

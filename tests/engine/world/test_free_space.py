@@ -39,6 +39,7 @@ def rays_meet(world: World, own: int, target: int) -> set[int]:
     return set(rows.tolist()) - {-2}
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("seed", range(6))
 def test_rays_through_free_space_meet_nothing(car: CarFactory, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -228,6 +228,7 @@ def duration(result: RunResult) -> float:
 class TestInClosedLoop:
     CAR = "ncap/crossing_car"
 
+    @pytest.mark.exhaustive
     def test_caution_avoids_the_collision_that_no_sensor_announces(self) -> None:
         blind = drive(self.CAR, Participants="none")
         careful = drive(self.CAR, Participants="none", Caution="true")
@@ -235,6 +236,7 @@ class TestInClosedLoop:
         assert blind.metrics["collision.impact_speed"] > 5.0
         assert careful.passed
 
+    @pytest.mark.statistical
     def test_cooperation_shows_as_less_caution(self) -> None:
         alone = drive(self.CAR, Participants="none", Caution="true")
         together = drive(self.CAR, Participants="both", Caution="true")
@@ -249,6 +251,7 @@ class TestInClosedLoop:
         old = drive(self.CAR, Participants="both", Caution="true", Latency="0.9")
         assert duration(old) > duration(fresh) + 0.5
 
+    @pytest.mark.exhaustive
     @pytest.mark.parametrize(("name", "participant"), [("coop/scenario_1", "rsu"), ("coop/scenario_2", "vehicle")])
     def test_caution_passes_the_scenarios_of_the_paper_with_and_without_messages(
         self, name: str, participant: str
