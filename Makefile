@@ -80,7 +80,7 @@ closed-loop: install  #- run the scenarios of the paper with learned detectors, 
 heat-maps: install  #- run the obstructed crossings over both speeds: reports/heat_maps/*.png
 	$(BIN)/python -m eidrive_reports.heat_maps --out reports/heat_maps
 
-library-pictures: install  #- draw the scenarios of the library: docs/library/*.png and the table in README.md
+library-pictures: install  #- draw the scenarios of the library: docs/library/*.png and docs/library.md
 	$(BIN)/python -m eidrive_reports.library_pictures
 
 planners: install  #- run the scenes for planners with two planners, 10 seeds each: reports/planner_scenes.md
