@@ -157,7 +157,7 @@ class DrivingStack(ABC):
 
     @property
     def settings(self) -> Mapping[str, AgentSettings]:
-        """Settings of the stations of the scenario, present or not; empty for a stack with settings of its own."""
+        """Settings of the stations of the scenario, present or not; empty for a stack with other settings."""
         return MappingProxyType({})
 
     @property

@@ -39,7 +39,7 @@ HOW_TO_JUDGE = "add one to the scenario or by --criterion '{collision: {of: Ego}
 
 
 class RunMeasures:
-    """What a run measures in each tick, apart from its criteria.
+    """Measurements of a run in each tick, apart from its criteria.
 
     stack  driving stack, whose stations are watched for standstill and false tracks
     """

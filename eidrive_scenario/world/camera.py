@@ -86,7 +86,7 @@ class UndrawnImage(Protocol):
 
 
 class VisibleState(NamedTuple):
-    """What cameras see of a world at one time [s], in addition to its static objects.
+    """Content of a world that cameras see at one time [s], in addition to its static objects.
 
     actors       specification and state of each actor, in the order of the rows of the view
     signals      states of the traffic signals by id

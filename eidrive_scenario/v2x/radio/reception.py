@@ -117,7 +117,7 @@ class Receiver:
     ) -> list[tuple[int, Bools]]:
         """Return the losses by background traffic, at the distances where its model has these path losses.
 
-        Each cause has a random number of its own: the key of the link is shifted by the place of the cause.
+        Each cause has a separate random number: the key of the link is shifted by the place of the cause.
         """
         table, loss_at = background
         distance = np.interp(mean_loss, loss_at, table.distance)

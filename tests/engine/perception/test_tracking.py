@@ -381,7 +381,7 @@ def test_position_of_standing_object_stays_as_uncertain_as_common_errors() -> No
     assert held.boxes[0, 0] == pytest.approx(53.0, abs=0.3)
 
 
-def test_pedestrian_who_stood_for_long_moves_at_once() -> None:
+def test_velocity_of_pedestrian_after_standstill_follows_at_once() -> None:
     """After 3 s at rest, two boxes of a walk of 1.5 m/s show it; a car that moved by 0.3 m may still stand."""
     speeds = {}
     for name in ("pedestrian", "car"):

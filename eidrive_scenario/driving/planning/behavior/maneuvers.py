@@ -347,7 +347,7 @@ def _around(
     room = every - outer - 2.0 * body.half_width
     if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
-    # As far beside the obstacle as it should be, else in the middle of the room, else at the least clearance.
+    # As far beside the obstacle as it should be, else in the middle of the gap, else at the least clearance.
     beside = (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
     beside = clearance + SPARE if room >= clearance + SPARE else beside
     value = max(outer + beside + body.half_width, 0.0)
