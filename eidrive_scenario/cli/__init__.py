@@ -101,6 +101,18 @@ class _Commands(Guarded):
         """Return the names of the commands."""
         return list(self.commands)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Select the project, by default that of the current folder, and return the command that the arguments name."""
+        from eidrive_scenario.project import enter_project, select_project
+
+        project: Path | None = ctx.params["project"]
+        with suppress(FileNotFoundError):  # The current folder is deleted
+            if project is None:
+                select_project(Path.cwd())
+            elif notice := enter_project(project):
+                echo(notice, err=True)
+        return super().resolve_command(ctx, args)
+
 
 app = typer.Typer(
     name="eidrive",
@@ -132,16 +144,7 @@ def _options(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Select the project, by default that of the current folder. `Guarded` and `_show_version` evaluate the others."""
-    from eidrive_scenario.cli.output import echo
-    from eidrive_scenario.project import enter_project, select_project
-
-    with suppress(FileNotFoundError):  # The current folder is deleted
-        if project is not None:
-            if notice := enter_project(project):
-                echo(notice, err=True)
-            return
-        select_project(Path.cwd())
+    """Declare the options of all commands, which `_Commands`, `Guarded` and `_show_version` evaluate."""
 
 
 _COLLECT_AFTER = 200_000
