@@ -79,7 +79,7 @@ class Surfaces(NamedTuple):
     glow: Floats
 
     @classmethod
-    def joined(cls, parts: Sequence[Surfaces]) -> Surfaces:
+    def concatenate(cls, parts: Sequence[Surfaces]) -> Surfaces:
         """Return the triangles of all parts in sequence."""
         return cls(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
 
@@ -114,7 +114,7 @@ def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pi
     nearness = 1.0 / depth
     x = pinhole.focal * x * nearness + pinhole.center_x
     y = pinhole.focal * y * nearness + pinhole.center_y
-    return VisibleGeometry(x, y, nearness, Surfaces.joined([surfaces for _, surfaces in parts]).take(whose))
+    return VisibleGeometry(x, y, nearness, Surfaces.concatenate([surfaces for _, surfaces in parts]).take(whose))
 
 
 def _sides(pinhole: Pinhole) -> Array:

@@ -25,7 +25,7 @@ _GLINT = 350.0
 
 
 class Circumstances(NamedTuple):
-    """What all pixels of an image share: camera, weather, its light, the image of the sky, and the grid of shadows."""
+    """Values that all pixels of an image share: camera, weather, its light, the image of the sky, and the grid of shadows."""
 
     view: CameraView
     weather: Weather
@@ -94,7 +94,7 @@ def together(first: Lit, second: Lit) -> Lit:
     if first.sunny is not None and second.sunny is not None:
         sunny = np.concatenate([first.sunny, second.sunny], axis=1)
     steady, whole = np.hstack([first.steady, second.steady]), np.hstack([first.whole, second.whole])
-    return Lit(Surfaces.joined([first.surfaces, second.surfaces]), steady, sunny, whole)
+    return Lit(Surfaces.concatenate([first.surfaces, second.surfaces]), steady, sunny, whole)
 
 
 def shade(
