@@ -25,7 +25,7 @@ _GLINT = 350.0
 
 
 class Circumstances(NamedTuple):
-    """Values that all pixels of an image share: camera, weather, its light, the image of the sky, and the grid of shadows."""
+    """Values that all pixels of an image share: camera, weather, its light, image of the sky, and grid of shadows."""
 
     view: CameraView
     weather: Weather
