@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hostile_scenario import Write
 from openscenario_xml import catalog_xml
-from processor_time import work_within
+from processor_time import within_readings
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -19,8 +20,7 @@ LONG = "x" * 5000
 def refused(path: Path, *words: str, line: bool = True) -> None:
     """Check and run report an error with the file and its line, without much work."""
     for command in (["check", str(path)], ["run", str(path), "--no-record"]):
-        with work_within(100):
-            result = CliRunner().invoke(app, command)
+        result = within_readings(100, partial(CliRunner().invoke, app, command))
         assert result.exit_code == 2, result.output
         assert "internal error" not in result.output
         errors = [one for one in result.output.splitlines() if "(warning" not in one and "(note" not in one]

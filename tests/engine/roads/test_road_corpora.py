@@ -10,7 +10,7 @@ import networkx as nx
 import numpy as np
 import pytest
 from lxml import etree
-from processor_time import work_within
+from processor_time import within_readings
 
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 
@@ -80,8 +80,7 @@ def test_locate_hundred_thousand_points_of_a_town(corpora: Path) -> None:
     width = tables.width.value(row, s - tables.section_start[tables.lane_section[row]])
     poses = tables.lane_poses(row, s, rng.uniform(-0.45, 0.45, len(rows)) * width)
     network.locate(poses.x[:1], poses.y[:1])
-    with work_within(5):
-        found = network.locate(poses.x, poses.y, poses.z)
+    found = within_readings(5, lambda: network.locate(poses.x, poses.y, poses.z))
     assert np.all(found.outside == 0.0)
     back = tables.road_poses(found.road, found.s, found.t)
     assert np.hypot(back.x - poses.x, back.y - poses.y).max() < 0.01
