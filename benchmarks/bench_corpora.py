@@ -25,10 +25,10 @@ from statistics import geometric_mean, median
 
 import numpy as np
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import EidriveError
-from eidrive_scenario.library import definition
+from eidrive_scenario.extensions.library import definition
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.road_map import Road

@@ -12,11 +12,11 @@ from statistics import median
 
 import numpy as np
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.randomness import generator
 
 DT = 0.05
 

@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, run_file
 

@@ -20,9 +20,9 @@ import numpy as np
 from detector_shares import print_table
 from random_scenes import random_scenes
 
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import points_in_box
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import points_in_box
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.lidar.detector import LidarDetector
 from eidrive_scenario.perception.tracking.method import TrackerSettings

@@ -20,11 +20,11 @@ from collections.abc import Iterator
 import numpy as np
 from timing import sum_of_minima
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.planner import BehaviorPlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.requests import Goal
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed

@@ -28,7 +28,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from radio_scenes import write_scenario
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from timing import print_shares, sum_of_minima, timed
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world import World

@@ -16,8 +16,8 @@ import cv2
 from eidrive_reports.street_view import look_at
 from eidrive_reports.weather_sheet import street
 
-from eidrive_scenario.library import names
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.extensions.library import names
 from eidrive_scenario.rendering.renderer import Renderer
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.lidar import Lidar

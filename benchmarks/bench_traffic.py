@@ -22,8 +22,8 @@ from statistics import median
 import numpy as np
 from timing import print_shares
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.traffic import Fleet

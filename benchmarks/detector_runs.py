@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from eidrive_scenario.library import library_path, resolve_scenario
+from eidrive_scenario.extensions.library import library_path, resolve_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 SCENARIO = "coop/scenario_1"

@@ -46,7 +46,7 @@ def planner_tick() -> float:
     from bench_planner import ROAD, TICKS, drive, timed_plans
     from timing import sum_of_minima
 
-    from eidrive_scenario.library import library_path
+    from eidrive_scenario.extensions.library import library_path
     from eidrive_scenario.roads import RoadNetwork
 
     roads, inputs = RoadNetwork.load(library_path() / ROAD), list(drive())
@@ -58,7 +58,7 @@ def heavy_traffic() -> float:
     from bench_planner import DT, SCENARIO, timed_ticks
     from timing import sum_of_minima
 
-    from eidrive_scenario.library import resolve_scenario
+    from eidrive_scenario.extensions.library import resolve_scenario
     from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
     settings = RunSettings(planner="behavior", detector="oracle")

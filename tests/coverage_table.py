@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model.element import USAGE, Element, Usage
-from eidrive_scenario.registry import registry
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "openscenario.md"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from coverage_table import PAGE, SECTIONS, WITHOUT_EFFECT, marked_tests, page, unread
 
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 
 
 @pytest.mark.exhaustive

@@ -25,7 +25,7 @@ from pathlib import Path
 for name in {PACKAGES!r}:
     place = Path(importlib.import_module(name).__file__)
     assert place.is_relative_to(sys.prefix), f"{{name}} is imported from {{place}}, not from the wheel"
-from eidrive_scenario.library import LIBRARY_FOLDER, library_path, resolve_scenario, scenarios
+from eidrive_scenario.extensions.library import LIBRARY_FOLDER, library_path, resolve_scenario, scenarios
 assert library_path().is_relative_to(sys.prefix), library_path()
 assert len(scenarios()) > 50, scenarios()
 assert list((Path(importlib.import_module("eidrive_scenario").__file__).parent / "perception" / "weights").iterdir())

@@ -15,11 +15,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, object_category
 from eidrive_scenario.perception.lifting.lifting import lift
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label

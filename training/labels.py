@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
 from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.rendering.meshes.signs import sign_face

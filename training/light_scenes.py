@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.geometry import overlap, rotation_matrix
+from eidrive_scenario.base.geometry import overlap, rotation_matrix
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.actor import ActorSpec, Placement

@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 from rich.progress import Progress
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.learned.image_network import resized
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.world import World

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller
 from eidrive_scenario.perception.detector import DetectorContext
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings

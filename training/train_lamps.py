@@ -18,8 +18,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.learned.lights import CROP, NONE, SHOWN, LightsOnMap, crops, save
-from eidrive_scenario.randomness import generator
 from training.light_scenes import LightScene, light_scenes
 
 VERSIONS = 12

@@ -5,10 +5,10 @@ Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, th
 """
 
 from eidrive_scenario import traffic
+from eidrive_scenario.base.requests import LONGEST_WAY, Goal, Override
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES, has_times
-from eidrive_scenario.requests import LONGEST_WAY, Goal, Override
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import (
     Condition,

@@ -3,7 +3,20 @@
 Stable: all names.
 """
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.geometry import (
+    box_distance,
+    footprint,
+    footprint_distance,
+    iou_bev,
+    overlap,
+    point_in_polygon,
+    points_in_box,
+    points_in_polygon,
+    wrap_angle,
+)
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.base.tolerances import EPSILON, TIME_TOLERANCE
 from eidrive_scenario.errors import (
     ConstraintError,
     Diagnostic,
@@ -17,27 +30,14 @@ from eidrive_scenario.errors import (
     quoted,
     suggestion,
 )
+from eidrive_scenario.extensions.registry import register, registry
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.files.atomic import exclusive, write_atomically
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.files.yaml_text import load_yaml
-from eidrive_scenario.geometry import (
-    box_distance,
-    footprint,
-    footprint_distance,
-    iou_bev,
-    overlap,
-    point_in_polygon,
-    points_in_box,
-    points_in_polygon,
-    wrap_angle,
-)
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.randomness import generator
-from eidrive_scenario.registry import register, registry
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
 from eidrive_scenario.roads.model.location import LaneKey
-from eidrive_scenario.settings import Settings, parse_settings
-from eidrive_scenario.tolerances import EPSILON, TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.view import Contact, WorldView
 

@@ -4,8 +4,9 @@ Stable: all names but those of driving stacks (`DrivingStack`, `EmptyStack`, `St
 `StackInputs`, `StackSettings`), which may change in a minor version.
 """
 
-from eidrive_scenario.coverage import PerceptionRegion, ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.communication.radio_line_of_sight import line_of_sight_states
@@ -23,7 +24,6 @@ from eidrive_scenario.driving.stack import (
 )
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import AgentStep, Plan, StationAction, StationPerception
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
 

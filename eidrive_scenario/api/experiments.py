@@ -3,7 +3,7 @@
 Stable: all names but those of jobs and average precision, which may change in a minor version.
 """
 
-from eidrive_scenario.content_digest import canonical_json, sha256_of
+from eidrive_scenario.base.content_digest import canonical_json, sha256_of
 from eidrive_scenario.experiments.average_precision import (
     area_in_order,
     average_precision,
@@ -28,7 +28,7 @@ from eidrive_scenario.experiments.statistics.paired import (
     paired_ratio,
     paired_spread,
 )
-from eidrive_scenario.library import (
+from eidrive_scenario.extensions.library import (
     LibraryScenario,
     definition,
     describe_scenarios,

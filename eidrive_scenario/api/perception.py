@@ -3,7 +3,7 @@
 Stable: all names except `lift` and `MapContext`, which may change with a minor version.
 """
 
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.lifting.lifting import lift

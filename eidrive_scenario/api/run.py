@@ -3,6 +3,7 @@
 Stable: all names.
 """
 
+from eidrive_scenario.base.wall_limit import limit_wall_time
 from eidrive_scenario.checks.rule import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.driving.step import StationAction
@@ -24,7 +25,6 @@ from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.rendering.tone_mapping import ideal_image
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
 from eidrive_scenario.simulation.tick import TickStart
-from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.road_objects import buildings

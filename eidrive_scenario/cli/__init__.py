@@ -24,7 +24,7 @@ from eidrive_scenario.cli.supervision import allow
 from eidrive_scenario.errors import ABORTED
 
 if TYPE_CHECKING:
-    from eidrive_scenario.registry import Registry
+    from eidrive_scenario.extensions.registry import Registry
 
 FUNCTIONS = {
     "run": "run:run",
@@ -66,7 +66,9 @@ class CommandTable(Mapping[str, Any]):
 
 def _added() -> Registry:
     """Return the commands of other packages."""
-    from eidrive_scenario.registry import registry  # late: a command of the engine does not read entry points
+    from eidrive_scenario.extensions.registry import (
+        registry,  # late: a command of the engine does not read entry points
+    )
 
     return registry("commands")
 
@@ -103,7 +105,7 @@ class _Commands(Guarded):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Select the project, by default that of the current folder, and return the command that the arguments name."""
-        from eidrive_scenario.project import enter_project, select_project
+        from eidrive_scenario.extensions.project import enter_project, select_project
 
         project: Path | None = ctx.params["project"]
         with suppress(FileNotFoundError):  # The current folder is deleted

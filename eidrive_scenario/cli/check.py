@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.base.wall_limit import LimitReached, limit_wall_time
 from eidrive_scenario.cli.options import HelpAll, takes_run_options
 from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError
 from eidrive_scenario.run_options import RunSettings, check_seconds
-from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
     from eidrive_scenario.checks.rule import CheckReport
@@ -95,7 +95,7 @@ def _check_file(path: Path, ignored: tuple[str, ...], settings: RunSettings, wal
         check_road_file,
         check_scenario,
     )
-    from eidrive_scenario.library import ROADS_SUFFIX, definition
+    from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition
     from eidrive_scenario.simulation.attribution import report_extension
 
     with limit_wall_time(wall_limit):
@@ -123,7 +123,7 @@ def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
 
     A folder selects its scenarios, which are checked with their roads, or its road files if it has no scenarios.
     """
-    from eidrive_scenario.library import ROADS_SUFFIX, SCENARIO_SUFFIX, resolve_scenario
+    from eidrive_scenario.extensions.library import ROADS_SUFFIX, SCENARIO_SUFFIX, resolve_scenario
 
     for given in paths:
         if not given or not os.path.isdir(given):

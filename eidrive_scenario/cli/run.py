@@ -127,7 +127,7 @@ def run(
 
     Without an option, the scenario file decides.
     """
-    from eidrive_scenario.library import definition, resolve_scenario
+    from eidrive_scenario.extensions.library import definition, resolve_scenario
 
     if json and log == STANDARD_OUTPUT:
         raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))

@@ -43,8 +43,8 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
 
     Example: eidrive list channels
     """
-    from eidrive_scenario import library
-    from eidrive_scenario.registry import registry
+    from eidrive_scenario.extensions import library
+    from eidrive_scenario.extensions.registry import registry
 
     if what is Names.scenarios:
         lines = _scenario_lines()
@@ -71,7 +71,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
 
 def _scenario_lines() -> list[str]:
     """Return one line per scenario: name, family and description."""
-    from eidrive_scenario.library import describe_scenarios
+    from eidrive_scenario.extensions.library import describe_scenarios
 
     return _columns([(entry.name, entry.family, entry.description) for entry in describe_scenarios()])
 
@@ -84,7 +84,7 @@ def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
 
 def _catalog_lines() -> list[str]:
     """Return one line per entry, and two lines about references from scenarios."""
-    from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path
+    from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, library_path
     from eidrive_scenario.openscenario.library_catalogs import library_catalog_entries
 
     rows = [("CATALOG", "ENTRY", "KIND", "LENGTH x WIDTH x HEIGHT", "MASS")]
@@ -109,7 +109,7 @@ def tree(
     Example: eidrive tree coop/scenario_1 --svg storyboard.svg
     """
     from eidrive_scenario.cli.console import console, storyboard_tree
-    from eidrive_scenario.library import resolve_scenario
+    from eidrive_scenario.extensions.library import resolve_scenario
     from eidrive_scenario.openscenario import load_scenario
     from eidrive_scenario.reporting.storyboard_diagram.diagram import write_storyboard_diagram
     from eidrive_scenario.roads import RoadNetwork

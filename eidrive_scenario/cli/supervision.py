@@ -19,7 +19,7 @@ from eidrive_scenario.cli.output import echo, has_all_characters, print_error, s
 from eidrive_scenario.errors import ABORTED, EidriveError, SimulationError, WallLimitError
 
 if TYPE_CHECKING:
-    from eidrive_scenario.wall_limit import Limit
+    from eidrive_scenario.base.wall_limit import Limit
 
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 _DEATH_SIGNAL = 1
@@ -49,9 +49,9 @@ def supervise(
         return
     import ctypes
 
+    from eidrive_scenario.base.wall_limit import set_last_resort
     from eidrive_scenario.experiments.hung_runs import last_resort
     from eidrive_scenario.files.bounded import file_in_memory
-    from eidrive_scenario.wall_limit import set_last_resort
 
     dump, notes = file_in_memory(), file_in_memory()  # stay open as long as the process
     finished, finish = os.pipe()

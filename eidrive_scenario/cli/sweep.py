@@ -115,7 +115,7 @@ def sweep(
     from eidrive_scenario.experiments.sweeps.store import ResultStore
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
     from eidrive_scenario.experiments.sweeps.workers import KeptFiles, LocalWorkers, Workers
-    from eidrive_scenario.library import definition, resolve_scenario
+    from eidrive_scenario.extensions.library import definition, resolve_scenario
 
     check_seconds("--wall-limit", wall_limit)
     check_record(record, out)

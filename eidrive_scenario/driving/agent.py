@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
-from eidrive_scenario.coverage import ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore, PointCloudSharing, ReportStore
@@ -20,7 +21,6 @@ from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, Plan, Statio
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control

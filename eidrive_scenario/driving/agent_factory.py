@@ -12,17 +12,17 @@ from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNE
 from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
+from eidrive_scenario.extensions.registry import construct, registry
+from eidrive_scenario.extensions.settings import Settings, parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
-from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.sensor import view_sectors
 from eidrive_scenario.sensing.settings import ImuSettings
-from eidrive_scenario.settings import Settings, parse_own_settings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationError
 
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError, quoted
-from eidrive_scenario.registry import registry
-from eidrive_scenario.settings import Settings, parse_settings, settings_type_of
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import Settings, parse_settings, settings_type_of
 
 NO_PLANNER = "none"
 """Planner of a station that does not drive: a parked vehicle, which holds its brake."""

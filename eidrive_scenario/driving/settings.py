@@ -14,6 +14,8 @@ from eidrive_scenario.driving.planner_settings import (
     split_planner_settings,
 )
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
 from eidrive_scenario.openscenario.conventions import property_entries
@@ -22,10 +24,8 @@ from eidrive_scenario.openscenario.values.parameters import parameter_hints, res
 from eidrive_scenario.perception.faults import MAX_FALSE_OBJECTS, FalseObject, PoseError
 from eidrive_scenario.perception.localization import PoseNoise
 from eidrive_scenario.perception.tracking.method import TrackerKind, tracker_setting
-from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.sensor import check_unique, default_sensor, parse_sensor
 from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSettings, TruthSettings
-from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.messages.message import StationClock
 
 NAME_PROPERTIES = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})

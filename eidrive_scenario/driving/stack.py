@@ -11,13 +11,13 @@ from typing import Any
 
 import msgspec
 
+from eidrive_scenario.base.requests import Goal, Overrides
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.detector import ImageDetections
-from eidrive_scenario.requests import Goal, Overrides
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.v2x.messages.message import LinkEvent

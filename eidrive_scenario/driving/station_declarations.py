@@ -12,14 +12,14 @@ from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
+from eidrive_scenario.extensions.registry import distributions, registry
+from eidrive_scenario.extensions.settings import optional_settings_type
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.registry import distributions, registry
 from eidrive_scenario.sensing.sensor import sensor_class
-from eidrive_scenario.settings import optional_settings_type
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.specs import actor_spec

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from eidrive_scenario.base.geometry import point_in_polygon
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planner_settings import Polygon
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.geometry import point_in_polygon
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.view import WorldView
 

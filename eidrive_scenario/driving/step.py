@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control

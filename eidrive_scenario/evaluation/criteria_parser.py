@@ -19,13 +19,13 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
+from eidrive_scenario.extensions.registry import construct, registry
+from eidrive_scenario.extensions.settings import parse_settings
 from eidrive_scenario.files.yaml_text import flow_yaml, key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import CRITERION_PREFIX, criteria_of, property_entries
 from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.values.parameters import Scope, parameter_hints, resolve_references
-from eidrive_scenario.registry import construct, registry
-from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 

@@ -15,10 +15,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from eidrive_scenario.errors import Diagnostic, EidriveError, InvalidResult, SettingError, quoted
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.geometry import points_of_boxes
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.geometry import points_of_boxes
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.crossing import crossing
 from eidrive_scenario.sensing.sensor import ABOVE_ROOF

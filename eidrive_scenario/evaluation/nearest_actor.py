@@ -8,8 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from eidrive_scenario.arrays import Bools
-from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.base.arrays import Bools
+from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.world.view import WorldView
 
 

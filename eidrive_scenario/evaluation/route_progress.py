@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import RoadNetwork, RouteError
 
 AHEAD, BEHIND = 30.0, 10.0

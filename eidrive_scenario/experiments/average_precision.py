@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.perception.learned.networks.suppression import covered, overlap
 
 LEAST_OVERLAP = 0.5

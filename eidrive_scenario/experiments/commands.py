@@ -1,7 +1,8 @@
 """Command lines that repeat runs.
 
-Paths in a command are absolute, so that it is valid in any folder. With a project (see `eidrive_scenario.project`) they
-are relative to its folder, which the command names once: after a copy of the project only this name changes.
+Paths in a command are absolute, so that it is valid in any folder. With a project (see
+`eidrive_scenario.extensions.project`) they are relative to its folder, which the command names once: after a copy of
+the project only this name changes.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.library import library_path, name_of, resolve_scenario
+from eidrive_scenario.extensions.library import library_path, name_of, resolve_scenario
+from eidrive_scenario.extensions.project import portable_path, selected_project
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.project import portable_path, selected_project
 from eidrive_scenario.run_options import OPTIONS, RunSettings
 from eidrive_scenario.simulation.result import RunResult
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 
+from eidrive_scenario.base.wall_limit import LastResort, Limit, set_last_resort
 from eidrive_scenario.errors import ABORTED, SimulationError, WallLimitError
-from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 _DUMP = "Timeout"
 """Beginning of a stack that faulthandler wrote at the limit."""

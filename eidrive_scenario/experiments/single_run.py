@@ -11,19 +11,19 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eidrive_scenario.base.wall_limit import limit_wall_time
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
+from eidrive_scenario.extensions.library import resolve_scenario
+from eidrive_scenario.extensions.registry import third_party_files
 from eidrive_scenario.files.atomic import atomic_output, exclusive
-from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
-from eidrive_scenario.registry import third_party_files
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_seed
 from eidrive_scenario.simulation import Observer, RunResult, Simulation
-from eidrive_scenario.wall_limit import limit_wall_time
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 

@@ -10,9 +10,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
-from eidrive_scenario.imports import optional_import
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.csv_writer import csv_text
 from eidrive_scenario.v2x.messages.message import LinkEvent

@@ -12,9 +12,9 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.assignment import associate
-from eidrive_scenario.detections import NOT_ESTIMATED, Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.assignment import associate
+from eidrive_scenario.base.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.method import FusionMethod, Report
 
 GATE = 4.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 
 TRACE_TOLERANCE = 0.01
 """Maximum relative excess of the trace of the result over the minimum trace.

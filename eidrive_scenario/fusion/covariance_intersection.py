@@ -9,16 +9,16 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.detections import CLASSES, Detections
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, means
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Objects, Table, group_tracks
 from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, fuse_headings
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
-from eidrive_scenario.settings import Settings
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 _BATCH = 16
 """Maximum number of receiving stations whose tracks are processed at once, so that their arrays fit in the cache."""

@@ -9,13 +9,13 @@ import numpy as np
 from msgspec.structs import replace
 from pydantic import PositiveFloat
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
 from eidrive_scenario.sensing.readings import LidarReading, Readings
-from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.message import PointCloud, compress
 
 

@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 
 import msgspec
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.sensing.readings import Readings
-from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.message import PointCloud, StationState
 
 

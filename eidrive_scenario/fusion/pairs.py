@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.assignment import assign
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.assignment import assign
 
 Table = NDArray[np.void]
 """Structured array of tracks; see `fusion.tracks.TRACK`."""

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.motion_models import (
     ACCELERATION_DENSITY,
     HEADING_DEVIATION,

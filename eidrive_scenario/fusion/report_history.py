@@ -11,7 +11,7 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Integers
+from eidrive_scenario.base.arrays import Integers
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, ranges
 from eidrive_scenario.fusion.tracks import TRACK, Rows, rows_of, update_tracks

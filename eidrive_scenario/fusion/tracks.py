@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs, ranges
 from eidrive_scenario.fusion.prediction import (

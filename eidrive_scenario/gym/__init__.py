@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from eidrive_scenario.base.imports import lazy_exports
 from eidrive_scenario.gym.environment import EidriveEnv
 from eidrive_scenario.gym.libraries import gymnasium
 from eidrive_scenario.gym.settings import (
@@ -24,7 +25,6 @@ from eidrive_scenario.gym.settings import (
     TargetSpeed,
 )
 from eidrive_scenario.gym.station_interface import RewardSettings
-from eidrive_scenario.imports import lazy_exports
 
 if TYPE_CHECKING:
     from eidrive_scenario.gym.parallel import EidriveParallelEnv

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import CLASSES, Detections
+from eidrive_scenario.base.geometry import footprint
 from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.step import StationPerception
-from eidrive_scenario.geometry import footprint
 from eidrive_scenario.gym.libraries import spaces
 from eidrive_scenario.gym.settings import GridSettings, ObservationSettings, RouteSettings, TableSettings
 from eidrive_scenario.sensing.readings import EgoState

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from eidrive_scenario.driving.planning.path import SPACING
 from eidrive_scenario.driving.planning.route_planner import HORIZON
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.settings import Settings, parse_settings
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 
 Speed: TypeAlias = Annotated[float, Field(ge=0.0, le=1e4)]
 

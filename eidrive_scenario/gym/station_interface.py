@@ -14,6 +14,7 @@ from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
 from eidrive_scenario.errors import NOT_JUDGED, Diagnostic, SettingError, suggestion
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
+from eidrive_scenario.extensions.settings import S, Settings, parse_settings
 from eidrive_scenario.gym.actions import ActionDecoder
 from eidrive_scenario.gym.episode import Episode, Transition
 from eidrive_scenario.gym.observations import ObservationEncoder
@@ -25,7 +26,6 @@ from eidrive_scenario.gym.settings import (
     TargetSpeed,
     parse_actions,
 )
-from eidrive_scenario.settings import S, Settings, parse_settings
 from eidrive_scenario.simulation import RunResult, Simulation
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.specs import actor_spec

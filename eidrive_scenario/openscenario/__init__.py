@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.imports import lazy_exports
+from eidrive_scenario.base.imports import lazy_exports
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.distributions.expansion import DistributionExpansion, load_distribution

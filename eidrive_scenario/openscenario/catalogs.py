@@ -9,11 +9,11 @@ from pathlib import Path
 import msgspec
 from lxml import etree
 
-from eidrive_scenario.content_digest import sha256_of
+from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
+from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
 from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
 from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Catalog,

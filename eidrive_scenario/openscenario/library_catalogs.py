@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eidrive_scenario.library import CATALOGS, library_path
+from eidrive_scenario.extensions.library import CATALOGS, library_path
 from eidrive_scenario.openscenario.model import Element, MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.reading.document import read_document
 

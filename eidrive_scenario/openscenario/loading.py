@@ -11,10 +11,10 @@ from pathlib import Path, PurePosixPath
 
 import msgspec
 
-from eidrive_scenario.content_digest import sha256_of
+from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import ErrorCollector
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.files.bounded import read_regular_file
-from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.reading.parsing import KeptFiles, Source

@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened, suggestion
+from eidrive_scenario.extensions.library import ROADS_SUFFIX, from_library, resolve_path
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import ROADS_SUFFIX, from_library, resolve_path
 from eidrive_scenario.openscenario.catalogs import CatalogFiles, CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (

@@ -16,13 +16,13 @@ from weakref import WeakKeyDictionary
 import msgspec
 from pydantic import Field, model_validator
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, quoted, suggestion
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import hide_parameters, parameter_hints, resolve_references
-from eidrive_scenario.randomness import generator
-from eidrive_scenario.settings import Settings, parse_settings
 
 COMMAND = "eidrive.variation"
 _EXPECTED = "give either uniform: [low, high] or normal: [mean, sd]"

@@ -10,13 +10,13 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import iou_bev
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import iou_bev
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
-from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from msgspec.structs import replace
 from pydantic import Field, model_validator
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import NOT_ESTIMATED, Detections
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import NOT_ESTIMATED, Detections
+from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.localization import at_pose
 from eidrive_scenario.sensing.readings import Readings
-from eidrive_scenario.settings import Settings
 
 MAX_FALSE_OBJECTS = 100
 """Maximum number of false objects of a station."""

@@ -10,12 +10,12 @@ import numpy as np
 from msgspec.structs import replace
 from pydantic import Field
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.sensing.readings import EgoState, GnssReading, ImuReading, Readings
 from eidrive_scenario.sensing.settings import ImuSettings
-from eidrive_scenario.settings import Settings
 
 X, Y, YAW, SPEED, TURN_BIAS, ACCELERATION_BIAS = range(6)
 PLANE = np.ix_((X, Y, YAW), (X, Y, YAW))

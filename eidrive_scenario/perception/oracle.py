@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
 

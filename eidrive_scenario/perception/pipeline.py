@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
@@ -19,7 +20,6 @@ from eidrive_scenario.perception.result_checks import check_detections, check_in
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 BODY_MARGIN = 0.9
 """Maximum distance of a detected box center from the outline of a body at which the box shows this body [m]. It is half

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.errors import InvalidResult
 
 LARGEST = 1e9

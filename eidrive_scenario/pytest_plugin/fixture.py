@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pytest
 
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
+from eidrive_scenario.extensions.library import definition, library_path, resolve_scenario
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.encodable import printable
-from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.failures import (
     add_error,
     add_failed_run,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from eidrive_scenario.errors import ConstraintError, InputError
+from eidrive_scenario.extensions.library import definition
 from eidrive_scenario.files.encodable import printable
-from eidrive_scenario.library import definition
 from eidrive_scenario.pytest_plugin.failures import (
     ScenarioFailed,
     add_error,

@@ -129,8 +129,8 @@ def _with_place(place: str, message: str) -> str:
 
 def _check_channels(place: str, value: list[str], folder: Path) -> None:
     """Check that profiles exist and that inline profiles are YAML; their settings are checked when a run loads them."""
+    from eidrive_scenario.extensions.library import library_path, resolve
     from eidrive_scenario.files.yaml_text import load_yaml
-    from eidrive_scenario.library import library_path, resolve
 
     for channel in split_channels(",".join(value)):
         if "{" in channel:
@@ -142,7 +142,7 @@ def _check_channels(place: str, value: list[str], folder: Path) -> None:
 def _check_extension(group: str) -> Callable[[str, str, Path], None]:
     def check(place: str, value: str, folder: Path) -> None:
         from eidrive_scenario.errors import SettingError
-        from eidrive_scenario.registry import registry
+        from eidrive_scenario.extensions.registry import registry
 
         if value not in registry(group):
             raise SettingError(registry(group).unknown(value, source=place))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.content_digest import canonical_json
+from eidrive_scenario.base.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.failures import WARNING, add_properties, record_of
 from eidrive_scenario.pytest_plugin.option_values import path_beside, split_channels
@@ -76,7 +76,7 @@ def _command(item: pytest.Item, source: Source | ConcreteRun) -> str:
     This is a run of a scenario without a file, or with extensions that only code of the tests registers.
     """
     from eidrive_scenario.experiments.commands import command_of_source
-    from eidrive_scenario.registry import has_unnamed_registrations
+    from eidrive_scenario.extensions.registry import has_unnamed_registrations
     from eidrive_scenario.simulation import RunSettings
 
     is_repeatable = command_of_source(source, 1, RunSettings()) and not has_unnamed_registrations()

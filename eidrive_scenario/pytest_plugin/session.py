@@ -18,13 +18,13 @@ from typing import IO, Any
 
 import pytest
 
+from eidrive_scenario.base.wall_limit import LastResort, Limit, set_last_resort
 from eidrive_scenario.errors import WallLimitError
 from eidrive_scenario.experiments.hung_runs import describe_report, last_resort
 from eidrive_scenario.pytest_plugin import markers
 from eidrive_scenario.pytest_plugin.failures import RunRecord, add_notes
 from eidrive_scenario.pytest_plugin.options import add_options, read_options, send_paths, wall_limit
 from eidrive_scenario.pytest_plugin.reports import register_attachments
-from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 WAIT = 5.0
 """Maximum duration from the end of the output of a worker to that of its process [s]."""
@@ -45,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     """Select the project of the root, as `eidrive` does, before a `conftest.py` registers further extensions."""
     from eidrive_scenario.errors import InputError
-    from eidrive_scenario.project import VARIABLE, select_project
+    from eidrive_scenario.extensions.project import VARIABLE, select_project
 
     if VARIABLE in os.environ:
         return

@@ -9,10 +9,10 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import box_corners, rotation_matrix
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.atomic import create
-from eidrive_scenario.geometry import box_corners, rotation_matrix
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.recording.frame import Frame

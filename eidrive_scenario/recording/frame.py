@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import quoted
 from eidrive_scenario.storyboard.state.element_states import StateChange

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.content_digest import package_versions
+from eidrive_scenario.base.content_digest import package_versions
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.codec import codec

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Floats
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
 

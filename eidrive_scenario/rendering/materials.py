@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.base.arrays import Floats
 
 Color = tuple[float, float, float]
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats, Integers
-from eidrive_scenario.content_digest import content_digest
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.content_digest import content_digest
 from eidrive_scenario.rendering.materials import MATERIALS, Color, finish_of
 
 Light = tuple[float, float, float]

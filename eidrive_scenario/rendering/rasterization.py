@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats, Integers
+from eidrive_scenario.base.arrays import Array, Floats, Integers
 
 _SHIFT = np.uint64(32)
 _LOW = np.uint64(0xFFFFFFFF)

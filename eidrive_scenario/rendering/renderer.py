@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.rendering.daylight import daylight, dome, horizon
 from eidrive_scenario.rendering.lamps import Beam, Lamplight, lamplight
 from eidrive_scenario.rendering.materials import SOAKS

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.content_digest import content_digest
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.content_digest import content_digest
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.rendering.lamps import Beam, glow, headlights
 from eidrive_scenario.rendering.materials import FACADES, MATERIALS, Color, by_name, paint
 from eidrive_scenario.rendering.meshes import actor_mesh

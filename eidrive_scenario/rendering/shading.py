@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.rendering.daylight import GROUND_ALBEDO, Daylight, sample
 from eidrive_scenario.rendering.lamps import LAMP_COLOR, Lamplight
 from eidrive_scenario.rendering.materials import GRAIN, MIRROR, RETURNS, SOAKS

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.rendering.model import MeshInstance
 from eidrive_scenario.rendering.projection import CameraView
 from eidrive_scenario.rendering.rasterization import Cover, greatest

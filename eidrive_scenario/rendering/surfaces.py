@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.rendering.daylight import sample
 from eidrive_scenario.rendering.projection import CameraView
 from eidrive_scenario.rendering.rasterization import Cover

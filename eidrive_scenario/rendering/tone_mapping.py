@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.world.camera import CameraImage, Radiance
 
 LUMA: Array = np.array([0.2126, 0.7152, 0.0722])

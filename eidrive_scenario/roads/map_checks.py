@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lateral_axis
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.map_warnings import (

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads.attributes import RoadAttributes
 from eidrive_scenario.roads.geometry import poses

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.roads.model.location import Pose
 from eidrive_scenario.roads.model.road_map import Corner, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
-from eidrive_scenario.tolerances import EPSILON
 
 LONGEST_PART = 5.0
 """Maximum length of a part of an object that repeats without gaps, such as a barrier [m]."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road, RoadMark
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import outlines

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeGuard
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.project import portable_path
+from eidrive_scenario.extensions.project import portable_path
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.values.parameters import Assignment

@@ -11,10 +11,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
-from eidrive_scenario.content_digest import content_digest
+from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.content_digest import content_digest
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering.tone_mapping import tone_map, white_level
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading, DeferredImage

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.world.view import WorldView
 
 Point = tuple[float, float, float]

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import rotation_matrix
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.sensing.readings import GnssReading, ImuReading
 from eidrive_scenario.sensing.sensor import Scene, Sensor
 from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings, SensorSettings

@@ -10,8 +10,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.sensing.crossing import crossing, starts_behind_bodies, turned
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.weather import Weather
 

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.world.camera import CameraImage
 
 NOTHING_ATTACHED: Array = np.empty((0, 7))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from eidrive_scenario.registry import construct
+from eidrive_scenario.extensions.registry import construct
 from eidrive_scenario.sensing.readings import FIELDS, EgoState, Readings
 from eidrive_scenario.sensing.sensor import Scene, Sensor, check_unique, sensor_class
 from eidrive_scenario.sensing.settings import SensorSettings

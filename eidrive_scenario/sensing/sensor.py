@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.coverage import ViewSector
-from eidrive_scenario.geometry import rotation_matrix
-from eidrive_scenario.registry import registry
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import settings_type_of, validate_by_kind
 from eidrive_scenario.sensing.settings import CameraSettings, Mount, SensorSettings
-from eidrive_scenario.settings import settings_type_of, validate_by_kind
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.camera import Pinhole, Radiance, UndrawnImage
 from eidrive_scenario.world.view import RayHits, WorldView

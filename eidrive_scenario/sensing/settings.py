@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.extensions.settings import Settings
 
 Rate = Annotated[float, Field(ge=0.01, le=10_000.0)]
 """Readings per second [Hz]."""

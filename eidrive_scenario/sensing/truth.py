@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import BOX_SAMPLES, points_of_boxes
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import BOX_SAMPLES, points_of_boxes
 from eidrive_scenario.sensing.crossing import few_ray_starts, starts_behind_bodies, turned
 from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.sensor import Point, Scene, Sensor, mounting

@@ -21,9 +21,9 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
+from eidrive_scenario.base.wall_limit import Limit, LimitReached, current_limit
 from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
-from eidrive_scenario.files.encodable import encodable
-from eidrive_scenario.registry import (
+from eidrive_scenario.extensions.registry import (
     GROUPS,
     Registration,
     is_built_in,
@@ -32,7 +32,7 @@ from eidrive_scenario.registry import (
     singular,
     third_party_files,
 )
-from eidrive_scenario.wall_limit import Limit, LimitReached, current_limit
+from eidrive_scenario.files.encodable import encodable
 
 _ABSENT = object()
 _CONTROL_FLOW = ("_pytest", "asyncio")

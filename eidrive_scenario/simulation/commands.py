@@ -23,8 +23,9 @@ from eidrive_scenario.evaluation.criteria_parser import (
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads
+from eidrive_scenario.extensions.library import library_path
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.files.yaml_text import read_yaml_source
-from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import (
     AcquirePositionAction,
@@ -36,7 +37,6 @@ from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import variations
 from eidrive_scenario.recording.frame import ExecutedCommand
-from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.v2x.profile import ChannelProfile, load_profile, profile_file

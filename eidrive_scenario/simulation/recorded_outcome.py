@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from eidrive_scenario.content_digest import canonical_json
+from eidrive_scenario.base.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json

@@ -11,12 +11,12 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from eidrive_scenario.content_digest import canonical_json, package_versions, sha256_of
+from eidrive_scenario.base.content_digest import canonical_json, package_versions, sha256_of
+from eidrive_scenario.extensions.library import name_of
+from eidrive_scenario.extensions.registry import distributions
 from eidrive_scenario.files.bounded import is_regular_file, read_regular_file, reason_of
-from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.variation import drawn_parameters
-from eidrive_scenario.registry import distributions
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run_options import NO_COOPERATION, OPTIONS, RunSettings
 from eidrive_scenario.simulation.commands import CHANNEL, channel_profile

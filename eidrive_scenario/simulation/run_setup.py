@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import msgspec
 
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory, build_stack
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
@@ -24,7 +25,6 @@ from eidrive_scenario.run_options import RunSettings, option_of
 from eidrive_scenario.simulation.commands import DeclaredCriteria, RunState, check_added_criteria, check_commands
 from eidrive_scenario.simulation.scenario_options import drive_entities, select_planner
 from eidrive_scenario.storyboard.storyboard import Storyboard
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world import World
 from eidrive_scenario.world.weather import Weather, load_weather
 

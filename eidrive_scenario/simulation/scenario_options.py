@@ -9,6 +9,7 @@ from typing import Any
 from eidrive_scenario.driving.planner_settings import NO_PLANNER
 from eidrive_scenario.driving.settings import NAME_PROPERTIES, agent_settings
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.files.yaml_text import YamlContent, flow_yaml, read_yaml_source
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import MODULE, is_agent_controller, property_entries
@@ -20,7 +21,6 @@ from eidrive_scenario.openscenario.model import (
     Vehicle,
     VehicleCategory,
 )
-from eidrive_scenario.registry import registry
 from eidrive_scenario.run_options import YamlSource, option_of
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.world.specs import actor_spec

@@ -10,6 +10,7 @@ from typing import Self
 
 from msgspec.structs import replace
 
+from eidrive_scenario.base.wall_limit import limit_wall_time, raise_if_limit_reached
 from eidrive_scenario.driving.stack import StackFactory
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import StationAction
@@ -36,7 +37,6 @@ from eidrive_scenario.simulation.start_checks import check_destinations, check_s
 from eidrive_scenario.simulation.tick import OutsideInputs, Tick, TickStart, check_action
 from eidrive_scenario.storyboard.state.commands import Commands, ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
-from eidrive_scenario.wall_limit import limit_wall_time, raise_if_limit_reached
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView

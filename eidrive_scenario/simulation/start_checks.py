@@ -13,9 +13,10 @@ from itertools import islice
 
 import numpy as np
 
+from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.driving.station_warnings import MARGIN
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted
-from eidrive_scenario.geometry import overlap
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import (
@@ -29,7 +30,6 @@ from eidrive_scenario.openscenario.model import (
     Vehicle,
 )
 from eidrive_scenario.openscenario.scenario import EntitySelections
-from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.storyboard.state.commands import Commands

@@ -10,10 +10,10 @@ from types import MappingProxyType
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
+from eidrive_scenario.extensions.registry import Registry, registry
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import PlacedObject, RoadNetwork, Route, placed_objects
 from eidrive_scenario.storyboard.context.controller_model import build_controller_models, unassigned_controller_warnings
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.imports import lazy_exports
+from eidrive_scenario.base.car_following import IntelligentDriver
+from eidrive_scenario.base.imports import lazy_exports
 
 if TYPE_CHECKING:
     from eidrive_scenario.traffic.fleet import Fleet

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.car_following import Drivers, IntelligentDriver
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.car_following import Drivers, IntelligentDriver
 from eidrive_scenario.world.actor import ActorSpec
 
 PLANNED = 12

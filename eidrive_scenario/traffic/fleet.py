@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.car_following import Drivers, IntelligentDriver, ballistic
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.car_following import Drivers, IntelligentDriver, ballistic
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanger, LaneChanges

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.lane_changes import LaneChanges
 from eidrive_scenario.traffic.lanes import TrafficLanes

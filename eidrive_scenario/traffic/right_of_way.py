@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import SignalPlace

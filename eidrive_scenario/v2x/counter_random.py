@@ -7,8 +7,8 @@ from array import array
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.randomness import generator, integer_key
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.randomness import generator, integer_key
 
 Keys = NDArray[np.uint64]
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.extensions.registry import construct, registry
+from eidrive_scenario.extensions.settings import Settings, parse_settings, settings_type_of
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
 from eidrive_scenario.openscenario.values.parameters import Scope, is_reference, parameter_hints, resolve_references
-from eidrive_scenario.registry import construct, registry
-from eidrive_scenario.settings import Settings, parse_settings, settings_type_of
 from eidrive_scenario.v2x.channel import Channel
 
 NO_COOPERATION = "none"

@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniforms
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT

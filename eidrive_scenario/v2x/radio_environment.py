@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import LineOfSight
 
 LOS, NLOSV, NLOS = range(3)

@@ -28,7 +28,7 @@ class ActorSpec:
     """Body of an actor by its Vehicle, Pedestrian or MiscObject.
 
     shape     mesh of the actor: car, firetruck, ambulance, bus, van, truck, motorbike, bicycle, pedestrian, rsu, box
-    category  one of eidrive_scenario.detections.CLASSES
+    category  one of eidrive_scenario.base.detections.CLASSES
     size      length, width, height [m]
     offset    box center in the frame of the actor [m]
     """

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.view import ActorState

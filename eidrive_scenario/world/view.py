@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 
 FEW = 16
 """Maximum number of actors whose boxes are computed as scalars, which is faster. Sine and cosine of arrays differ from

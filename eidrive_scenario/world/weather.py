@@ -11,9 +11,9 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.extensions.library import resolve
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.files.yaml_text import load_yaml_file
-from eidrive_scenario.library import resolve
-from eidrive_scenario.settings import Settings, parse_settings
 
 CONTRAST_THRESHOLD = 0.02
 """Contrast of a black object against the sky at the visual range (Koschmieder)."""

@@ -11,7 +11,7 @@ from corpora import needs_corpora, scenario_files
 
 from eidrive_scenario.checks.scenario_checks import check_distribution
 from eidrive_scenario.errors import ConstraintError
-from eidrive_scenario.library import definition
+from eidrive_scenario.extensions.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from eidrive_scenario.api.common import Contact, RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import Frame
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.v2x.messages.message import Message, StationState
 

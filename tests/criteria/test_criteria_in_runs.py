@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from criteria_scenario import ROAD, write_scenario
 
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings, run_file
 
 ACTORS = {

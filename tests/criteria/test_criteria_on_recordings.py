@@ -11,8 +11,8 @@ import pytest
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import Frame, Verdict, evaluate_criteria
 from eidrive_scenario.evaluation.criteria_parser import build_criteria, parse_criteria
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.recording import Recorder, read_recording
-from eidrive_scenario.registry import registry
 
 ROAD = Path(__file__).parents[2] / "xosc" / "roads" / "coop_1.xodr"
 SIGN = 'dynamic="no" orientation="+" zOffset="2.4" country="DE" type="206"'

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from eidrive_scenario.evaluation.criterion import describe_criteria
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 
 PAGE = Path(__file__).parents[2] / "docs" / "criteria.md"
 

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from eidrive_scenario.api.criteria import Criterion, LinkStatistics, Verdict, evaluate_criteria
 from eidrive_scenario.api.v2x import LinkEvent, Message, ReceivedMessage
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.v2x.messages.message import StationState
 

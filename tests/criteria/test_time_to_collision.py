@@ -10,8 +10,8 @@ from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionS
 from msgspec.structs import replace
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
+from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.evaluation.nearest_actor import time_to_contact
-from eidrive_scenario.geometry import overlap
 
 
 def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[float]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from faulty_extensions import BROKEN_MODULES, install
 
-from eidrive_scenario import registry
+from eidrive_scenario.extensions import registry
 
 
 @pytest.fixture(scope="module")

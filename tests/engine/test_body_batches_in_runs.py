@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.physics import body_group
 

@@ -11,7 +11,7 @@ import pytest
 from openscenario_xml import deterministic_xml, distribution_xml, values_xml
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed, run_file
 

@@ -8,7 +8,7 @@ import pytest
 
 from eidrive_scenario.api.run import RunResult, RunSettings, Simulation, load_distribution, run_file
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 
 CROSSINGS = {"crossing_car": ("Other", "OtherKmh", 25.0), "crossing_child": ("Walker", "WalkerKmh", 3.8)}
 """Hidden actor, parameter of its speed, and distance of the conflict area's beginning from the meeting point [m]."""

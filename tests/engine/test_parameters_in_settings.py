@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed, run_file
 

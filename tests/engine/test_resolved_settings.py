@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.content_digest import canonical_json
-from eidrive_scenario.library import library_path
+from eidrive_scenario.base.content_digest import canonical_json
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 

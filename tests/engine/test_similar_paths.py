@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.gym import EidriveEnv
-from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, run_file

@@ -27,7 +27,7 @@ from storyboard_xml import (
 )
 
 from eidrive_scenario.errors import ExtensionError, InputError
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed, run_file
@@ -100,7 +100,8 @@ def test_equal_seed_gives_equal_trace_in_any_order_and_process() -> None:
     assert first == again
     assert first != other
     code = (
-        "from eidrive_scenario.simulation import run_file; from eidrive_scenario.library import resolve_scenario;"
+        "from eidrive_scenario.simulation import run_file;"
+        "from eidrive_scenario.extensions.library import resolve_scenario;"
         f"import sys; sys.stdout.write(run_file(resolve_scenario('{ONE}'), seed=3).trace_hash)"
     )
     elsewhere = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

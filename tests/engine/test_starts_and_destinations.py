@@ -9,9 +9,9 @@ from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml, world_position_xml
 
+from eidrive_scenario.base.geometry import Box, overlap
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.geometry import Box, overlap
 from eidrive_scenario.simulation import RunSettings, run_file
 
 TRAILER = """<Trailer><TrailerRef entityRef="Cart"/></Trailer></Vehicle>"""

@@ -18,7 +18,7 @@ import pytest
 from lxml import etree
 from mirrored_scenario import mirror_areas, mirror_positions, mirror_road
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 

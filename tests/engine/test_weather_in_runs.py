@@ -9,7 +9,7 @@ import pytest
 from scenario_1 import edited
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.commands import execute

@@ -19,8 +19,8 @@ from eidrive_reports.cooperative_perception.scores import (
 from eidrive_reports.cooperative_perception.trial import run_trial, with_properties
 from lxml import etree
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from eidrive_reports.corner_cases import ALONE, ARMS, jobs, table
 from eidrive_reports.planner_scenes import SceneRun
 
-from eidrive_scenario.library import describe_scenarios, resolve_scenario
+from eidrive_scenario.extensions.library import describe_scenarios, resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 
 

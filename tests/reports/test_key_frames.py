@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from eidrive_reports.key_frames import KeyFrames, Story
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.view import Contact, WorldView
 

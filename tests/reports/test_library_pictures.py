@@ -19,7 +19,7 @@ from eidrive_reports.library_pictures import (
     run_picture,
 )
 
-from eidrive_scenario.library import LibraryScenario, describe_scenarios
+from eidrive_scenario.extensions.library import LibraryScenario, describe_scenarios
 from eidrive_scenario.reporting.drawing.top_view import GROUND, LANE, RoadDrawing
 
 ROOT = Path(__file__).parents[2]

@@ -13,7 +13,7 @@ from matplotlib.collections import QuadMesh
 from openscenario_xml import deterministic_xml, distribution_xml, values_xml
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 
 Write = Callable[..., Path]
 

@@ -13,7 +13,7 @@ from eidrive_reports.reproduction.part import Case
 from eidrive_reports.reproduction.provenance import job_digest
 from known_episodes import episode
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.v2x.standards import ieee80211p_airtime
 

@@ -15,7 +15,7 @@ from eidrive_reports.reproduction.parts import PARTS
 from known_episodes import episode
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.library import scenarios
+from eidrive_scenario.extensions.library import scenarios
 
 # Table II
 

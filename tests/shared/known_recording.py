@@ -26,7 +26,7 @@ from msgspec.structs import replace
 from eidrive_scenario.api.common import Contact, WorldView
 from eidrive_scenario.api.criteria import Frame, LinkStatistics
 from eidrive_scenario.api.v2x import LinkEvent, Message, ReceivedMessage
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.v2x.messages.message import StationState
 

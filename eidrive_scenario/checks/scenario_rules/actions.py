@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, is_immediate
@@ -29,7 +30,6 @@ from eidrive_scenario.openscenario.model import (
     Vehicle,
 )
 from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES, has_times
-from eidrive_scenario.tolerances import EPSILON
 
 _DOMAINS: Mapping[type[Element], str] = {
     SpeedAction: "longitudinal",

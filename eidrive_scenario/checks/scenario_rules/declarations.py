@@ -13,9 +13,9 @@ from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.outline import WORD
 from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.extensions.library import resolve_path
 from eidrive_scenario.files.bounded import absolute
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.library import resolve_path
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import (
     EntitySelection,

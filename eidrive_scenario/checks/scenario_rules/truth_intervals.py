@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_criterion
 from eidrive_scenario.openscenario.model import Element, Rule
-from eidrive_scenario.tolerances import EPSILON
 
 Intervals = tuple[tuple[float, float], ...]
 

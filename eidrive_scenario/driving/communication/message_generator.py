@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.coverage import ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.messages.generation import (
     CHECK,

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World

@@ -8,17 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.coverage import PerceptionRegion, ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import points_in_box
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.sensing.readings import EgoState, Readings
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message, PointCloud, ReceivedMessage, StationState
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.v2x.channel import (
     Channel,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.path import LEADS_AWAY
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
 

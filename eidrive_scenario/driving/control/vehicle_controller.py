@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+from eidrive_scenario.base.requests import Override, Overrides
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.requests import Override, Overrides
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 

@@ -10,18 +10,18 @@ import numpy as np
 from msgspec.structs import replace
 from pydantic import BeforeValidator, NonNegativeFloat, PositiveFloat
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import point_in_polygon
+from eidrive_scenario.base.requests import Goal
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planner_settings import PlannerSettings, Polygon
 from eidrive_scenario.driving.planning.path import is_on_level, path_heights
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.geometry import point_in_polygon
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 

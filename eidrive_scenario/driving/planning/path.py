@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState

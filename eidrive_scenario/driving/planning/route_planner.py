@@ -9,20 +9,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.coverage import PerceptionRegion, ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import LONGEST_WAY, Goal
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.path import SPACING, PathPart, PlannedPath, lane_below, path_heights
 from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.requests import LONGEST_WAY, Goal
+from eidrive_scenario.extensions.settings import parse_settings
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, RouteError
 from eidrive_scenario.roads.routing.graph import assumed_speed
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
-from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.world.actor import ActorSpec
 
 

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.path import APPROACH_DECELERATION
 from eidrive_scenario.perception.traffic_lights import SignalAhead, SignalsAhead
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 BEFORE_LINE = 1.5

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import binom, binomtest, norm
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.statistics.intervals import jackknife_interval, mean_interval
 
 LEAST_PAIRS = 5

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.randomness import integer_key
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.model import ParameterType
-from eidrive_scenario.randomness import integer_key
 from eidrive_scenario.run_options import OPTIONS, RunSettings
 from eidrive_scenario.v2x.profile import load_profile
 

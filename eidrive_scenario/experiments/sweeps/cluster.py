@@ -13,11 +13,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing.util import Finalize
 from typing import Any, TypeVar
 
+from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
-from eidrive_scenario.imports import optional_import
-from eidrive_scenario.project import VARIABLE
-from eidrive_scenario.registry import use_project
+from eidrive_scenario.extensions.project import VARIABLE
+from eidrive_scenario.extensions.registry import use_project
 
 R = TypeVar("R")
 

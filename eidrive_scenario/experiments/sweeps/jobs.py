@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.content_digest import canonical_json, package_versions, sha256_of
+from eidrive_scenario.base.content_digest import canonical_json, package_versions, sha256_of
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, SettingError, suggestion
 from eidrive_scenario.experiments.sweeps.axes import (
     CHANNEL,

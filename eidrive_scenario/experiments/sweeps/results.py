@@ -12,11 +12,11 @@ from typing import Any, TypeAlias, TypeVar
 
 import msgspec
 
+from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
-from eidrive_scenario.imports import optional_import
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
 
 INTERVALS: Mapping[str, Callable[..., Proportion]] = {

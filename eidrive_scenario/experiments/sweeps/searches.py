@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, Point, Scalar
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
-from eidrive_scenario.imports import optional_import
 
 PLACES = 241
 """Number of tested boundaries, over the range and half of its length on either side."""

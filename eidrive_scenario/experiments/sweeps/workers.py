@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from eidrive_scenario import errors
+from eidrive_scenario.base.wall_limit import running_line
 from eidrive_scenario.errors import ConstraintError, InputError, OutputError, WallLimitError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.hung_runs import hang_of, report_hung_runs
@@ -37,11 +38,10 @@ from eidrive_scenario.experiments.sweeps.store import (
     PASSED,
     StoredRun,
 )
-from eidrive_scenario.library import name_of
+from eidrive_scenario.extensions.library import name_of
 from eidrive_scenario.openscenario import ConcreteRun
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.simulation.result import typed
-from eidrive_scenario.wall_limit import running_line
 
 _is_worker = False
 """Whether this process only executes runs, so that no user interrupts it."""

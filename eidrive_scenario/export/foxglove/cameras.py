@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, set_stamp
 from eidrive_scenario.files.atomic import partial_path
 from eidrive_scenario.files.bounded import is_regular_file, load_json, read_regular_file

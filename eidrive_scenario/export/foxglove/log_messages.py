@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.export.foxglove.schemas import Foxglove, set_stamp
@@ -18,7 +19,6 @@ from eidrive_scenario.recording.text.run_log import (
     describe_kind,
     describe_link,
 )
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world.view import WorldView
 

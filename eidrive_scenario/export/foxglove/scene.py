@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.export.foxglove.schemas import (
     WORLD,

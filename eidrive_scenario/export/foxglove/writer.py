@@ -9,7 +9,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.export.foxglove.cameras import (
@@ -39,7 +40,6 @@ from eidrive_scenario.export.foxglove.schemas import (
 )
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
-from eidrive_scenario.imports import optional_import
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder
 

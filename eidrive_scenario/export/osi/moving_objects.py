@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.export.geometry import rotations
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_vector
 from eidrive_scenario.recording.frame import Frame

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from eidrive_scenario.imports import optional_import
+from eidrive_scenario.base.imports import optional_import
 
 
 class Identifiers:

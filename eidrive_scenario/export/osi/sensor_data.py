@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.export.geometry import angles, rotations
 from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type, rear_axle
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_time, set_vector

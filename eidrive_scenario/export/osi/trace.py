@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import quote
 
+from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder, host_vehicle
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi, nanoseconds
 from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
-from eidrive_scenario.imports import optional_import
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import TRACE_METADATA
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import overload
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
+from eidrive_scenario.extensions.library import from_library, resolve_path
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import from_library, resolve_path
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
@@ -39,7 +40,6 @@ from eidrive_scenario.openscenario.model import (
     UniformDistribution,
 )
 from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
-from eidrive_scenario.randomness import generator
 
 Quantile = Callable[[float], "float | str"]
 _SMALLEST, _LARGEST = 2.0**-54, 1 - 2.0**-53

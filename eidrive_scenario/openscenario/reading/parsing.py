@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import msgspec
 from lxml import etree
 
-from eidrive_scenario.content_digest import sha256_of
+from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
+from eidrive_scenario.extensions.library import scenario_suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
-from eidrive_scenario.library import scenario_suggestion
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")

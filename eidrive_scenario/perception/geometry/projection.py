@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.geometry import BOX_SAMPLES, box_corners, points_of_boxes
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.geometry import BOX_SAMPLES, box_corners, points_of_boxes
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
 from eidrive_scenario.sensing.crossing import crossing
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading

@@ -9,9 +9,10 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from msgspec.structs import astuple, replace
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.content_digest import content_digest
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.content_digest import content_digest
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.detector import Detector, DetectorContext, ImageDetections, without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
@@ -33,7 +34,6 @@ from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
-from eidrive_scenario.settings import Settings
 
 
 class LearnedDetector(Detector):

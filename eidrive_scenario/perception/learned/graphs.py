@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.perception.learned.networks.ssd_sizes import BOXES_PER_CELL, COARSE, FINE, MIDDLE
 from eidrive_scenario.perception.learned.networks.ssd_sizes import STRIDES as SSD_STRIDES
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, DEPTHS, WIDTHS

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.detections import CLASSES
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.detections import CLASSES
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.learned.networks.suppression import suppress
 from eidrive_scenario.roads.model.signal_states import OFF, lamps
@@ -41,7 +41,7 @@ def image_class(category: str) -> str:
 
 
 def object_category(name: str) -> str | None:
-    """Return the class out of eidrive_scenario.detections.CLASSES for a network class; None for other things."""
+    """Return the class out of eidrive_scenario.base.detections.CLASSES for a network class; None for other things."""
     if name in CLASSES:
         return name
     known = _SAME_AS.get(name)

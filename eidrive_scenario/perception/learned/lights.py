@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools, Floats
+from eidrive_scenario.base.arrays import Array, Bools, Floats
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.learned.image_network import STOP_SIGN, light_state

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.base.arrays import Floats
 
 IR_VERSION = 8
 OPSET = 13

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.image_network import VEHICLES, Candidates, ImageNetwork

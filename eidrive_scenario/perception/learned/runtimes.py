@@ -20,7 +20,7 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.weights import ONNX_SUFFIX, TORCHSCRIPT_SUFFIX, read_weights
 

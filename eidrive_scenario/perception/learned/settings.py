@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.learned.external_network import Layout
 from eidrive_scenario.perception.learned.image_network import misspelt, object_category
 from eidrive_scenario.perception.learned.runtimes import Device, Runtime
@@ -17,7 +18,6 @@ from eidrive_scenario.perception.learned.weights import (
     OWN_SUFFIX,
     TORCHSCRIPT_SUFFIX,
 )
-from eidrive_scenario.settings import Settings
 
 EXTERNAL_SUFFIXES = (ONNX_SUFFIX, TORCHSCRIPT_SUFFIX)
 

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.perception.learned.networks.blocks import fold
 from eidrive_scenario.perception.learned.networks.ssd import Ssd

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION
 from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of

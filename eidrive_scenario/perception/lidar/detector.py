@@ -9,8 +9,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveInt
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.detector import Detector, DetectorContext, without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import (
     LevelFrame,
@@ -24,8 +26,6 @@ from eidrive_scenario.perception.lidar.objects import UNLIKELY, FittedObject, ob
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
-from eidrive_scenario.settings import Settings
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 HALF_SURE = 5.0
 """Number of points at which the score is half of its maximum."""

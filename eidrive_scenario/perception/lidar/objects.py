@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Integers
-from eidrive_scenario.geometry import overlap
+from eidrive_scenario.base.arrays import Integers
+from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
 from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, Pattern
 from eidrive_scenario.perception.geometry.size_priors import LARGEST
 from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box

@@ -9,8 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.randomness import generator
 
 SECTORS = 24
 """Number of sectors around the sensor."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION, MapContext
 from eidrive_scenario.perception.geometry.projection import NEAREST, level_frame, straight_boxes
 from eidrive_scenario.perception.geometry.size_priors import possible_classes, prior_of

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import box_corners, overlap
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import box_corners, overlap
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_points
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels
@@ -123,7 +123,7 @@ def lift(
 ) -> Detections:
     """Return the objects in the world that an image detector detected, one for each box, in the given order.
 
-    boxes    (N, 4) left, top, right, bottom [px]; classes  out of eidrive_scenario.detections.CLASSES
+    boxes    (N, 4) left, top, right, bottom [px]; classes  out of eidrive_scenario.base.detections.CLASSES
     lidar    reading of the same tick; None: from the ground plane alone
     time     of the image [s]
     ground   height of the ground below the sensors [m]: that of the reference point of the station

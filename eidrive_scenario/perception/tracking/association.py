@@ -21,8 +21,8 @@ import math
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.assignment import assign_matrix
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.assignment import assign_matrix
 from eidrive_scenario.perception.tracking.motion_models import Estimates
 
 UNKNOWN_DEVIATION = 0.5

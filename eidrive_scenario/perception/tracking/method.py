@@ -8,11 +8,11 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, PositiveInt, model_validator
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.extensions.settings import Settings, validate_by_kind, validate_nested
 from eidrive_scenario.perception.tracking.association import BIRTH_DENSITY, DETECTION_PROBABILITY, LIFETIME
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
-from eidrive_scenario.settings import Settings, validate_by_kind, validate_nested
 
 NO_TRACKER = "none"
 """Kind that passes detections on unchanged."""

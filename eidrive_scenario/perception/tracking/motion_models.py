@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
 
 HEADING = 2
 """Index of the heading in the state of a model that measures it."""

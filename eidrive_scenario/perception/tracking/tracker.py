@@ -9,9 +9,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.detections import VULNERABLE, Detections
-from eidrive_scenario.geometry import iou_bev, wrap_angle
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.detections import VULNERABLE, Detections
+from eidrive_scenario.base.geometry import iou_bev, wrap_angle
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.perception.tracking.association import (
     MOST,
     associate,
@@ -25,7 +26,6 @@ from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT,
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerKind, TrackerSettings, TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
 class TrackHistory:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.perception.tracking.motion_models import HEADING, Estimates, MotionModel, Update, transposed
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 MAX_STEPS = 1000
 """Maximum number of time steps between two scans whose poses are stored; tracks do not coast for longer."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.rendering.meshes.cars import ambulance, car, van
 from eidrive_scenario.rendering.meshes.heavy import bus, firetruck, trailer, truck
 from eidrive_scenario.rendering.meshes.people import bicycle, motorbike, pedestrian

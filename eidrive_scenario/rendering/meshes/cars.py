@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.rendering.meshes.solids import BodyDimensions, Mesh, add_wheels, bevelled_box, box, loft, polygon
 
 _TALL = 0.37

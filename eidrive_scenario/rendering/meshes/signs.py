@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.rendering.meshes.solids import Mesh, polygon
 from eidrive_scenario.roads import Signal
 

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import footprint
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import footprint
 from eidrive_scenario.reporting.drawing.top_view import (
     GROUND,
     LANE,

@@ -19,7 +19,7 @@ from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.statistics.intervals import Proportion
 
 PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}

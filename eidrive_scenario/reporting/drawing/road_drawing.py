@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import footprint
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.geometry import footprint
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window

@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import footprint
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import footprint
 from eidrive_scenario.reporting.drawing.canvas import Canvas, Image, ellipse_of_95_percent
 from eidrive_scenario.reporting.drawing.top_view import (
     FUSED,

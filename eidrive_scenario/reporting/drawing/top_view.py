@@ -12,9 +12,9 @@ from html import escape
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import footprint
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import footprint
 from eidrive_scenario.reporting.snapshot import StationSnapshot
 
 OWN, RECEIVED, LINK, LOST, AREA = "#2563eb", "#ea580c", "#0f9d58", "#dc2626", "#eab308"

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 
 import cv2
 
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.recording.integrity import DamageReport
@@ -25,7 +26,6 @@ from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.view import WorldView
 
 FILM_SIZE, GIF_SIZE = (1280, 720), (640, 360)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.frame import Frame

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneLocations

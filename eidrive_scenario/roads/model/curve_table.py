@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral, fresnel
 from eidrive_scenario.roads.model.polynomials import spread
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 
 LONGEST = 1.6
 """Maximum argument of the series. It belongs to a spiral that turns by 4 rad from its straight end."""

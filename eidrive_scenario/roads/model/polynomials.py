@@ -8,7 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 
 Piece = tuple[float, float, float, float, float]
 """Start s of a piece and its coefficients a, b, c, d; ds counts from that start."""

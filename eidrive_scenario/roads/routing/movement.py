@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import LEAST_STRETCH, lane_at, lane_t, pose_in_lane
 from eidrive_scenario.roads.model.curves import Arc
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose

@@ -13,8 +13,8 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lane_pose_at, lane_t
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose

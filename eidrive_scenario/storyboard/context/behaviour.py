@@ -11,8 +11,8 @@ import py_trees
 from py_trees.common import Status
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, ScenarioError
+from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.protocols import ActionContext, EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.actor import Actor

@@ -8,11 +8,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
-from eidrive_scenario.tolerances import EPSILON
 
 SYMBOLS = {
     "greaterThan": ">",

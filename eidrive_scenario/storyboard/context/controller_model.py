@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from typing import ClassVar, SupportsFloat
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, suggestion
+from eidrive_scenario.extensions.registry import Registry, construct
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
-from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.context.protocols import ControllerContext
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 

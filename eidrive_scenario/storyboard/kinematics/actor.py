@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_agent_controller
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.motion import Motion
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads import BranchSelector, LaneKey, LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.roads.geometry.poses import lane_t
 from eidrive_scenario.roads.routing.route import LANE_CHANGE_LENGTH, smoothstep

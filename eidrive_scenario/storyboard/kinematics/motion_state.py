@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.roads import BranchSelector, LaneLocation, Pose, RoadNetwork, Route
-from eidrive_scenario.tolerances import EPSILON
 
 APART = 0.01
 """Maximum horizontal distance between a pose and its lane location [m]."""

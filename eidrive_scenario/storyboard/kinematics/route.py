@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import (
     Branch,
     BranchSelector,

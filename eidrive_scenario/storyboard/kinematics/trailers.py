@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.actor import Actor

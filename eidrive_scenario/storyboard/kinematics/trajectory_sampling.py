@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, blend, fill_gaps

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.openscenario.model import DynamicsShape
-from eidrive_scenario.tolerances import EPSILON
 
 PEAK_SLOPE = {
     DynamicsShape.STEP: 0.0,

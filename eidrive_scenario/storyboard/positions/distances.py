@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.base.geometry import box_distance
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
-from eidrive_scenario.tolerances import EPSILON
 
 Box = tuple[float, float, float, float, float, float, float]
 """x, y, z of the center, length, width, height [m], yaw [rad]."""

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError
-from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.storyboard.context.protocols import ConditionContext

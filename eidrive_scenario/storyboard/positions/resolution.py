@@ -7,8 +7,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.roads.model.location import PositionError

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple, Never
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.requests import Goal, Overrides
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.openscenario.model import Element
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.requests import Goal, Overrides
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import Appearance

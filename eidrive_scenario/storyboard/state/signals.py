@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, YELLOW, lamp_colors, must_stop
-from eidrive_scenario.tolerances import EPSILON
 
 
 class SignalCycle:

@@ -10,9 +10,9 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 
 from eidrive_scenario.errors import Diagnostic, RegistryError, ScenarioError, suggestion
+from eidrive_scenario.extensions.registry import Registry, construct
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import without_criteria
-from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition
 from eidrive_scenario.storyboard.context.protocols import DomainHolder, EntityAbsentError

@@ -11,11 +11,11 @@ from typing import Protocol
 import py_trees
 from py_trees.common import Status
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.openscenario.model import Rule
 from eidrive_scenario.storyboard.context.condition import Condition, Measure, truth
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.tolerances import EPSILON
 
 
 class ConditionEvaluator:

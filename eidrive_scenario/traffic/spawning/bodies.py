@@ -10,13 +10,13 @@ from typing import Annotated, Generic, TypeVar
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from eidrive_scenario.car_following import IntelligentDriver
+from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.library import CATALOGS, library_path
+from eidrive_scenario.extensions.library import CATALOGS, library_path
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.openscenario import Scenario, model, read_document
 from eidrive_scenario.openscenario.conventions import property_entries
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
-from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.specs import actor_spec
 

@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, quoted
 from eidrive_scenario.openscenario.model import Element
-from eidrive_scenario.randomness import generator
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
 from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Changes, Population
 from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites, is_wide_enough

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import FREE

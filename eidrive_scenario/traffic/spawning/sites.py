@@ -10,10 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.car_following import Drivers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.car_following import Drivers
+from eidrive_scenario.base.geometry import overlap, points_in_polygon
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.geometry import overlap, points_in_polygon
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.location import PositionError
 from eidrive_scenario.roads.routing.links import RoadEnd

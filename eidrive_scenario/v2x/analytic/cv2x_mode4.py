@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.v2x.analytic.table import (
     RATIOS,
     REACH,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.v2x.analytic.table import (
     RATIOS,
     REACH,

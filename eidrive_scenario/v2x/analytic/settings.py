@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.analytic.cv2x_mode4 import cv2x_mode4_errors
 from eidrive_scenario.v2x.analytic.ieee80211p import FULL, ieee80211p_errors, offered_load
 from eidrive_scenario.v2x.analytic.table import ErrorTable

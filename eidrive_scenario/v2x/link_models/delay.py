@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import quoted, shortened
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
-from eidrive_scenario.settings import Settings
 
 MAX_BYTES = 32 * MIB
 """Maximum size of a file of measured delays [bytes]."""

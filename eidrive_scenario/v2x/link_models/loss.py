@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from eidrive_scenario.randomness import generator
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.counter_random import LinkRandom
 from eidrive_scenario.v2x.messages.message import Message

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.coverage import ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.v2x.messages.message import Message, StationState

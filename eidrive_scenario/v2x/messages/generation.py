@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.assignment import associate
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.assignment import associate
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.v2x.messages.message import StationState
 
 CHECK = 0.1

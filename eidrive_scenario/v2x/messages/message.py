@@ -11,9 +11,9 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.coverage import ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.detections import Detections
 
 Bytes = NDArray[np.uint8]
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.settings import Settings
-from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.messages.message import Message
 from eidrive_scenario.v2x.propagation import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniforms
 from eidrive_scenario.v2x.propagation import LinkGeometry, PathLoss, probability_of_los
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment

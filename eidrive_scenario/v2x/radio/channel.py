@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.channel import Channel, OutgoingMessage, QueuedChannel
 from eidrive_scenario.v2x.counter_random import Keys, LinkRandom, combine_keys, key, uniform
 from eidrive_scenario.v2x.link_models.composed import delay_of

@@ -7,8 +7,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.extensions.settings import Settings
 
 LONGEST_INTERVAL = 10.0
 """Maximum message interval in a profile [s]; that of the standard is 1 s."""

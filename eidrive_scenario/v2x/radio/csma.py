@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate

@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.propagation import LinkGeometry, PathLoss
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 

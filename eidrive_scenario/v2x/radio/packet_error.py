@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.v2x.analytic import cv2x_mode4, ieee80211p
 
 

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.errors import suggestion
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.link_models.composed import ComposedProfile

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
 from eidrive_scenario.v2x.radio.access import Transmission

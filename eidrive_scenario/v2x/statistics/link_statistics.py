@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog, ReceptionStatistics, queue_entry
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
 
 MAX_BREAKPOINTS = 1 << 20

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
 from eidrive_scenario.world.physics.bullet import (

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import astuple
 
-from eidrive_scenario.arrays import Array, Bools, Integers, of_each
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array, Bools, Integers, of_each
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.view import FEW, ActorState

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.geometry import box_corners, box_distance, overlap, points_in_box
+from eidrive_scenario.base.geometry import box_corners, box_distance, overlap, points_in_box
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.physics.body_group import BodyGroup

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, repeat
 
+from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.actor import Control, Vector3
 from eidrive_scenario.world.physics.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.physics.body_group import BodyGroup

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import WorldView

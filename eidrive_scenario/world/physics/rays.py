@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.world.physics.bullet import STATIC, TERRAIN, bullet
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import GROUND, NOTHING, RayHits, WorldView

@@ -13,8 +13,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.geometry import footprint_distance
+from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import footprint_distance
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bullet import (

@@ -13,7 +13,7 @@ from faulty_extensions import install, line_of, write_scenario
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 
 pytestmark = pytest.mark.timeout(600)
 """Hanging checks take their limit and the grace time, and several processes load the engine."""

@@ -3,8 +3,8 @@
 import pytest
 from command_fixtures import Eidrive
 
-from eidrive_scenario import library
 from eidrive_scenario.errors import RegistryError, SimulationError
+from eidrive_scenario.extensions import library
 
 
 def break_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:

@@ -15,7 +15,7 @@ from command_fixtures import Eidrive
 
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.errors import RegistryError
-from eidrive_scenario.registry import register, registry
+from eidrive_scenario.extensions.registry import register, registry
 
 
 @pytest.mark.process

@@ -20,7 +20,7 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.live.live_view import LiveView

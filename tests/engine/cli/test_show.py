@@ -11,7 +11,7 @@ from command_fixtures import Eidrive
 
 from eidrive_scenario.cli.show import Names
 from eidrive_scenario.experiments.sweeps.store import ResultStore
-from eidrive_scenario.registry import GROUPS
+from eidrive_scenario.extensions.registry import GROUPS
 
 
 def test_help_lists_commands_without_importing_engine() -> None:

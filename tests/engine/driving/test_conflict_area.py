@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, ConflictAreaSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec
 

@@ -10,13 +10,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.control.pid_controller import PID, Gains, PidController
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.world.actor import ActorSpec
 
 NOTHING = Detections(0.0)

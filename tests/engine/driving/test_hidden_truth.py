@@ -14,7 +14,7 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.api.run import RunSettings, Simulation
-from eidrive_scenario.library import describe_scenarios, library_path
+from eidrive_scenario.extensions.library import describe_scenarios, library_path
 from eidrive_scenario.recording.frame import Frame
 
 EGO = "Ego"

@@ -13,7 +13,7 @@ from signal_street import CAR
 from eidrive_scenario.driving.planning.path import lane_below
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.v2x.messages.message import StationState

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.perception.faults import PoseError, with_pose_error
 from eidrive_scenario.perception.pipeline import outlines, rows_on_bodies, without_rows

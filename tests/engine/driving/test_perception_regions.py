@@ -11,8 +11,8 @@ from msgspec.structs import replace
 from planned_drive import two_lane_road
 from sample_car import CAR
 
-from eidrive_scenario.coverage import PerceptionRegion, ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore

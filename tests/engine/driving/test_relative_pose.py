@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.communication.report_store import relative_state

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.result_checks import check_plan
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import InvalidResult
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
 
 POINTS = np.array([[0.0, 0.0], [10.0, 0.0], [20.0, 0.0]])

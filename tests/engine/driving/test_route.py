@@ -9,12 +9,12 @@ import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 from scenariogeneration import xodr
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork, RouteError
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec

@@ -25,7 +25,8 @@ from storyboard_xml import (
     trigger_xml,
 )
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.planning.signal_stops import (
@@ -37,7 +38,6 @@ from eidrive_scenario.driving.planning.signal_stops import (
 )
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.rig import Rig

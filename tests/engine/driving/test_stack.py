@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from scenario_1 import ONE, FrameCollector
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Overrides
 from eidrive_scenario.driving.stack import DrivingStack, EmptyStack, StackContext, StackInputs, StackSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.requests import Overrides
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world import World

@@ -15,9 +15,9 @@ from eidrive_scenario.driving.control.vehicle_controller import VehicleControlle
 from eidrive_scenario.driving.settings import parse_station_settings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
-from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec, Control
 
 EMPTY = TruthReading((), (), np.empty((0, 7)), np.empty((0, 2)), np.empty(0))

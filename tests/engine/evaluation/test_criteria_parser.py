@@ -14,9 +14,9 @@ from eidrive_scenario.evaluation.criteria_parser import (
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, evaluate_criteria
+from eidrive_scenario.extensions.registry import Registry
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.registry import Registry
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 

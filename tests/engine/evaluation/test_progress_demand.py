@@ -10,7 +10,7 @@ from openscenario_xml import agent_xml, object_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, teleport_xml, world_position_xml
 
 from eidrive_scenario.evaluation.criterion import Criterion
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 PROGRESS = {

@@ -6,8 +6,8 @@ import os
 import time
 from pathlib import Path
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.repetitions import Job
-from eidrive_scenario.randomness import generator
 
 
 def draw(job: Job) -> tuple[str, int, float]:

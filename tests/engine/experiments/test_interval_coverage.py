@@ -18,7 +18,8 @@ import pytest
 from eidrive_reports.cooperative_perception.scores import FULL_SCORE, PerceptionRecord, Pool, Tally
 from scipy.stats import binom
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.statistics.intervals import (
     Proportion,
     anytime_interval,
@@ -35,7 +36,6 @@ from eidrive_scenario.experiments.statistics.paired import (
     paired_spread,
 )
 from eidrive_scenario.experiments.sweeps.searches import BoundarySearch
-from eidrive_scenario.randomness import generator
 
 SAMPLES = 3000
 LEAST, MOST = 0.93, 0.98

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.statistics.paired import PairedVerdicts
-from eidrive_scenario.randomness import generator
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ from perception_metrics import (
 )
 from scenario_1 import ONE, FrameCollector, simulate
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.registry import registry
 
 LENGTH = 4.5
 

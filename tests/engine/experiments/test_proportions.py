@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.statistics.intervals import anytime_interval, clopper_pearson, wilson
-from eidrive_scenario.randomness import generator
 
 KNOWN = [
     (19, 20, (0.763869, 0.991119), (0.751267, 0.998735), (0.657592, 0.999881)),

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest, success_rate
-from eidrive_scenario.randomness import generator
 
 WALD = RatioTest(good=0.95, bad=0.80, limit=2000)
 SERIES = 2000

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.assignment import associate
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.assignment import associate
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.fusion.average import AverageFusion, fuse_average
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.registry import registry
 
 
 def report(

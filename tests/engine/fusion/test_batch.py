@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.detections import CLASSES, Detections
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.fusion import covariance_intersection
 from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion, CovarianceIntersectionSettings
 from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.message import StationState
 
 DT = 0.05

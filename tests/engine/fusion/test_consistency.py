@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.message import StationState
 
 Make = Callable[..., Report]

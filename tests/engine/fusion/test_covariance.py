@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.fusion import covariance as ci
 from eidrive_scenario.fusion.covariance import TRACE_TOLERANCE
-from eidrive_scenario.randomness import generator
 
 
 def intersect(a: Array, cov_a: Array, b: Array, cov_b: Array) -> tuple[Array, Array, Array]:

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.registry import registry
 from eidrive_scenario.v2x.messages.message import StationState
 
 Make = Callable[..., Report]

@@ -13,9 +13,9 @@ from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.v2x.messages.message import HEADER_BYTES, ReceivedMessage

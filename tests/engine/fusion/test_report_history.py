@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate
 from eidrive_scenario.fusion.report_history import ReportHistory
-from eidrive_scenario.randomness import generator
 
 GATE = AssociationGate.of(0.99, 4.0)
 

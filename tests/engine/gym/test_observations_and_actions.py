@@ -12,7 +12,7 @@ from lone_car import lone_car
 from openscenario_xml import agent_xml, parameters_xml, road_file_xml, round_car_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings

@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.extensions.library import definition
 from eidrive_scenario.files.bounded import MIB, RefusedFileError, read_regular_file
 from eidrive_scenario.files.yaml_text import load_yaml_file
-from eidrive_scenario.library import definition
 from eidrive_scenario.perception.learned.weights import read_arrays
 
 SECRET = "root:x:0:0:hunter2"

@@ -14,7 +14,7 @@ from hostile_scenario import Write
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 

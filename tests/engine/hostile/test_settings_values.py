@@ -25,9 +25,9 @@ from trial import attempt
 from eidrive_scenario.driving.settings import AgentSettings, parse_station_settings
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.evaluation.criteria_parser import parse_criteria
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.registry import registry
-from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.profile import load_profile

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.library import library_path, resolve_path
+from eidrive_scenario.extensions.library import library_path, resolve_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.library_catalogs import library_catalog_entries
 

@@ -9,7 +9,7 @@ import pytest
 from openscenario_xml import catalog_xml, object_xml, scenario_xml
 
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.library import scenarios
+from eidrive_scenario.extensions.library import scenarios
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.model import Element
 from eidrive_scenario.openscenario.reading import parsing

@@ -10,10 +10,10 @@ import pytest
 from openscenario_xml import catalog_xml, object_xml, scenario_xml
 from storyboard_xml import private_xml, story_xml
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import Scenario, load_scenario, model
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.traffic import TrafficMix
 from eidrive_scenario.world.specs import _VEHICLES, actor_spec

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.faults import FIRST_TRACK, FalseObject, PoseError, with_false_objects, with_pose_error
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector

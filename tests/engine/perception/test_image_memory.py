@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eidrive_scenario.content_digest import content_digest
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.content_digest import content_digest
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_memory import ImageMemory, RecentResults, StationDetections

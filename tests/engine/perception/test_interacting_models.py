@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.perception.tracking.interacting_models import MOVES, STANDS, InteractingModels, Tracks
 from eidrive_scenario.perception.tracking.motion_models import (
     WANDERING_DENSITY,

@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.extensions.registry import registry
+from eidrive_scenario.extensions.settings import parse_settings
 from eidrive_scenario.perception.detector import DetectorContext, ImageDetections
 from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector, merge_duplicates
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.registry import registry
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
-from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 

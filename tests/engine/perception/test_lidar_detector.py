@@ -10,8 +10,8 @@ import pytest
 from msgspec.structs import replace
 from opendrive_xml import map_xml, road_xml
 
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import iou_bev
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, pattern_from_points, pattern_from_settings
 from eidrive_scenario.perception.lidar.detector import LidarDetector, LidarDetectorSettings

@@ -11,7 +11,7 @@ from image_boxes import HEIGHT, USUAL, WIDTH, box, camera, outline
 from msgspec.structs import replace
 from opendrive_xml import elevation_xml, map_xml, road_xml
 
-from eidrive_scenario.geometry import iou_bev
+from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels, straight_boxes

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eidrive_scenario.library import library_path
+from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.perception.detector import DetectorContext, ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.learned.detector import YoloDetector
@@ -24,7 +25,6 @@ from eidrive_scenario.perception.learned.lights import (
     signal_kinds,
 )
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor

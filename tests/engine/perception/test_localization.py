@@ -9,7 +9,7 @@ import pytest
 from sample_car import CAR
 from scipy.stats import chi2
 
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.localization import (
     Estimate,
     InertialFilter,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.perception.oracle import OracleDetector
-from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 
 EGO = EgoState(1.5, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -17,7 +17,8 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
+from eidrive_scenario.extensions.settings import parse_settings
 from eidrive_scenario.perception.learned import network_loading, runtimes
 from eidrive_scenario.perception.learned.detector import YoloDetector
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
@@ -25,7 +26,6 @@ from eidrive_scenario.perception.learned.own_network import Infer, OwnNetwork
 from eidrive_scenario.perception.learned.runtimes import Runtime, is_installed, select_runtime
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import read
-from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 RED_BOXES = Path(__file__).parents[2] / "data" / "red_boxes.onnx"

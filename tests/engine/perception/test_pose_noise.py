@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.perception.pipeline import Perception

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.agent_factory import build_detector
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult, RegistryError

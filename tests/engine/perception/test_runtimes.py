@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.perception.learned import runtimes
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.runtimes import (

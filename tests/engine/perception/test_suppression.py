@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.perception.learned.image_network import (
     IMAGE_CLASSES,
     image_class,

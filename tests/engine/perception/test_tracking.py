@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 from scipy.stats import chi2
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
 from eidrive_scenario.perception.tracking.tracker import Tracker

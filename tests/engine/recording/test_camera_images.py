@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.recording.camera_images import (

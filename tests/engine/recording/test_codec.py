@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame

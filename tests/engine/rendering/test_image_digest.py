@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from eidrive_reports.street_view import look_at
 
-from eidrive_scenario.content_digest import content_digest
+from eidrive_scenario.base.content_digest import content_digest
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.rendering.lamps import Beam
 from eidrive_scenario.rendering.model import MeshInstance, Model, gridded, model

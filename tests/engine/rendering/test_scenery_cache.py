@@ -11,7 +11,7 @@ from eidrive_reports.street_view import look_at
 from eidrive_reports.weather_sheet import street
 from sample_car import CarFactory
 
-from eidrive_scenario.library import names
+from eidrive_scenario.extensions.library import names
 from eidrive_scenario.rendering.renderer import Renderer
 from eidrive_scenario.rendering.scene import Visuals
 from eidrive_scenario.world import World

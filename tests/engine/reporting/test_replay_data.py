@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.evaluation.nearest_actor import nearest_body, nearest_pair
-from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.replay.frame_data import MessageList, Timeline, packed, replay_data

@@ -7,8 +7,8 @@ import math
 import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork, fastest, fewest_junctions, random_costs
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import RoadError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.routing.steady_lanes import SteadyLane
 

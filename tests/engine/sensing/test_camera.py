@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import (
     BASE_SPEED,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.coverage import ViewSector
+from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.sensing.sensor import view_sectors
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec

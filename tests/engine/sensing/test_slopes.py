@@ -11,7 +11,7 @@ import pytest
 from opendrive_xml import elevation_xml, map_xml, road_xml, superelevation_xml
 from sample_car import CAR
 
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings, TruthSettings

@@ -8,7 +8,7 @@ import numpy as np
 from fleet_scene import car, street, view_of
 from msgspec.structs import replace
 
-from eidrive_scenario.car_following import IntelligentDriver
+from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.traffic import (
     BackgroundTraffic,
     Changes,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.rendering.tone_mapping import ideal_image
 from eidrive_scenario.world import World
 from eidrive_scenario.world.camera import CameraImage, Pinhole

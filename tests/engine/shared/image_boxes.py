@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.sensing.readings import CameraReading

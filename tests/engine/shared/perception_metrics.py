@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.evaluation.known_actors import nearest_pairs
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, match_by_share
 from eidrive_scenario.experiments.statistics.intervals import Proportion, wilson
-from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.recording.frame import Frame
 
 SIGHTED = 2.0

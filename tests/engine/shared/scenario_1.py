@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, run_file
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run
 from eidrive_scenario.recording import Recorder

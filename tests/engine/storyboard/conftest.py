@@ -13,8 +13,8 @@ from openscenario_xml import round_car_xml, scenario_xml
 from py_trees.common import Status
 from storyboard_xml import act_xml, acts_xml, group_xml, init_xml, maneuver_xml
 
+from eidrive_scenario.extensions.registry import Registry
 from eidrive_scenario.openscenario import load_scenario, model
-from eidrive_scenario.registry import Registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition

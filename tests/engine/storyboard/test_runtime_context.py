@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from eidrive_scenario.base.requests import Override
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.requests import Override
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.context.protocols import ActionContext, ConditionContext, ControllerContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext

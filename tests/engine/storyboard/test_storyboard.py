@@ -22,7 +22,7 @@ from storyboard_xml import (
 )
 
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.registry import Registry
+from eidrive_scenario.extensions.registry import Registry
 from eidrive_scenario.storyboard.state.element_states import ElementTransition
 
 STARTS = teleport_xml(world_position_xml(5)) + speed_xml(10)

@@ -13,12 +13,12 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from eidrive_scenario import wall_limit as wall_limit_module
 from eidrive_scenario.api.criteria import Criterion, Frame, Verdict
+from eidrive_scenario.base import wall_limit as wall_limit_module
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, execute
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 
 
 def killed_at_30(job: SweepJob, wall_limit: float | None, files: KeptFiles | None) -> StoredRun:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.sweeps.searches import Boundary, BoundarySearch, is_found
-from eidrive_scenario.randomness import generator
 
 
 def searched(

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from sweep_workers import InProcess
 
+from eidrive_scenario.base.wall_limit import limit_wall_time
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
@@ -24,10 +25,9 @@ from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepJob, plan_of, v
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, execute
-from eidrive_scenario.project import VARIABLE
-from eidrive_scenario.registry import registry, use_project
+from eidrive_scenario.extensions.project import VARIABLE
+from eidrive_scenario.extensions.registry import registry, use_project
 from eidrive_scenario.simulation import RunSettings
-from eidrive_scenario.wall_limit import limit_wall_time
 
 distributed = pytest.importorskip("distributed")
 
@@ -100,7 +100,7 @@ def test_hung_run_on_cluster_is_one_row_and_waiting_runs_have_results(
         if job.point["Speed"] == 30:
             with calls.open("a") as stream:
                 stream.write("x")
-            importlib.import_module("eidrive_scenario.wall_limit").GRACE = 0.1  # type: ignore[attr-defined]
+            importlib.import_module("eidrive_scenario.base.wall_limit").GRACE = 0.1  # type: ignore[attr-defined]
             with limit_wall_time(wall_limit):
                 while True:
                     with suppress(BaseException):

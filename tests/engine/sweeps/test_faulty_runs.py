@@ -20,7 +20,7 @@ from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, LocalWorkers, execute
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.simulation import RunSettings
 
 __all__ = ["eidrive"]

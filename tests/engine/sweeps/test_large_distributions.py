@@ -8,7 +8,7 @@ import pytest
 
 from eidrive_scenario.errors import ScenarioError, SettingError
 from eidrive_scenario.experiments.sweeps.jobs import plan_of
-from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings
 
 RANGE = """<DeterministicSingleParameterDistribution parameterName="{name}"><DistributionRange stepWidth="0.029">

@@ -21,7 +21,7 @@ from eidrive_scenario.experiments.sweeps.results import summaries
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
-from eidrive_scenario.registry import registry
+from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.simulation import RunSettings, Simulation
 
 SPEEDS: list[Point] = points_of(parse_axes(["Speed=10,30,50"]), "grid", None, 1)

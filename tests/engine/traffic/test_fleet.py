@@ -7,7 +7,7 @@ import pytest
 from fleet_scene import LENGTH, WIDTH, car, view_of
 from opendrive_xml import lane_links_xml, lane_xml, ring_xml, section_xml
 
-from eidrive_scenario.geometry import overlap
+from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, IntelligentDriver
 from eidrive_scenario.world.actor import Placement

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.car_following import Drivers, ballistic
+from eidrive_scenario.base.car_following import Drivers, ballistic
 from eidrive_scenario.traffic import IntelligentDriver
 
 DRIVER = IntelligentDriver(time_gap=1.5, standstill_gap=2.0, acceleration=1.2, deceleration=2.0, exponent=4.0)

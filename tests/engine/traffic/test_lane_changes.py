@@ -9,7 +9,7 @@ import pytest
 from fleet_scene import car, street
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
-from eidrive_scenario.geometry import overlap
+from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, LaneChanger
 from eidrive_scenario.traffic.lane_changes import Prospect, incentive, safe

@@ -9,7 +9,7 @@ import pytest
 from background_scene import DT, Scene, swarm
 from fleet_scene import view_of
 
-from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.world.actor import Placement
 
 

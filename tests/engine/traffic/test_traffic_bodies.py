@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.traffic import TrafficMix
 from eidrive_scenario.traffic.spawning.bodies import library_bodies
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.settings import parse_settings
+from eidrive_scenario.extensions.settings import parse_settings
 from eidrive_scenario.v2x.analytic.cv2x_mode4 import cv2x_mode4_errors
 from eidrive_scenario.v2x.analytic.ieee80211p import airtime, ieee80211p_errors
 from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss

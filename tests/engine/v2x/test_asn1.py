@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder, cpm_value
 from eidrive_scenario.v2x.messages.message import Message, StationState

@@ -10,7 +10,7 @@ import pytest
 from pydantic import TypeAdapter
 from radio_traffic import composed
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel
 from eidrive_scenario.v2x.link_models.delay import Delay, LognormalDelay
 from eidrive_scenario.v2x.messages.generation import cpm_size

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.v2x.messages.generation import (
     CamGenerationRules,
     CpmContents,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.recording import TraceHash
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, StationState

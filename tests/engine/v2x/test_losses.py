@@ -12,7 +12,7 @@ from processor_time import within_readings
 from pydantic import TypeAdapter, ValidationError
 from radio_traffic import composed
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.link_models.delay import TraceDelay
 from eidrive_scenario.v2x.link_models.loss import DistanceLoss, GilbertElliottLoss, Loss

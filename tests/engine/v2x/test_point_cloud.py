@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.v2x.messages.message import HEADER_BYTES, PointCloud, compress
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.detections import Detections
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.v2x.statistics import reception_log
 from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog

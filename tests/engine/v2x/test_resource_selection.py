@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, Sensed, candidates
 
 NOW, BANDS = 5000, 4

@@ -7,8 +7,8 @@ import pytest
 from opendrive_xml import elevation_xml, map_xml, road_xml
 from sample_car import CarFactory
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement

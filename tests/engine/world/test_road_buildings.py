@@ -9,7 +9,7 @@ import pytest
 from opendrive_xml import map_xml, road_xml
 from sample_car import CarFactory
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.library import names
+from eidrive_scenario.extensions.library import names
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.environment import Environment, solar_position, weather_from_environment

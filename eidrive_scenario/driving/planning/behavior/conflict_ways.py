@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL

@@ -7,7 +7,8 @@ import math
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, passing_profiles
 from eidrive_scenario.driving.planning.behavior.proposals import (
     ROUTE,
@@ -29,7 +30,6 @@ from eidrive_scenario.driving.planning.behavior.scoring import URGENT, OncomingT
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import VULNERABLE
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (

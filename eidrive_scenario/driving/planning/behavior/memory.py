@@ -9,11 +9,11 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.detections import VULNERABLE, Detections
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.detections import VULNERABLE, Detections
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 ON_FOOT = frozenset({"pedestrian"})
 STILL = 0.5

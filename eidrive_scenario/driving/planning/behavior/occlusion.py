@@ -8,9 +8,9 @@ from collections.abc import Hashable, Sequence
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.coverage import PerceptionRegion, ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.conflict_ways import UPSTREAM, ConflictWay
 from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings

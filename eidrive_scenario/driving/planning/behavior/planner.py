@@ -9,9 +9,12 @@ from typing import ClassVar
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.coverage import PerceptionRegion
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.coverage import PerceptionRegion
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.requests import Goal
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
@@ -27,12 +30,9 @@ from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.signal_states import ON, lamps
 from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 STEP = 0.25

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
-from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
 
 STANDING = 0.3

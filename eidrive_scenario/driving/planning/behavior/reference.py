@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.path import PlannedPath, path_heights
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t

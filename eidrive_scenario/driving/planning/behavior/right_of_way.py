@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.traffic_lights import StopLine, places_along, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.car_following import IntelligentDriver
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.driving.planning.behavior.proposals import Option, Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings

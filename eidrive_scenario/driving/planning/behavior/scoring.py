@@ -9,7 +9,7 @@ from itertools import groupby
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Body, LateralProfile, Option
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.rollout import WALL, Rollout

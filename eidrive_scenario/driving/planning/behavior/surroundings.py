@@ -8,8 +8,8 @@ from functools import cached_property
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.detections import VULNERABLE
+from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine

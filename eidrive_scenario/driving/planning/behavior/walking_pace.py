@@ -7,14 +7,14 @@ import math
 import msgspec
 import numpy as np
 
-from eidrive_scenario.detections import VULNERABLE
+from eidrive_scenario.base.detections import VULNERABLE
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.maneuvers import LEAST_CLEARANCE, Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.scoring import Options
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 PACE = 2.0
 """Walking pace [m/s]; in a traffic-calmed area German courts accept 4 to 7 km/h."""

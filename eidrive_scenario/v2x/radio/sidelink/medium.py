@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate

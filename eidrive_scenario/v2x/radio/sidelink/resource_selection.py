@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.v2x.standards import CANDIDATE_SHARE
 
 STEP_DB = 3.0

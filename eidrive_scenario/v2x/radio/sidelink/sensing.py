@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve

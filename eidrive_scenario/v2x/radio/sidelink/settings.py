@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import suggestion
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
 from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 

@@ -12,7 +12,7 @@ from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules
 from eidrive_scenario.driving.planning.path import PlannedPath
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
 Size = tuple[float, float]

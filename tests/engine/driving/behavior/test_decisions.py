@@ -10,8 +10,8 @@ import pytest
 from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
 from signal_street import CAR
 
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 

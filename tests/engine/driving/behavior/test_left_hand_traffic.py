@@ -12,7 +12,7 @@ import pytest
 from mirrored_scenario import write_mirrored
 
 from eidrive_scenario.api.run import run_file
-from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.recording.frame import Frame
 
 pytestmark = pytest.mark.exhaustive

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.api.run import RunSettings, Simulation, load_scenario
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 
 pytestmark = pytest.mark.exhaustive
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from planned_drive import KnownBox, detections
 
-from eidrive_scenario.arrays import Bools
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.arrays import Bools
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 

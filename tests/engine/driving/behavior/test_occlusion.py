@@ -11,8 +11,8 @@ import pytest
 from sample_car import CAR
 
 from eidrive_scenario.api.run import RunResult, RunSettings, run_file
-from eidrive_scenario.coverage import PerceptionRegion, ViewSector
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.occlusion import CREEP, HiddenTraffic, Occluders, PossibleTraffic
@@ -20,7 +20,7 @@ from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.path import PlannedPath
-from eidrive_scenario.library import from_library
+from eidrive_scenario.extensions.library import from_library
 
 NOTHING = Occluders.of_boxes(np.empty((0, 7)))
 EVERYWHERE = ViewSector(0.0, 0.0, 1.5, 0.0, math.pi, 200.0)

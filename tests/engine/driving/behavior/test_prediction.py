@@ -10,12 +10,12 @@ from opendrive_xml import map_xml, road_xml
 from planned_drive import KnownBox, detections
 from signal_street import stop_sign
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion, stopping_motion
 from eidrive_scenario.driving.planning.behavior.right_of_way import Course
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
 TIMES = np.arange(0.0, 8.01, 0.25)

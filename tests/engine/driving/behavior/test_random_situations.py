@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from planned_drive import KnownBox, behavior, detections
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.memory import nearest_rows
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.car_following import IntelligentDriver
+from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Option, Proposal, Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.rollout import Course, Limits, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings

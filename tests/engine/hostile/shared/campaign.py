@@ -29,7 +29,7 @@ from trial import TIME_LIMIT, Outcome, attempt
 
 from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.library import definition, library_path
+from eidrive_scenario.extensions.library import definition, library_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation

@@ -8,7 +8,7 @@ from typing import Protocol
 from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
 from storyboard_xml import init_xml, lane_position_xml, teleport_xml
 
-from eidrive_scenario.library import library_path
+from eidrive_scenario.extensions.library import library_path
 
 
 class Write(Protocol):

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
 from eidrive_scenario.errors import EidriveError, InputError
-from eidrive_scenario.library import definition
+from eidrive_scenario.extensions.library import definition
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 

@@ -7,7 +7,7 @@ import math
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.base.arrays import Array, Bools
 
 
 class ViewSector(msgspec.Struct, frozen=True):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 
 ABOVE_DESIRED = 2.0
 """Maximum braking above the desired speed in units of the comfortable deceleration.

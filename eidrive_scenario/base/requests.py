@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import msgspec
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 
 LONGEST_WAY = 200_000.0
 """Maximum length of a way to a destination [m]: a planner may have a point for each meter."""

@@ -35,7 +35,7 @@ def library_path() -> Path:
 
     Raise SettingError if there is none.
     """
-    package = Path(__file__).parent
+    package = Path(__file__).parents[1]
     for folder in (package / "library", package.parent / "xosc"):
         if folder.is_dir():
             return folder

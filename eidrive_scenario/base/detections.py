@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.base.arrays import Array
 
 NOT_ESTIMATED: Array = np.empty(0)
 """Existence of objects for which no tracker and no fusion method has estimated it."""

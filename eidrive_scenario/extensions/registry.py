@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, quoted, suggestion
-from eidrive_scenario.project import entry_points_of, modules_of, project_entry_points, selected_project
+from eidrive_scenario.extensions.project import entry_points_of, modules_of, project_entry_points, selected_project
 
 GROUPS = (
     "actions",

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from eidrive_scenario.assignment import assign, assign_matrix, associate
+from eidrive_scenario.base.assignment import assign, assign_matrix, associate
 
 Pair = tuple[int, int]
 
@@ -57,7 +57,8 @@ def test_equal_costs_select_the_lowest_indices() -> None:
 
 def test_competing_pairs_import_the_general_method_only_if_necessary() -> None:
     program = (
-        "import sys; from eidrive_scenario.assignment import assign; assign([0, 0, 1], [0, 1, 2], [3.0, 2.0, 1.0]); "
+        "import sys; from eidrive_scenario.base.assignment import assign; "
+        "assign([0, 0, 1], [0, 1, 2], [3.0, 2.0, 1.0]); "
         "star = 'scipy' in sys.modules; assign([0, 0, 1], [0, 1, 1], [3.0, 2.0, 1.0]); "
         "print(star, 'scipy' in sys.modules)"
     )

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.geometry import (
+from eidrive_scenario.base.geometry import (
     box_corners,
     box_distance,
     footprint,

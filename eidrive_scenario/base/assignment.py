@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.base.arrays import Array, Bools
 
 OUTSIDE = 1e6
 """Cost of a pair outside the gate: finite, so that a full assignment exists, and above any sum of gated costs."""

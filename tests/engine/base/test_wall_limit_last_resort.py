@@ -11,12 +11,12 @@ from faulty_extensions import write_scenario
 from threads import run_in_thread
 
 import eidrive_scenario
-from eidrive_scenario import wall_limit
+from eidrive_scenario.base import wall_limit
+from eidrive_scenario.base.wall_limit import LastResort, Limit, limit_wall_time, set_last_resort
 from eidrive_scenario.errors import WallLimitError
 from eidrive_scenario.recording import Frame
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.simulation.attribution import describe_dump, describe_hung_run
-from eidrive_scenario.wall_limit import LastResort, Limit, limit_wall_time, set_last_resort
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -102,7 +102,7 @@ def test_dump_of_hung_run_or_check_names_line_of_its_thread(module: str) -> None
     dump = f"""Timeout (0:00:12)!
 Thread 0x00007f0000000002 (most recent call first):
   File "/usr/lib/python3.11/threading.py", line 331 in wait
-  File "{engine / "wall_limit.py"}", line 161 in _watch
+  File "{engine / "base" / "wall_limit.py"}", line 161 in _watch
 
 Thread 0x00007f0000000001 (most recent call first):
   File "{reading}", line 66 in read_regular_file

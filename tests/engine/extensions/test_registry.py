@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import RegistryError, SettingError
-from eidrive_scenario.registry import Registry
+from eidrive_scenario.extensions.registry import Registry
 
 GROUP = "eidrive_scenario.criteria"
 

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, RegistryError, SettingError, quoted, suggestion
-from eidrive_scenario.registry import registry, singular
+from eidrive_scenario.extensions.registry import registry, singular
 
 MAX_NUMBER = 1e12
 """Maximum absolute value of a number in settings; no length, time, rate or power comes near it."""

@@ -7,7 +7,7 @@ import importlib
 import pytest
 
 import eidrive_scenario.traffic
-from eidrive_scenario.imports import lazy_exports
+from eidrive_scenario.base.imports import lazy_exports
 
 
 @pytest.mark.parametrize(

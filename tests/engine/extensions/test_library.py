@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from eidrive_scenario import library
 from eidrive_scenario.errors import ScenarioError, SettingError
+from eidrive_scenario.extensions import library
 from eidrive_scenario.openscenario import load_scenario
 
 OPENING = '<OpenSCENARIO><FileHeader revMajor="1" revMinor="3"/>'

@@ -16,12 +16,12 @@ import pytest
 from faulty_extensions import line_of, write_scenario
 from threads import run_in_thread
 
-from eidrive_scenario import wall_limit
+from eidrive_scenario.base import wall_limit
+from eidrive_scenario.base.wall_limit import LastResort, current_limit, limit_wall_time, set_last_resort
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import Frame, read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
-from eidrive_scenario.wall_limit import LastResort, current_limit, limit_wall_time, set_last_resort
 
 pytestmark = pytest.mark.timeout(600)
 LONG = 3600.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from eidrive_scenario.content_digest import content_digest
+from eidrive_scenario.base.content_digest import content_digest
 from eidrive_scenario.world.weather import Weather
 
 
