@@ -48,6 +48,9 @@ class Continuity:
         return Step(duration, distance) if distance <= reach else None
 
 
+AGAINST = math.cos(math.radians(120.0))
+"""Cosine of the angle between the heading of an actor and the direction of a lane beyond which the lane is an opposite
+one; 120° as in ScenarioRunner's criterion of wrong lanes."""
 Point = tuple[float, float, float]
 
 SIDEWALKS = frozenset({"sidewalk", "walking"})
@@ -89,6 +92,20 @@ class LaneTracker:
             if self.roads.tables.lane_id[row]:
                 found[index].add(row)
         return found
+
+    def are_against(self, points: Sequence[Point], yaw: float) -> list[bool]:
+        """Return whether each point is in lanes whose traffic drives against a heading [rad], outside of junctions."""
+        x, y, z = np.array(points, dtype=float).reshape(-1, 3).T
+        rows, s, indices = self.roads.overlapped_lanes(x, y, z)
+        tables = self.roads.tables
+        heading = tables.lane_poses(rows, s, np.zeros(len(s))).h
+        against = [False] * len(points)
+        for row, index, direction in zip(rows.tolist(), indices.tolist(), heading.tolist(), strict=True):
+            lane, road = tables.lanes[row], self.roads.roads[tables.ids[tables.section_road[tables.lane_section[row]]]]
+            if lane.id and lane.drivable and road.junction_id is None:
+                sense = self.roads.driving_direction(road.id, lane.id)
+                against[index] |= sense * math.cos(direction - yaw) < AGAINST
+        return against
 
     def types_at(self, points: Sequence[Point]) -> list[set[str]]:
         """Return the types of all lanes under each point; "driving" for every type for cars."""

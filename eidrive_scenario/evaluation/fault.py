@@ -6,7 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
+import numpy as np
+
+from eidrive_scenario.base.geometry import points_in_polygon, points_of_boxes
 from eidrive_scenario.evaluation.actor_tracking import LaneTracker, corners
+from eidrive_scenario.roads.objects import crosswalks
 from eidrive_scenario.world.view import ActorState, WorldView
 
 STOPPED = 0.05
@@ -15,6 +19,8 @@ BEHIND = math.radians(150.0)
 """Angle at the reference point between the direction of travel and the center of an actor beyond which that actor is
 behind."""
 
+BODY_GRID = np.array([(a, b, -1.0) for a in (-1.0, -0.5, 0.0, 0.5, 1.0) for b in (-1.0, 0.0, 1.0)])
+"""Points of a body on the ground, as shares of its half sizes."""
 CORNER = 0.1
 """Maximum distance of a contact at a corner from both faces [m]."""
 
@@ -106,7 +112,8 @@ def judge_impact(
         side = approached_side(before, of, other)
     side = side or side_of(view.plain_boxes[row], x, y, partner)
     if _speed(view, before, of) <= STOPPED:
-        return Impact(side, False, "it had stopped")
+        place = None if lanes is None else _blocked_place(view, row, lanes)
+        return Impact(side, place is not None, "it had stopped" if place is None else f"it had stopped {place}")
     if other not in view.rows or _speed(view, before, other) <= STOPPED:
         return Impact(side, True, "the other one had stopped")
     state, there = view.states[row], view.plain_boxes[view.rows[other]]
@@ -121,6 +128,20 @@ def judge_impact(
     if leaves_lane(view, row, lanes):
         return Impact(side, True, "it was in several lanes or off the drivable area")
     return Impact(side, False, "it was in one lane")
+
+
+def _blocked_place(view: WorldView, row: int, lanes: LaneTracker) -> str | None:
+    """Return the place where a body stands in the way of others, at which it must not stop; None if it does not."""
+    body = np.array(view.plain_boxes[row])
+    places = points_of_boxes(body[None], BODY_GRID)[0]
+    points = [(x, y, view.states[row].z) for x, y, _ in places.tolist()]
+    if any("rail" in types or "tram" in types for types in lanes.types_at(points)):
+        return "on rails"
+    if any(points_in_polygon(places[:, :2], outline[:, :2]).any() for outline in crosswalks(lanes.roads)):
+        return "on a crosswalk"
+    if any(lanes.are_against(points, float(body[6]))):
+        return "in a lane of the opposite direction"
+    return None
 
 
 def leaves_lane(view: WorldView, row: int, lanes: LaneTracker) -> bool:

@@ -39,6 +39,11 @@ def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
             yield PlacedObject(item, _pose(network, item, item.s, item.t, item.z_offset), length, width, item.height)
 
 
+def crosswalks(network: RoadNetwork) -> tuple[Array, ...]:
+    """Return the outlines of all crosswalks as polygons (M, 3)."""
+    return tuple(outline for item in network.objects if item.type == "crosswalk" for outline in outlines(network, item))
+
+
 def outlines(network: RoadNetwork, item: RoadObject) -> list[Array]:
     """Return the outlines of an object on the ground as polygons (M, 3), by default from its length and width."""
     if item.outlines:

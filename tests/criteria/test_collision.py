@@ -1,13 +1,16 @@
 """Criterion `collision`: actors, time, position and speed of contacts."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 from eidrive_criteria.collision import Collision, CollisionSettings
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
 from eidrive_scenario.api.common import Contact
 from eidrive_scenario.api.criteria import evaluate_criteria
+from eidrive_scenario.roads import RoadNetwork
 
 
 def criterion(**settings: Any) -> Collision:
@@ -150,3 +153,42 @@ def test_side_of_a_corner_contact_is_that_of_the_approach(
     frames = [frame(0.0, cars, sizes=sizes), frame(0.05, cars, [touch], sizes=sizes)]
     (verdict,) = evaluate_criteria(frames, [criterion()])
     assert f"Ego with its {side}," in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "yaw", "place"),
+    [
+        (-50.0, 0.0, 0.0, None),  # in its lane
+        (-50.0, -3.5, 0.0, None),  # parked at the roadside
+        (-50.0, 3.5, math.pi, None),  # in the lane beside, in its direction
+        (36.5, 1.5, 0.5, None),  # turning in the junction, over lanes of all directions
+        (-50.0, 1.0, 0.0, "in a lane of the opposite direction"),  # partly
+        (-50.0, 3.5, 0.0, "in a lane of the opposite direction"),
+        (14.0, 0.0, 0.0, None),  # before the crosswalk, from x = 16.2 m on
+        (15.0, 0.0, 0.0, "on a crosswalk"),  # partly
+    ],
+)
+def test_collision_of_a_stopped_actor_is_a_fault_where_it_must_not_stop(
+    frame: Any, car: Any, roads: Any, x: float, y: float, yaw: float, place: str | None
+) -> None:
+    """The lane has a width of 3.5 m around y = 0, the opposite one around 3.5 m."""
+    cars = {"Ego": car(x, y, yaw), "Bus": car(x + 4.0, y, yaw + math.pi, 9.0)}
+    collision = criterion()
+    frames = [frame(0.0, cars), frame(0.05, cars, [Contact("Ego", "Bus", (x + 2.0, y, 0.5), 9.0)])]
+    (verdict,) = evaluate_criteria(frames, [collision], roads)
+    assert collision.metrics()["collision.at_fault"] == (place is not None)
+    assert f"as it had stopped{'' if place is None else f' {place}'}" in verdict.reason
+
+
+def test_collision_of_an_actor_that_stopped_on_rails_is_a_fault(frame: Any, car: Any, tmp_path: Path) -> None:
+    path = tmp_path / "tram.xodr"
+    path.write_text(
+        map_xml(road_xml("1", length=100.0, lanes=section_xml(right=lane_xml(-1) + lane_xml(-2, kind="tram")))),
+        encoding="utf-8",
+    )
+    for y, fault in ((-1.75, 0.0), (-3.0, 1.0)):
+        cars = {"Ego": car(50.0, y), "Tram": car(58.0, y, math.pi, 9.0)}
+        collision = criterion()
+        frames = [frame(0.0, cars), frame(0.05, cars, [Contact("Ego", "Tram", (52.0, y, 0.5), 9.0)])]
+        evaluate_criteria(frames, [collision], RoadNetwork.load(path))
+        assert collision.metrics()["collision.at_fault"] == fault

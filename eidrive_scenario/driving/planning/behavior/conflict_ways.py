@@ -13,8 +13,9 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
-from eidrive_scenario.roads import RoadNetwork, outlines
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.objects import crosswalks
 
 UPSTREAM = 150.0
 """Length of a lane before a junction on which hidden traffic is considered [m]."""
@@ -80,8 +81,7 @@ class ConflictWays:
         self._length, self._half_width = size[0], size[1] / 2.0
         self._lanes: dict[str, list[tuple[tuple[LaneKey, ...], Course, float]]] = {}
         self._courses = LaneCourses(roads, rules)
-        crosswalks = [item for item in roads.objects if item.type == "crosswalk"]
-        self._crosswalks = [outline for item in crosswalks for outline in outlines(roads, item)]
+        self._crosswalks = crosswalks(roads)
 
     def along(self, line: ReferenceLine, passages: tuple[Passage, ...]) -> list[ConflictWay]:
         """Return the ways that meet a line, in the order of their zones.
