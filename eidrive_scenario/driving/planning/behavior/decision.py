@@ -9,13 +9,16 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, passing_profiles
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
+from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    FIRST_PLACES,
     ROUTE,
     Body,
     LateralProfile,
     Option,
     Precedence,
+    Proposal,
     Start,
     Wall,
     conflicts,
@@ -24,9 +27,10 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     leading,
     proposals_for,
     towards,
+    with_view,
 )
 from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
-from eidrive_scenario.driving.planning.behavior.scoring import URGENT, OncomingTraffic, Options, evaluate
+from eidrive_scenario.driving.planning.behavior.scoring import URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
@@ -95,6 +99,10 @@ RELEASE = 0.75
 """Share of the hard deceleration below which a proposal ends emergency braking."""
 VIEWED = 10.0
 """Distance ahead at which the oncoming lane is determined [m]."""
+CRUISE = Proposal(0, 1.0, "all", 4.0)
+"""Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
+AT_REST, NEAR_PLACE = 0.1, 1.0
+"""Speed of a vehicle that waits [m/s], and distance from its place of waiting [m]."""
 HARDER = 0.3
 """Difference to a comfortable deceleration from which on braking is hard [m/s²]."""
 
@@ -133,9 +141,11 @@ class Decider:
         self._switched = -math.inf
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
-        self._oncoming = OncomingTraffic(view)
+        self._oncoming = OncomingTraffic(view, times, self._body, settings)
         self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
+        self._passes = False
+        """Whether the last decision was to pass in the oncoming lane, instead of waiting for it."""
         self._brakes = False
         """Whether the last decision was emergency braking."""
 
@@ -144,6 +154,7 @@ class Decider:
 
         shift  increase of the distances along the line [m]; None if the maneuver ends because the lines differ
         """
+        self._oncoming.line_changed(shift)
         current = self._current
         if current is None or shift is None:
             self._current = None
@@ -163,7 +174,9 @@ class Decider:
         options = self._options(situation, scene, profiles, with_maneuvers=expects)
         best = options.best(len(profiles))
         self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
-        self._oncoming.observe(scene, situation.s + self._center, situation.now, held_up=self._held_up)
+        passes = self._current is not None and self._current.uses_oncoming
+        center = situation.s + self._center
+        self._oncoming.observe(scene, center, situation.wanted, situation.now, held_up=self._held_up or passes)
         if self._held_up:
             if not expects:
                 options = self._options(situation, scene, profiles, with_maneuvers=True)
@@ -175,7 +188,8 @@ class Decider:
             threat = options.uncertain_threat(best, scene.certain, is_hard=is_hard)
         if threat >= 0:
             return self._without_hard_braking(situation, scene, options, threat)
-        if self._walking_pace.is_due(situation, options, best):
+        is_waiting = options.options[best].proposal.profile in options.waiting
+        if not is_waiting and self._walking_pace.is_due(situation, options, best):
             slow = self._at_walking_pace(situation, profiles)
             if slow is not None:
                 return slow
@@ -264,19 +278,26 @@ class Decider:
         with_maneuvers: bool = False,
     ) -> Options:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
-        hidden = math.inf
         more = passing_profiles(situation, scene, self._settings, self._body) if with_maneuvers else []
-        if more:
-            beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
-            center = (situation.s + self._center, situation.d)
-            hidden = self._oncoming.first_hidden(scene, beside, center, situation.now)
-            profiles = profiles + more
+        profiles = profiles + more
+        course = Course(situation.line.along, situation.limits, situation.wanted)
+        waiting, refused = set(), set()
         options: list[Option] = []
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
         here = (self._front, situation.s, situation.speed)
         stops = [situation.stop] if situation.stop is not None else []
         for number, profile in enumerate(profiles):
+            holds: list[Wall] = []
+            if profile.uses_oncoming:
+                profile, verdict, place = self._verified(situation, scene, profile, stops)
+                if verdict is Verdict.WAIT:
+                    waiting.add(number)
+                    holds.append(Wall(place, math.inf, "wait for a free oncoming lane"))
+                elif verdict is Verdict.GIVE_UP:
+                    refused.add(number)
             way = inside_way(scene, profile, self._half_width)
+            for hold in holds:
+                way &= scene.rear < hold.s + self._front
             crossing = conflicts(scene, way, situation.s)
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
@@ -284,10 +305,9 @@ class Decider:
             ):
                 kind = proposal.precedence
                 if kind not in reactions:
-                    walls = [*crossing_walls(crossing, self._times, here, kind, reasons), *stops]
+                    walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
                 options.append(Option(proposal, profile, way, *reactions[kind]))
-        course = Course(situation.line.along, situation.limits, situation.wanted)
         start, body = (situation.s, situation.speed), (self._front, self._center)
         rolled = self._roller.roll(options, course, start, body, scene)
         evaluation = evaluate(
@@ -299,9 +319,53 @@ class Decider:
             self._settings,
             wanted=situation.wanted,
             kept=self._kept_names(situation),
-            hidden=hidden,
+            waiting=frozenset(waiting),
+            refused=frozenset(refused),
         )
-        return Options(options, rolled, evaluation)
+        return Options(options, rolled, evaluation, frozenset(waiting), frozenset(refused))
+
+    def _verified(
+        self, situation: Situation, scene: Surroundings, profile: LateralProfile, stops: list[Wall]
+    ) -> tuple[LateralProfile, Verdict, float]:
+        """Return a profile that uses the oncoming lane, whether the vehicle may follow it, and where it waits [m].
+
+        A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
+        """
+        way = inside_way(scene, profile, self._half_width)
+        crossing = conflicts(scene, way, situation.s)
+        leads = leading(scene, way, crossing, situation.s + self._center, CRUISE)
+        course = Course(situation.line.along, situation.limits, situation.wanted)
+        start, body = (situation.s, situation.speed), (self._front, self._center)
+        rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads)], course, start, body, scene)
+        beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
+        verdict = self._oncoming.verify(
+            profile,
+            Motion(rolled.s[0], rolled.speed[0]),
+            scene,
+            situation.line,
+            beside,
+            situation.now,
+            is_current=self._current is not None and self._current.name == profile.name,
+        )
+        place = self._oncoming.waiting_place(profile, situation.s)
+        has_begun = self._passes and self._current is not None and self._current.name == profile.name
+        if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
+            verdict = Verdict.WAIT
+        if verdict is Verdict.WAIT:
+            better = with_view(profile, Start(*situation.steered, situation.speed), self._settings)
+            if better is not None:
+                profile, place = better, self._oncoming.waiting_place(better, situation.s)
+            elif len(profile.places) <= FIRST_PLACES:
+                # Nearer to the obstacle it would see less.
+                stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
+                place = min(place, situation.s + stop)
+            s = situation.s + self._center
+            eye = (s, profile.offset_at(s))
+            waits = situation.speed < AT_REST and place - situation.s < NEAR_PLACE
+            if waits and may_pass(situation, scene, self._body):
+                is_free = self._oncoming.yields(scene, situation.line, beside, eye, situation.now)
+                verdict = Verdict.GO if is_free else verdict
+        return profile, verdict, place
 
     def _kept_names(self, situation: Situation) -> frozenset[str]:
         """Return the current maneuver, and the route if its lateral motion is complete: then the vehicle returns."""
@@ -338,13 +402,15 @@ class Decider:
         if not same:
             return best
         kept = max(same, key=lambda row: float(options.evaluation.score[row]))
-        return kept if not math.isfinite(options.evaluation.collision[kept]) else best
+        is_risky = math.isfinite(options.evaluation.collision[kept])
+        return best if is_risky or options.options[kept].proposal.profile in options.refused else kept
 
     def _decision(self, situation: Situation, options: Options, best: int) -> Decision:
         proposal, profile = options.options[best].proposal, options.options[best].profile
         if self._current is None or profile.name != self._current.name:
             self._switched = situation.now
         self._current = profile
+        self._passes = profile.uses_oncoming and proposal.profile not in options.waiting
         speed, s = options.rolled.speed[best], options.rolled.s[best]
         acceleration = self._acceleration(options, best)
         reason, objects = reason_of(situation, options, best)

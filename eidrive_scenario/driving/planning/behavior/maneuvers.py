@@ -12,10 +12,11 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import VULNERABLE
-from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
     ONCOMING_SPEED,
+    SIMILAR_SPEED,
     Body,
     LateralProfile,
     Start,
@@ -130,8 +131,14 @@ BEFORE_OBSTACLE = 2.0
 """Distance between the rear of the vehicle and a passed obstacle at which it starts to return [m]."""
 SWUNG_OUT = 1.0
 """Distance by which the front is beside an obstacle when the lateral motion ends [m]; it is 99 % complete before."""
+BEFORE_MOVING = 4.0
+"""Gap behind a moving vehicle at which the lateral motion to overtake it ends [m]; a choice, twice `standstill_gap`."""
+MEAN_SHARE = 0.75
+"""Share of the maximum acceleration that the car-following model has on average up to 0.9 of the wanted speed."""
 QUEUE_GAP, QUEUE_PATIENCE = 15.0, 20.0
 """Gap between standing vehicles that queue [m], and time for which a queue has stood before it is passed [s]."""
+INSIDE = 0.1
+"""Clearance to a lane of the opposite direction within which the vehicle is not in it [m]."""
 TOGETHER = 25.0
 """Gap below which two obstacles are passed in one maneuver [m]."""
 NEAR_STOP = 40.0
@@ -170,16 +177,23 @@ def passing_profiles(
     blocker = _blocker(situation, scene, body)
     if blocker is None or _queues(situation, scene, blocker, body):
         return found
+    obstacle = _obstacle(situation, scene, settings, blocker, body)
+    if not may_pass(situation, scene, body):
+        profile = None if obstacle is None else _around(situation, settings, obstacle, body, _overtaking(situation))
+        return found if profile is None or not profile.uses_oncoming else [*found, profile]
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
     if not math.isnan(faster) and _rear_is_free(situation, scene, faster, body.center):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = Start(*situation.steered, situation.speed)
         found.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
-    obstacle = _obstacle(situation, scene, blocker, body)
     if obstacle is not None:
-        sides = (_around(situation, settings, obstacle, body, side) for side in (overtaking, -overtaking))
-        found += [profile for profile in sides if profile is not None]
+        # Beside a lane for it, a moving vehicle is overtaken by a change of lane.
+        changes = not math.isnan(faster) and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
+        sides = (-overtaking,) if changes else (overtaking, -overtaking)
+        found += [
+            profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
+        ]
     return found
 
 
@@ -245,10 +259,14 @@ def _behind_neighbor(
     end = max(last.front + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
     back = change_length(d, max(situation.speed, 2.0), settings.lateral_acceleration)
     name = f"pass {situation.kind_of(last.owner)} on the {'left' if side > 0 else 'right'}"
-    own, _ = situation.line.lanes_beside(situation.lanes_at(end)).room(side)
-    return LateralProfile(
-        name, (s, end, end + back), (d, d, 0.0), slope, side, uses_oncoming=abs(d) + body.half_width > own
-    )
+    border = _border(situation.line.lanes_beside(situation.lanes_at(end)), side, body)
+    return LateralProfile(name, (s, end, end + back), (d, d, 0.0), slope, side, border)
+
+
+def _border(lanes: LanesBeside, side: int, body: Body) -> float:
+    """Return the offset to a side beyond which the vehicle is in a lane of the opposite direction [m]."""
+    own, every = lanes.room(side)
+    return own - body.half_width - INSIDE if every > own else math.inf
 
 
 def _is_in_way(one: Present, half_width: float) -> bool:
@@ -280,10 +298,30 @@ def _is_passable(situation: Situation, one: Present, body: Body) -> bool:
     """Return whether an object may be passed: not a crossing pedestrian, and standing for some time or moving."""
     known = situation.objects[one.owner]
     if known.still_since is None:
-        return known.kind != "pedestrian"
+        return known.kind not in ON_FOOT
+    if known.kind in ON_FOOT and not _is_parked(situation, one, body):
+        return False
+    return known.kind == "misc" or situation.now - known.still_since >= PATIENCE
+
+
+def may_pass(situation: Situation, scene: Surroundings, body: Body) -> bool:
+    """Return whether the vehicle may pass what holds it up now; behind a vehicle that has just stopped it waits."""
+    blocker = _blocker(situation, scene, body)
+    return blocker is None or _is_parked(situation, blocker, body)
+
+
+def _is_parked(situation: Situation, one: Present, body: Body) -> bool:
+    """Return whether an object does not seem to have stopped just now, behind which the vehicle would wait."""
+    known = situation.objects[one.owner]
+    if known.still_since is None or known.kind == "misc" or abs(one.d) > ASIDE:
+        return True
     stands = situation.now - known.still_since
-    waits = situation.speed < WAITING or stands >= LONG or _is_beside(situation, one, body)
-    return known.kind == "misc" or (stands >= PATIENCE and (abs(one.d) > ASIDE or waits))
+    return situation.speed < WAITING or stands >= LONG or _is_beside(situation, one, body)
+
+
+def _overtaking(situation: Situation) -> int:
+    """Return the side for overtaking at the vehicle."""
+    return situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0)).overtaking
 
 
 def _is_steady(situation: Situation, one: Present) -> bool:
@@ -315,7 +353,21 @@ def _rear_is_free(situation: Situation, scene: Surroundings, offset: float, cent
     return True
 
 
-def _obstacle(situation: Situation, scene: Surroundings, blocker: Present, body: Body) -> _Obstacle | None:
+def _catch_up_time(gap: float, closing: float, top: float, acceleration: float) -> float:
+    """Return the time to gain a gap [m] on an object at speeds relative to it from `closing` to `top` [m/s]."""
+    if gap <= 0.0:
+        return 0.0
+    top = max(top, closing, 0.5)
+    time = (top - closing) / acceleration
+    gained = 0.5 * (closing + top) * time
+    if gained >= gap:
+        return (math.sqrt(closing**2 + 2.0 * acceleration * gap) - closing) / acceleration
+    return time + (gap - gained) / top
+
+
+def _obstacle(
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, blocker: Present, body: Body
+) -> _Obstacle | None:
     """Return the blocker with what stands close behind it; None if it is too fast or not steady enough to pass it."""
     objects = _together(scene, blocker, body.half_width)
     wanted = max(situation.wanted, 1.0)
@@ -326,9 +378,15 @@ def _obstacle(situation: Situation, scene: Surroundings, blocker: Present, body:
     if fastest > 0.5:
         if wanted - fastest < SLOWER or not all(_is_steady(situation, one) for one in objects):
             return None
-        durations = [(end - situation.s) / max(wanted - own, 0.5) for end, own in zip(ends, speed, strict=True)]
-        ends = [end + own * duration for end, own, duration in zip(ends, speed, durations, strict=True)]
-        begin += slowest * max(begin - situation.s, 0.0) / max(wanted - slowest, 0.5)
+        gain = settings.acceleration * MEAN_SHARE
+        rear = situation.s - body.rear - BEFORE_OBSTACLE
+        ends = [
+            end + own * _catch_up_time(end - rear, situation.speed - own, wanted - own, gain)
+            for end, own in zip(ends, speed, strict=True)
+        ]
+        if math.isnan(situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0)).faster):
+            begin -= SWUNG_OUT + BEFORE_MOVING
+        begin += slowest * _catch_up_time(begin - situation.s, situation.speed - slowest, wanted - slowest, gain)
     end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
     step = (end - begin) / 3.0
     places = (begin, begin + step, begin + 2.0 * step, end)
@@ -343,7 +401,7 @@ def _around(
     vulnerable = any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
     clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
     outer = max([side * one.d + one.half_width for one in obstacle.objects])
-    own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in obstacle.beside), strict=True))
+    every = min(lanes.room(side)[1] for lanes in obstacle.beside)
     room = every - outer - 2.0 * body.half_width
     if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
@@ -361,9 +419,12 @@ def _around(
         side,
         stands=stands,
     )
-    if profile is not None and value + body.half_width > own:
-        return msgspec.structs.replace(profile, uses_oncoming=True, passes_standing=stands)
-    return profile
+    if profile is None:
+        return None
+    border = min(_border(lanes, side, body) for lanes in obstacle.beside)
+    fastest = max(one.speed for one in obstacle.objects)
+    profile = msgspec.structs.replace(profile, border=border)
+    return msgspec.structs.replace(profile, overtakes=max(fastest, 0.0)) if profile.uses_oncoming else profile
 
 
 def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:
@@ -373,7 +434,7 @@ def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[
         for one in scene.present
         if one.s >= blocker.s
         and not one.crosses
-        and abs(one.speed - blocker.speed) < 1.0
+        and abs(one.speed - blocker.speed) < SIMILAR_SPEED
         and _is_in_way(one, half_width)
     ]
     found = [blocker]

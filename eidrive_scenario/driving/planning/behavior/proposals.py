@@ -25,6 +25,12 @@ TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
 """Share of the length of a lateral motion in which most of it must be possible."""
+WALKING = 2.0
+"""Speed for which the lateral motion from a place of waiting is made [m/s]."""
+AT_EDGE = 10.0
+"""Length of the way at the edge of the lane before a place of waiting [m]: two lengths of a car."""
+FIRST_PLACES = 5
+"""Maximum number of places of a profile past an obstacle in one lateral motion."""
 AT_OFFSET = 0.1
 """Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
 
@@ -63,10 +69,10 @@ class LateralProfile(msgspec.Struct, frozen=True):
     values: tuple[float, ...]
     slope: float = 0.0
     side: int = 0
-    uses_oncoming: bool = False
-    """Whether the vehicle enters a lane of the opposite direction."""
-    passes_standing: bool = False
-    """Whether it passes objects that stand, so that its end is known beyond the horizon."""
+    overtakes: float = 0.0
+    """Speed of the fastest object that it overtakes [m/s]; 0 if it passes standing ones only."""
+    border: float = math.inf
+    """Distance from the line to `side` beyond which the vehicle is in a lane of the opposite direction [m]."""
 
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""
@@ -96,6 +102,11 @@ class LateralProfile(msgspec.Struct, frozen=True):
         """Offset at the end of the maneuver [m]."""
         return self.values[-1]
 
+    @property
+    def uses_oncoming(self) -> bool:
+        """Whether the vehicle enters a lane of the opposite direction."""
+        return self.side * max(self.values, key=abs) > self.border
+
 
 def blend(share: Array) -> Array:
     """Return the quintic blend from 0 to 1, with derivatives of 0 at both ends."""
@@ -111,8 +122,18 @@ def change_length(change: float, speed: float, lateral_acceleration: float) -> f
     """Return the length of a lateral motion by `change` [m] at a speed [m/s] with this peak acceleration [m/s²]."""
     if not change:
         return 1.0
-    duration = math.sqrt(PEAK_ACCELERATION * abs(change) / lateral_acceleration)
-    return max(duration * speed, SHORTEST * math.sqrt(min(abs(change) / USUAL_WIDTH, 1.0)), 1.0)
+    by = np.array(abs(change))
+    return max(float(lateral_duration(by, lateral_acceleration)) * speed, float(least_length(by)), 1.0)
+
+
+def lateral_duration(change: Array, lateral_acceleration: float) -> Array:
+    """Return the durations of lateral motions by distances `change` [m] with this peak acceleration [m/s²]."""
+    return np.asarray(np.sqrt(PEAK_ACCELERATION * change / lateral_acceleration))
+
+
+def least_length(change: Array) -> Array:
+    """Return the minimum lengths of lateral motions by distances `change` [m]."""
+    return np.asarray(SHORTEST * np.sqrt(np.minimum(change / USUAL_WIDTH, 1.0)))
 
 
 class Start(NamedTuple):
@@ -167,11 +188,34 @@ def passing(
     return LateralProfile(name, tuple(places), (*values, value, value, 0.0), slope, side)
 
 
+def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings) -> LateralProfile | None:
+    """Return a profile past an obstacle in two lateral motions, with a way at the edge of the lane between them, where
+    the vehicle has a view into the oncoming lane.
+
+    The result is None if there is not enough space, or if the profile has such a way already.
+    """
+    s, offset, slope, speed = start
+    edge = profile.side * (profile.border - AT_OFFSET)
+    begin, end, back = profile.places[-3:]
+    value = profile.values[-2]
+    onward = begin - change_length(value - edge, WALKING, settings.lateral_acceleration)
+    length = change_length(edge - offset, max(speed, WALKING), settings.lateral_acceleration)
+    if len(profile.places) > FIRST_PLACES or s + length > onward:
+        return None
+    first = max(onward - length - 2.0 * AT_EDGE, s)
+    starts = ((s, offset), (first, offset)) if first - s >= 1.0 else ((s, offset),)
+    ends = ((first + length, edge), (onward, edge), (begin, value), (end, value), (back, 0.0))
+    places, values = zip(*starts, *ends, strict=True)
+    return msgspec.structs.replace(profile, places=places, values=values, slope=slope)
+
+
 Precedence = Literal["all", "earlier", "none"]
 """Crossing and merging traffic to which a proposal gives way: all of it, what arrives earlier, or none."""
 
 SPEED_SHARES = (1.0, 0.7, 0.4)
 """Target speeds of proposals, as shares of the wanted speed."""
+SIMILAR_SPEED = 1.0
+"""Difference of speeds up to which objects are overtaken together [m/s]."""
 ONCOMING_SPEED = 0.5
 """Speed against the direction of the vehicle above which an object is oncoming [m/s]."""
 BEFORE_ZONE = 1.5
@@ -235,8 +279,15 @@ class Conflict(msgspec.Struct, frozen=True):
 
 
 def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float, extra: float = 0.0) -> Bools:
-    """Return where hypotheses are in the way (N, K) of a vehicle that follows a profile."""
-    gap = np.abs(profile.offset(scene.s) - scene.d) - scene.half_width
+    """Return where hypotheses are in the way (N, K) of a vehicle that follows a profile.
+
+    The vehicle is beside an object that it overtakes as soon as it reaches it, wherever the object is now.
+    """
+    s = scene.s
+    if profile.overtakes:
+        slow = (scene.speed[:, 0] > ONCOMING_SPEED) & (scene.speed[:, 0] <= profile.overtakes + SIMILAR_SPEED)
+        s = np.where((slow & (scene.rear[:, 0] < profile.places[-2]))[:, None], profile.places[-2], s)
+    gap = np.abs(profile.offset(s) - scene.d) - scene.half_width
     return np.asarray(gap < half_width + scene.margin[:, None] * 0.5 + extra)
 
 

@@ -39,6 +39,8 @@ class LanesBeside(NamedTuple):
     right_edge: float = -WITHOUT_ROAD
     far_edge: float = WITHOUT_ROAD
     overtaking: int = 1
+    oncoming_limit: float = math.nan
+    """Speed limit of the nearest lane of the opposite direction [m/s]; NaN if there is none."""
 
     @property
     def faster(self) -> float:
@@ -64,6 +66,7 @@ class LanesBeside(NamedTuple):
             -self.left_edge,
             -self.far_edge,
             -self.overtaking,
+            self.oncoming_limit,
         )
 
 
@@ -165,9 +168,15 @@ class ReferenceLine:
             (center[n], half[n], section.lanes[n].drivable, roads.driving_direction(road.id, n) == sense) for n in order
         ]
         if road.rule == "RHT":
-            return _beside(lanes, own)
-        lanes = [(-place, width, drivable, with_traffic) for place, width, drivable, with_traffic in reversed(lanes)]
-        return _beside(lanes, len(lanes) - 1 - own).mirrored()
+            beside = _beside(lanes, own)
+        else:
+            lanes = [(-middle, width, drivable, same) for middle, width, drivable, same in reversed(lanes)]
+            beside = _beside(lanes, len(lanes) - 1 - own).mirrored()
+        if math.isnan(beside.oncoming):
+            return beside
+        opposite = min(order, key=lambda number: abs(center[number] - beside.oncoming))
+        limit = roads.speed_limit(road.id, place.s, opposite)
+        return beside if limit is None else beside._replace(oncoming_limit=limit)
 
 
 def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBeside:

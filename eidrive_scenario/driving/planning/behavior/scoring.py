@@ -10,122 +10,10 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers
-from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Body, LateralProfile, Option
-from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
+from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Body, Option
 from eidrive_scenario.driving.planning.behavior.rollout import WALL, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
-
-LANES = 6.0
-"""Offset from the line within which oncoming traffic counts [m]: two lanes."""
-PAUSE = 6.0
-"""Time of waiting without oncoming traffic after which none is expected beyond the view [s], of the order of the
-critical gaps of the Highway Capacity Manual (4.1 to 7.5 s)."""
-FREE_TIME = 1.0
-"""Time without an obstruction after which the vehicle does not wait any more [s]."""
-SAMPLE = 2.0
-"""Spacing of the places on the oncoming lane that are checked for a view [m]."""
-
-
-class OncomingTraffic:
-    """Oncoming traffic that one vehicle observes over time, and what may come from where it has no view.
-
-    view  range of the perception of the vehicle [m]
-    """
-
-    def __init__(self, view: float) -> None:
-        self._ahead: Array = np.arange(SAMPLE, view + SAMPLE, SAMPLE)
-        """Distances of the places that are checked for a view [m]."""
-        self._last = -math.inf
-        self._held_up_since: float | None = None
-        self._held_up_until = -math.inf
-
-    def observe(self, scene: Surroundings, center: float, now: float, *, held_up: bool) -> None:
-        """Update by the objects at `now` [s].
-
-        center   distance of the center of the vehicle along the line [m]
-        held_up  whether the vehicle would pass something
-        """
-        if bool(_is_oncoming(scene, 0, center).any()):
-            self._last = now
-        if held_up:
-            self._held_up_until = now
-            self._held_up_since = now if self._held_up_since is None else self._held_up_since
-        elif now - self._held_up_until > FREE_TIME:
-            self._held_up_since = None
-
-    def first_hidden(self, scene: Surroundings, beside: LanesBeside, ego: tuple[float, float], now: float) -> float:
-        """Return the place nearest to the vehicle from which traffic may come unseen [m]; inf if none is expected.
-
-        None is expected if the vehicle has waited and no oncoming traffic appeared for a time of PAUSE.
-
-        ego  distance of the center of the vehicle along the line, and its offset [m]
-        """
-        since = max(self._last, now if self._held_up_since is None else self._held_up_since)
-        if now - since >= PAUSE or math.isnan(beside.oncoming):
-            return math.inf
-        s, d = ego
-        places = s + self._ahead
-        center, half = scene.d[:, 0, None], scene.half_width[:, 0, None]
-        edges = np.concatenate([scene.rear[:, 0], scene.front[:, 0]])
-        # A line to a place on the oncoming lane passes an edge of an object at this share of its length; it is hidden
-        # where it crosses the body between both edges.
-        share = ((edges - s)[:, None] / (places - s)).reshape(2, len(scene), len(places))
-        at_edge = d + share * (beside.oncoming - d)
-        crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
-        hidden: Bools = np.logical_or.reduce(crosses, axis=(0, 1))
-        first = int(hidden.argmax()) if hidden.any() else len(places)
-        return float(s + first * SAMPLE)
-
-
-def first_oncoming(way: Bools, s: float, scene: Surroundings) -> int:
-    """Return the index of the first time at which oncoming traffic is in the way of a vehicle at s; K if never.
-
-    way  where hypotheses are in the way of the vehicle (N, K)
-    """
-    meets: Bools = np.logical_or.reduce(way & (scene.speed < -ONCOMING_SPEED) & (scene.front > s), axis=0)
-    return int(meets.argmax()) if meets.any() else len(meets)
-
-
-def meets_oncoming(
-    profile: LateralProfile,
-    motion: tuple[Array, float],
-    times: Array,
-    oncoming: int,
-    hidden: tuple[float, float],
-    scene: Surroundings,
-) -> bool:
-    """Return whether the vehicle meets oncoming traffic before it is back on its side, or does not return.
-
-    Past objects that stand it also returns after the horizon, until which all keep their last speeds.
-
-    motion    distances along the line (K,) of the vehicle at `times` [m], and its last speed [m/s]
-    oncoming  index of the time from which on oncoming traffic is in its way
-    hidden    place from which traffic may come unseen [m], inf without one, and its speed [m/s]
-    """
-    s, own_speed = motion
-    back = int(s.searchsorted(profile.places[-2]))
-    if oncoming < len(s) and oncoming <= back:
-        return True
-    if back < len(s):
-        end, duration = float(s[back]), float(times[back])
-    elif profile.passes_standing and own_speed > ONCOMING_SPEED:
-        end = profile.places[-2]
-        after = (end - float(s[-1])) / own_speed
-        duration = float(times[-1]) + after
-        if bool((_is_oncoming(scene, -1, float(s[-1])) & (scene.rear[:, -1] + scene.speed[:, -1] * after < end)).any()):
-            return True
-    else:
-        return True
-    place, speed = hidden
-    return bool(place - speed * duration < end)
-
-
-def _is_oncoming(scene: Surroundings, step: int, place: float) -> Bools:
-    """Return which hypotheses (N,) are oncoming traffic ahead of a place [m] at a time step."""
-    is_oncoming = (scene.speed[:, step] < -ONCOMING_SPEED) & (np.abs(scene.d[:, step]) < LANES)
-    return np.asarray(is_oncoming & (scene.front[:, step] > place))
-
 
 CONTACT = 0.1
 """Distance below which bodies are taken to touch [m]; a choice of the order of the errors of tracked positions."""
@@ -151,6 +39,8 @@ class Weights(msgspec.Struct, frozen=True):
     switch           for another maneuver than the current one
     slower           of a lower target speed than wanted, which decides between options that are otherwise alike
     gentle           of a stop for an uncertain object, which is only chosen for such an object
+    refused          for an oncoming lane that is not free; above any progress
+    view             in favor of a place with a view into the oncoming lane; above the progress to the obstacle
     crash            of a collision, above all other terms
     """
 
@@ -162,6 +52,8 @@ class Weights(msgspec.Struct, frozen=True):
     switch: float = 0.3
     slower: float = 0.05
     gentle: float = 50.0
+    refused: float = 20.0
+    view: float = 2.0
     crash: float = 100.0
 
 
@@ -189,13 +81,15 @@ def evaluate(
     *,
     wanted: float,
     kept: frozenset[str],
-    hidden: float,
+    waiting: frozenset[int] = frozenset(),
+    refused: frozenset[int] = frozenset(),
 ) -> Evaluation:
     """Return the evaluation of all options, which are in the order of their profiles.
 
     wanted   wanted speed [m/s]
     kept     names of the maneuvers that are no change: the current one, and the route after a complete one
-    hidden   place from which oncoming traffic may come unseen [m], inf without one
+    waiting  profiles that end before an oncoming lane, for a view into it
+    refused  profiles that use an oncoming lane that is not free
     """
     count, horizon = len(options), float(times[-1])
     offsets = _offsets(options, rolled, ego)
@@ -218,21 +112,18 @@ def evaluate(
     score -= WEIGHTS.risk * risk
     crash = 1.0 + (1.0 - collision / horizon) + 0.05 * impact
     score -= WEIGHTS.crash * np.where(np.isfinite(collision), crash, 0.0)
-    meeting: dict[int, int] = {}
-    """Index of the time from which on oncoming traffic is in the way, by profile."""
+    held = waiting | refused
+    may_go = any(option.profile.uses_oncoming and option.proposal.profile not in held for option in options)
     values: list[float] = score.tolist()
     for row, option in enumerate(options):
         proposal, profile = option.proposal, option.profile
         switches = profile.name not in kept
         values[row] -= WEIGHTS.slower * (1.0 - proposal.share) + WEIGHTS.gentle * proposal.is_gentle
-        if profile.uses_oncoming and switches:
-            if proposal.profile not in meeting:
-                meeting[proposal.profile] = first_oncoming(option.way, float(rolled.s[0, 0]), scene)
-            motion = rolled.s[row], float(rolled.speed[row, -1])
-            first = meeting[proposal.profile]
-            values[row] -= WEIGHTS.risk * meets_oncoming(profile, motion, times, first, (hidden, wanted), scene)
+        if proposal.profile in waiting:
+            values[row] += 0.0 if may_go else WEIGHTS.view
+            continue
         lanes = WEIGHTS.aside * (profile.side != 0) + WEIGHTS.oncoming * profile.uses_oncoming
-        values[row] -= lanes + WEIGHTS.switch * switches
+        values[row] -= lanes + WEIGHTS.switch * switches + WEIGHTS.refused * (proposal.profile in refused)
     return Evaluation(np.array(values), collision, risk, impact, cause)
 
 
@@ -364,6 +255,10 @@ class Options(msgspec.Struct, frozen=True):
     options: Sequence[Option]
     rolled: Rollout
     evaluation: Evaluation
+    waiting: frozenset[int] = frozenset()
+    """Profiles that end before an oncoming lane, for a view into it."""
+    refused: frozenset[int] = frozenset()
+    """Profiles that use an oncoming lane that is not free."""
 
     @property
     def gentle(self) -> int:
@@ -380,11 +275,19 @@ class Options(msgspec.Struct, frozen=True):
         return self.options[row].profile.name
 
     def best(self, profiles: int | None = None) -> int:
-        """Return the index of the option with the highest score, among those along the first `profiles`."""
+        """Return the index of the option with the highest score, among those along the first `profiles`.
+
+        The emergency brake is one of them only if the others collide soon.
+        """
         count = len(self.options)
         if profiles is not None:
             count = sum(option.proposal.profile < profiles for option in self.options)
-        return int(np.argmax(self.evaluation.score[:count]))
+        score = self.evaluation.score[:count].copy()
+        brake = self.emergency
+        with_brake, score[brake] = float(score[brake]), -math.inf
+        best = int(np.argmax(score))
+        is_urgent = float(self.evaluation.collision[best]) < URGENT
+        return brake if is_urgent and with_brake > float(score[best]) else best
 
     def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int:
         """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard; -1 without one.

@@ -1,4 +1,4 @@
-"""Oncoming traffic that is not in view: occlusion, range and time of waiting."""
+"""Use of a lane of the opposite direction: view, traffic in view and out of view, waiting and giving up."""
 
 from __future__ import annotations
 
@@ -6,22 +6,20 @@ import math
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
-from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, inside_way
-from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
-from eidrive_scenario.driving.planning.behavior.scoring import PAUSE, OncomingTraffic, first_oncoming, meets_oncoming
+from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, Motion, OncomingTraffic, Verdict, approach
+from eidrive_scenario.driving.planning.behavior.proposals import AT_EDGE, Body, LateralProfile, Start, with_view
+from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+from eidrive_scenario.driving.planning.path import PlannedPath
 
-UNKNOWN = math.inf
-BESIDE = LanesBeside(oncoming=3.5)
+BESIDE = LanesBeside(oncoming=3.5, oncoming_limit=20.0)
 TIMES = np.arange(0.0, 8.01, 0.25)
-PASSING = LateralProfile("pass", (0.0, 20.0, 50.0, 70.0), (0.0, 3.0, 3.0, 0.0), side=1, uses_oncoming=True)
-
-
-def first(objects: Surroundings) -> int:
-    """Return the index of the first time at which objects are in the way of a vehicle of 1.8 m width; K if never."""
-    return first_oncoming(inside_way(objects, PASSING, 0.9), 0.0, objects)
+BODY = Body(3.8, 1.0, 2.85, 0.9)
+SETTINGS = BehaviorSettings()
+PASSING = LateralProfile("pass", (0.0, 20.0, 50.0, 70.0), (0.0, 3.0, 3.0, 0.0), side=1, border=0.75)
+LINE = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [400.0, 0.0]]), ends=False), None)
 
 
 def scene(*objects: tuple[float, float, float]) -> Surroundings:
@@ -45,79 +43,109 @@ def scene(*objects: tuple[float, float, float]) -> Surroundings:
     )
 
 
+def traffic(view: float) -> OncomingTraffic:
+    """Return the traffic of a vehicle that wants to drive 10 m/s and is held up since 0 s."""
+    observed = OncomingTraffic(view, TIMES, BODY, SETTINGS)
+    observed.observe(scene(), 0.0, 10.0, 0.0, held_up=True)
+    return observed
+
+
+def verdict(
+    *objects: tuple[float, float, float], view: float = 300.0, now: float = 0.0, s: float = 0.0, current: bool = False
+) -> Verdict:
+    """Return the verdict on PASSING at 10 m/s from `s` on, past a car of 5 m that stands at 40 m, and other objects.
+
+    The front axle crosses the border where 3 blend(share) = 0.75, at a share of 0.36; the rear axle returns at 62.8 m,
+    of which 6.5 s is the next time, with the front at 68.8 m.
+    """
+    motion = Motion(s + 10.0 * TIMES, np.full(len(TIMES), 10.0))
+    there = scene(*(objects or ((40.0, 0.0, 0.0),)))
+    return traffic(view).verify(PASSING, motion, there, LINE, BESIDE, now, is_current=current)
+
+
 def test_free_view_ends_at_its_range() -> None:
-    traffic = OncomingTraffic(100.0)
-    assert traffic.first_hidden(scene(), BESIDE, (0.0, 0.0), 0.0) == pytest.approx(100.0, abs=4.0)
+    assert traffic(100.0).first_hidden(LINE, scene(), BESIDE, (0.0, 0.0)) == pytest.approx(100.0, abs=4.0)
 
 
 @pytest.mark.parametrize("gap", [10.0, 20.0])
 def test_truck_ahead_hides_the_lane_beyond_the_line_of_sight(gap: float) -> None:
     # The line of sight over the rear left corner, at (gap, 1.0), reaches the center of the next lane at 3.5 gap.
-    traffic = OncomingTraffic(100.0)
-    found = traffic.first_hidden(scene((gap + 2.5, 0.0, 0.0)), BESIDE, (0.0, 0.0), 0.0)
-    assert found == pytest.approx(3.5 * gap, abs=2.0)
+    hidden = traffic(100.0).first_hidden(LINE, scene((gap + 2.5, 0.0, 0.0)), BESIDE, (0.0, 0.0))
+    assert hidden == pytest.approx(3.5 * gap, abs=2.0)
 
 
-def test_waiting_without_traffic_makes_the_hidden_lane_free() -> None:
-    traffic = OncomingTraffic(50.0)
-    empty = scene()
-    traffic.observe(empty, 0.0, 0.0, held_up=True)
-    assert math.isfinite(traffic.first_hidden(empty, BESIDE, (0.0, 0.0), PAUSE - 0.1))
-    assert traffic.first_hidden(empty, BESIDE, (0.0, 0.0), PAUSE) == math.inf
+def test_crest_hides_the_lane_beyond_it() -> None:
+    """Slopes of 5 % up to 100 m and down from there: from 1.5 m above the road at 60 m the line of sight over the crest
+    falls by (1.5 - 2) / 40, and is 1 m above the road beyond where (100 + x): 5 - 0.05 x + 1 = 5 + 0.0125 x."""
+    line = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [400.0, 0.0]]), ends=False), None)
+    line.__dict__["heights"] = 0.05 * (100.0 - np.abs(line.along - 100.0))
+    hidden = traffic(200.0).first_hidden(line, scene(), BESIDE, (60.0, 0.0))
+    assert hidden == pytest.approx(100.0 + 1.0 / 0.0625, abs=2.0)
 
 
-def test_oncoming_vehicle_restarts_the_time_of_waiting() -> None:
-    traffic = OncomingTraffic(50.0)
-    traffic.observe(scene(), 0.0, 0.0, held_up=True)
-    traffic.observe(scene((30.0, 3.5, -8.0)), 0.0, 4.0, held_up=True)
-    assert math.isfinite(traffic.first_hidden(scene(), BESIDE, (0.0, 0.0), PAUSE + 1.0))
-    assert traffic.first_hidden(scene(), BESIDE, (0.0, 0.0), PAUSE + 4.0) == math.inf
+def test_approach_is_a_response_time_and_braking() -> None:
+    """10 m/s for 1 s, then 3 m/s²."""
+    assert approach(10.0, 1.0) == pytest.approx(10.0)
+    assert approach(10.0, 2.0) == pytest.approx(18.5)
+    assert approach(10.0, math.inf) == pytest.approx(10.0 + 100.0 / 6.0)
 
 
-def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
-    assert OncomingTraffic(50.0).first_hidden(scene(), LanesBeside(), (0.0, 0.0), 0.0) == math.inf
+def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> None:
+    waiting = traffic(50.0)
+    assert waiting.hidden_speed(BESIDE, PAUSE - 0.1) == 20.0
+    assert waiting.hidden_speed(BESIDE, PAUSE) == 10.0
+    waiting.observe(scene((30.0, 3.5, -8.0)), 0.0, 10.0, 4.0, held_up=True)
+    assert waiting.hidden_speed(BESIDE, PAUSE + 1.0) == 20.0, "traffic in view restarts the time"
+    assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
 
 
-@pytest.mark.parametrize(("start", "meets"), [(200.0, False), (100.0, True)])
-def test_meeting_before_the_return(start: float, meets: bool) -> None:
-    # At 10 m/s the return begins after 5 s at 50 m; at -10 m/s an object from 100 m is there at the same time.
-    there = scene((start, 3.5, -10.0))
-    assert meets_oncoming(PASSING, (10.0 * TIMES, 10.0), TIMES, first(there), (math.inf, 10.0), there) == meets
+@pytest.mark.parametrize(("start", "expected"), [(155.0, Verdict.GO), (145.0, Verdict.WAIT), (-10.0, Verdict.GO)])
+def test_traffic_in_view_must_not_meet_the_vehicle_before_its_return(start: float, expected: Verdict) -> None:
+    """At -10 m/s, 1.5 s after the return at 6.5 s, its front 2.5 m ahead of its center is at that of the vehicle, at
+    68.8 m, if it starts at 151.3 m; one that is behind has passed."""
+    assert verdict((40.0, 0.0, 0.0), (start, 3.5, -10.0)) is expected
 
 
-def test_oncoming_traffic_is_in_the_way_once_on_the_lane() -> None:
-    # The way is at 3 m to the left up to s = 50 m; the front of the object, 2.5 m ahead of its center, is there at 5 s.
-    assert TIMES[first(scene((102.5, 3.5, -10.0)))] == pytest.approx(5.0, abs=1.2)
-    for harmless in (scene(), scene((100.0, 3.5, 10.0)), scene((-10.0, 3.5, -10.0)), scene((100.0, 9.0, -10.0))):
-        assert first(harmless) == len(TIMES)
-
-
-@pytest.mark.parametrize(("place", "meets"), [(95.0, True), (105.0, False)])
-def test_unseen_traffic_counts_from_its_place(place: float, meets: bool) -> None:
-    assert meets_oncoming(PASSING, (10.0 * TIMES, 10.0), TIMES, len(TIMES), (place, 10.0), scene()) == meets
-
-
-def test_maneuver_that_does_not_return_within_the_horizon_meets_traffic() -> None:
-    assert meets_oncoming(PASSING, (5.0 * TIMES, 5.0), TIMES, len(TIMES), (math.inf, 10.0), scene())
+@pytest.mark.parametrize(("start", "expected"), [(140.0, Verdict.GO), (125.0, Verdict.WAIT)])
+def test_current_maneuver_needs_no_reserve(start: float, expected: Verdict) -> None:
+    assert verdict((40.0, 0.0, 0.0), (start, 3.5, -10.0), current=True) is expected
 
 
 @pytest.mark.parametrize(
-    ("place", "start", "meets"),
+    ("view", "now", "expected"),
     [
-        (UNKNOWN, UNKNOWN, False),
-        (155.0, UNKNOWN, False),
-        (145.0, UNKNOWN, True),
-        (UNKNOWN, 155.0, False),
-        (UNKNOWN, 145.0, True),
+        (200.0, 0.0, Verdict.GO),  # traffic at 20 m/s has a way of at most 20 + 400 / 6 = 86.7 m to 68.8 m
+        (120.0, 0.0, Verdict.WAIT),
+        (120.0, PAUSE, Verdict.GO),
+        (70.0, PAUSE, Verdict.GO),  # nothing within the range hides traffic
+        (40.0, PAUSE, Verdict.WAIT),  # the range ends before the maneuver does
     ],
 )
-def test_return_past_standing_objects_after_the_horizon(place: float, start: float, meets: bool) -> None:
-    """At 5 m/s the return begins after 10 s at 50 m; the front of traffic at -10 m/s is there from 150 m.
+def test_view_has_to_suffice_for_the_maneuver(view: float, now: float, expected: Verdict) -> None:
+    assert verdict(view=view, now=now) is expected
 
-    place  of unseen traffic [m];  start  of the front of an oncoming car [m]
-    """
-    profile = replace(PASSING, passes_standing=True)
-    there = scene((start + 2.5, 3.5, -10.0)) if math.isfinite(start) else scene()
-    motion = 5.0 * TIMES, 5.0
-    assert meets_oncoming(profile, motion, TIMES, len(TIMES), (place, 10.0), there) == meets
-    assert meets_oncoming(profile, (5.0 * TIMES, 0.0), TIMES, len(TIMES), (place, 10.0), there), "it stands"
+
+def test_maneuver_around_a_moving_object_is_given_up_instead_of_waiting() -> None:
+    assert verdict((30.0, 0.0, 4.0), view=40.0) is Verdict.GIVE_UP
+
+
+def test_vehicle_that_cannot_return_any_more_goes_on() -> None:
+    """30 m along the line, the front is 3.7 m behind the car, and the vehicle 3 m beside its lane."""
+    assert verdict((40.0, 0.0, 0.0), (100.0, 3.5, -10.0), s=30.0, current=True) is Verdict.GO
+
+
+def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
+    motion = Motion(10.0 * TIMES, np.full(len(TIMES), 10.0))
+    there = scene((40.0, 0.0, 0.0))
+    assert traffic(10.0).verify(PASSING, motion, there, LINE, LanesBeside(), 0.0, is_current=False) is Verdict.GO
+
+
+def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
+    profile = with_view(PASSING, Start(-60.0, 0.0, 0.0, 5.0), SETTINGS)
+    assert profile is not None
+    place = traffic(100.0).waiting_place(profile, -60.0)
+    # The front axle stands before the border, and has room for the motion to the offset of 3 m from walking pace.
+    assert 0.6 < profile.offset_at(place + BODY.wheelbase) < PASSING.border
+    assert place + BODY.wheelbase == pytest.approx(profile.places[-4] - AT_EDGE)
+    assert profile.places[-4] == pytest.approx(20.0 - 11.0 * math.sqrt(2.35 / 3.5), abs=0.1)
+    assert with_view(PASSING, Start(12.0, 0.0, 0.0, 2.0), SETTINGS) is None, "there is not enough space"

@@ -43,7 +43,7 @@ def risk(arrival: float, *, yields: bool) -> float:
     way = inside_way(scene, route, body.half_width)
     options = [Option(Proposal(0, 1.0, "all", 4.0), route, way, [], way)]
     kept = frozenset({"route"})
-    evaluation = evaluate(options, rolled, scene, TIMES, body, SETTINGS, wanted=SPEED, kept=kept, hidden=np.inf)
+    evaluation = evaluate(options, rolled, scene, TIMES, body, SETTINGS, wanted=SPEED, kept=kept)
     return float(evaluation.risk[0])
 
 

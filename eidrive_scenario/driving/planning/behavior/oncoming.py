@@ -1,0 +1,342 @@
+"""Use of a lane of the opposite direction: the view into it, the traffic on it, and the way back.
+
+A maneuver that needs such a lane is verified in every tick. As long as the vehicle can give it up, it is enough that
+the lane is free from the point on at which it cannot any more; from there to its return, neither traffic in view nor
+traffic that may come out of view meets it.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum, auto
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.proposals import (
+    AT_EDGE,
+    FIRST_PLACES,
+    ONCOMING_SPEED,
+    Body,
+    LateralProfile,
+    lateral_duration,
+    least_length,
+)
+from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+
+LANES = 6.0
+"""Offset from the line within which oncoming traffic counts [m]: two lanes."""
+PAUSE = 6.0
+"""Time of waiting without oncoming traffic after which traffic out of view is expected to drive as fast as that in view
+did, or as the vehicle wants to, instead of at the speed limit [s]; of the order of the critical gaps of the Highway
+Capacity Manual (4.1 to 7.5 s)."""
+SLOWEST = 0.5
+"""Share of the wanted speed that traffic out of view is expected to drive at least."""
+FREE_TIME = 1.0
+"""Time without an obstruction after which the vehicle does not wait any more [s]."""
+SAMPLE = 2.0
+"""Spacing of the places on the oncoming lane that are checked for a view [m]."""
+RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
+"""Response time [s] and deceleration [m/s²] of traffic that comes into view while the vehicle is in its lane; those of
+RSS for a vehicle that keeps to its lane (Shalev-Shwartz et al. 2017)."""
+RESERVE = 1.5
+"""Time that has to remain before traffic is met for a maneuver to begin [s]; one that has begun needs none, so that it
+is not given up for the noise of a motion."""
+NARROW = 1.0
+"""Distance between an object and the center of the oncoming lane below which traffic has to slow down for it [m]: half
+the width of a car."""
+EYE, TARGET = 1.5, 1.0
+"""Heights of sensor and traffic above the road for the view over a crest [m]."""
+BRAKING = 3.0
+"""Deceleration with which a maneuver is given up [m/s²]; Autoware limits its stops for obstacles to about that."""
+STOPPING_ERROR = 0.5
+"""Distance by which the vehicle may stop too late [m]."""
+SLOW, OVERRUN = 1.0, 0.3
+"""Speed below which the vehicle stops at the border [m/s], and distance by which it may be beyond it then [m]."""
+BEHIND = 1.0
+"""Gap behind an obstacle at which a maneuver that is given up ends [m]."""
+
+
+class Verdict(Enum):
+    """Result of the verification: go on; wait before the border of the lane; give the maneuver up."""
+
+    GO = auto()
+    WAIT = auto()
+    GIVE_UP = auto()
+
+
+class Motion(NamedTuple):
+    """Motion along the line that is verified: distances [m] and speeds [m/s] (K,) of the reference point."""
+
+    s: Array
+    speed: Array
+
+
+class OncomingTraffic:
+    """Oncoming traffic that one vehicle observes over time, and what may come from where it has no view.
+
+    view  range of the perception of the vehicle [m]
+    """
+
+    def __init__(self, view: float, times: Array, body: Body, settings: BehaviorSettings) -> None:
+        self._ahead: Array = np.arange(SAMPLE, view + SAMPLE, SAMPLE)
+        """Distances of the places that are checked for a view [m]."""
+        self._times = times
+        self._body = body
+        self._lateral_acceleration = settings.lateral_acceleration
+        self._usual, self._fastest = 0.0, 0.0
+        """Speed of traffic that is expected out of view, and greatest speed of traffic in view until now [m/s]."""
+        self._others_yield = False
+        """Whether the current maneuver began without a sufficient view."""
+        self._last = -math.inf
+        self._held_up_since: float | None = None
+        self._held_up_until = -math.inf
+        self._free_to, self._free_at = -math.inf, 0.0
+        """Place up to which the oncoming lane was free of unseen traffic at a time [m, s]."""
+
+    def observe(self, scene: Surroundings, center: float, wanted: float, now: float, *, held_up: bool) -> None:
+        """Update by the objects at `now` [s].
+
+        center   distance of the center of the vehicle along the line [m]
+        wanted   wanted speed of the vehicle [m/s]
+        held_up  whether the vehicle would pass something
+        """
+        is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < LANES)
+        is_oncoming &= scene.front[:, 0] > center
+        if is_oncoming.any():
+            self._last = now
+            self._fastest = max(self._fastest, -float(scene.speed[is_oncoming, 0].min()))
+        self._usual = max(self._fastest, SLOWEST * wanted) if self._fastest else wanted
+        if held_up:
+            self._held_up_until = now
+            self._held_up_since = now if self._held_up_since is None else self._held_up_since
+        elif now - self._held_up_until > FREE_TIME:
+            self._held_up_since = None
+
+    def hidden_speed(self, beside: LanesBeside, now: float) -> float:
+        """Return the speed of traffic that may come from out of view [m/s]."""
+        if self._is_patient(now) or math.isnan(beside.oncoming_limit):
+            return self._usual
+        return max(beside.oncoming_limit, self._usual)
+
+    def _is_patient(self, now: float) -> bool:
+        """Return whether the vehicle has waited for the pause, and no oncoming traffic came into view."""
+        since = max(self._last, now if self._held_up_since is None else self._held_up_since)
+        return now - since >= PAUSE
+
+    def line_changed(self, shift: float | None) -> None:
+        """Move what is known to be free to another line, or forget it; `shift` as for `Decider.line_changed`."""
+        self._free_to = -math.inf if shift is None else self._free_to + shift
+        self._others_yield &= shift is not None
+
+    def first_hidden(
+        self, line: ReferenceLine, scene: Surroundings, beside: LanesBeside, eye: tuple[float, float], step: int = 0
+    ) -> float:
+        """Return the place on the oncoming lane nearest to the vehicle from which traffic may come unseen [m].
+
+        eye   distance along the line and offset of the vehicle [m]
+        step  index of the time
+        """
+        s, d = eye
+        places = s + self._ahead
+        oncoming = beside.oncoming
+        # Traffic behind an oncoming vehicle is not faster than that, and an object in the lane slows traffic down: they
+        # hide none that counts.
+        beside_lane = np.abs(scene.d[:, step] - oncoming) - scene.half_width[:, step] >= NARROW
+        rows = (scene.speed[:, step] >= -ONCOMING_SPEED) & beside_lane
+        center, half = scene.d[rows, step, None], scene.half_width[rows, step, None]
+        edges = np.concatenate([scene.rear[rows, step], scene.front[rows, step]])
+        # A line to a place on the oncoming lane passes an edge of an object at this share of its length; it is hidden
+        # where it crosses the body between both edges.
+        share = ((edges - s)[:, None] / (places - s)).reshape(2, -1, len(places))
+        at_edge = d + share * (oncoming - d)
+        crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
+        hidden: Bools = np.logical_or.reduce(crosses, axis=(0, 1))
+        if line.heights is not None:
+            hidden |= _beyond_crest(line, s, self._ahead)
+        first = int(hidden.argmax()) if hidden.any() else len(places)
+        return float(s + first * SAMPLE)
+
+    def verify(
+        self,
+        profile: LateralProfile,
+        motion: Motion,
+        scene: Surroundings,
+        line: ReferenceLine,
+        beside: LanesBeside,
+        now: float,
+        *,
+        is_current: bool,
+    ) -> Verdict:
+        """Return whether the vehicle may follow a profile that uses the oncoming lane.
+
+        now         current time [s]
+        is_current  whether it follows the profile already; then it needs no reserve
+        """
+        if math.isnan(beside.oncoming):
+            return Verdict.GO
+        body, side, times, border = self._body, profile.side, self._times, profile.border
+        offsets = side * np.maximum(side * profile.offset(motion.s + body.wheelbase), side * profile.offset(motion.s))
+        outside: Bools = side * offsets > border
+        if not outside.any():
+            return Verdict.GO
+        first = int(outside.argmax())
+        back, place = self._return(profile, motion, outside)
+        possible, duration = self._can_give_up(profile, motion, scene, np.maximum(side * offsets - border, 0.0))
+        last = int(possible.argmin()) - 1 if not possible.all() else len(times) - 1
+        if last < 0 and first == 0:
+            return Verdict.GO
+        has_stopped = float(motion.speed[0]) < SLOW and side * float(offsets[0]) < border + OVERRUN
+        must_return = (first == 0 and not has_stopped) or self._moves(profile, motion, scene)
+        refused = Verdict.GIVE_UP if must_return else Verdict.WAIT
+        reserve = 0.0 if is_current else RESERVE
+        end = place + body.front
+        if math.isinf(back) or self._meets(profile, scene, motion, first, back, end, reserve):
+            return refused
+        self._others_yield &= is_current
+        if self._others_yield:
+            return Verdict.GO
+        eyes = motion.s + body.center
+        beside_line = profile.offset(eyes)
+        here = (float(eyes[0]), float(beside_line[0]))
+        free = self._free(line, scene, beside, here, now)
+        if self._suffices(free, here[0], back + reserve, end, beside, now):
+            return Verdict.GO
+        step = min(max(last, 0), len(times) - 1)
+        there = (float(eyes[step]), float(beside_line[step]))
+        hidden = self.first_hidden(line, scene, beside, there, step)
+        if not self._suffices(hidden, there[0], back + reserve - float(times[step]), end, beside, now):
+            return refused
+        # Until then the vehicle may have to return to its lane.
+        until, front = float(times[step] + duration[step]), there[0] + body.half_length
+        may_return = step <= first or self._suffices(free, here[0], until, front, beside, now)
+        return Verdict.GO if may_return else refused
+
+    def yields(
+        self, scene: Surroundings, line: ReferenceLine, beside: LanesBeside, eye: tuple[float, float], now: float
+    ) -> bool:
+        """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
+        stop before it."""
+        place = self.first_hidden(line, scene, beside, eye)
+        front = eye[0] + self._body.half_length
+        self._others_yield = self._is_patient(now) and place - approach(self._usual, math.inf) >= front
+        return self._others_yield
+
+    def _suffices(
+        self, hidden: float, eye: float, duration: float, end: float, beside: LanesBeside, now: float
+    ) -> bool:
+        """Return whether traffic from a hidden place does not come to `end` in a time [s].
+
+        After the pause, none is expected from beyond the range of the sensors at `eye`, where nothing else hides it.
+        """
+        if self._is_patient(now) and hidden >= eye + float(self._ahead[-1]) - SAMPLE:
+            return hidden >= end
+        return hidden - approach(self.hidden_speed(beside, now), duration) >= end
+
+    def _free(
+        self, line: ReferenceLine, scene: Surroundings, beside: LanesBeside, eye: tuple[float, float], now: float
+    ) -> float:
+        """Return the place up to which the oncoming lane is free of unseen traffic [m].
+
+        What was in view stays free until traffic can have come there.
+        """
+        known = self._free_to - self.hidden_speed(beside, now) * (now - self._free_at)
+        self._free_to, self._free_at = max(known, self.first_hidden(line, scene, beside, eye)), now
+        return self._free_to
+
+    def waiting_place(self, profile: LateralProfile, s: float) -> float:
+        """Return the place of the reference point at which the vehicle reaches the border of its lane [m]; `s` if it
+        is beyond it already."""
+        if len(profile.places) > FIRST_PLACES:
+            # The way at the edge of the lane has room for a place of waiting with a better view.
+            return max(profile.places[-4] - self._body.wheelbase - AT_EDGE, s)
+        places = np.arange(s, profile.places[-1], 0.1)
+        outside: Bools = profile.side * profile.offset(places + self._body.wheelbase) > profile.border
+        return max(float(places[outside.argmax()]) - STOPPING_ERROR, s) if outside.any() else math.inf
+
+    def _return(self, profile: LateralProfile, motion: Motion, outside: Bools) -> tuple[float, float]:
+        """Return time and place of the reference point at which the vehicle is back in its lane; inf if never."""
+        if not outside[-1]:
+            last = len(outside) - int(outside[::-1].argmax())
+            return float(self._times[last]), float(motion.s[last])
+        places = np.linspace(profile.places[-2], profile.places[-1], 20)
+        inside: Bools = profile.side * profile.offset(places) <= profile.border
+        place = max(float(places[inside.argmax()]) if inside.any() else math.inf, float(motion.s[-1]))
+        speed = float(motion.speed[-1])
+        if speed <= ONCOMING_SPEED:
+            return math.inf, place
+        return float(self._times[-1]) + (place - float(motion.s[-1])) / speed, place
+
+    def _passed(self, profile: LateralProfile, motion: Motion, scene: Surroundings) -> Bools:
+        """Return which hypotheses (N,) the profile passes: in the lane ahead of the rear of the vehicle."""
+        in_lane = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < self._body.half_width + scene.margin
+        ahead = scene.front[:, 0] > float(motion.s[0]) - self._body.rear
+        near = scene.rear[:, 0] < profile.places[-2]
+        return np.asarray(in_lane & ahead & near & (scene.speed[:, 0] > -ONCOMING_SPEED) & ~scene.crosses[:, 0])
+
+    def _moves(self, profile: LateralProfile, motion: Motion, scene: Surroundings) -> bool:
+        """Return whether a passed object moves, so that there is no place to wait behind it."""
+        return bool((scene.speed[self._passed(profile, motion, scene), 0] > ONCOMING_SPEED).any())
+
+    def _can_give_up(
+        self, profile: LateralProfile, motion: Motion, scene: Surroundings, excess: Array
+    ) -> tuple[Bools, Array]:
+        """Return when (K,) the vehicle can still return behind what it passes, and how long the return takes (K,) [s].
+
+        excess  distance by which the vehicle is beyond the border of its lane (K,) [m]
+        """
+        rows = self._passed(profile, motion, scene).nonzero()[0]
+        duration = lateral_duration(excess, self._lateral_acceleration)
+        if not rows.size:
+            return np.zeros(len(excess), dtype=bool), duration
+        rear = scene.rear[rows]
+        nearest = rear.argmin(axis=0)
+        columns = np.arange(rear.shape[1])
+        gap = rear[nearest, columns] - motion.s - self._body.front
+        closing = np.maximum(motion.speed - np.maximum(scene.speed[rows][nearest, columns], 0.0), 0.0)
+        # The return needs a length on the road, of which the object ahead covers its share meanwhile.
+        length = np.maximum(motion.speed * duration, least_length(excess))
+        returning = length * closing / np.maximum(motion.speed, ONCOMING_SPEED)
+        braking = closing**2 / (2.0 * BRAKING)
+        return np.asarray(gap >= np.maximum(returning, braking) + BEHIND), duration
+
+    def _meets(
+        self,
+        profile: LateralProfile,
+        scene: Surroundings,
+        motion: Motion,
+        first: int,
+        back: float,
+        end: float,
+        reserve: float,
+    ) -> bool:
+        """Return whether oncoming traffic in view meets the vehicle between the step `first` and its return."""
+        aside = np.abs(profile.side * max(abs(value) for value in profile.values) - scene.d)
+        beside = aside - scene.half_width < self._body.half_width + scene.margin[:, None] * 0.5
+        comes = np.logical_or.reduce(beside & (scene.speed < -ONCOMING_SPEED), axis=1)
+        comes &= scene.front[:, first] > float(motion.s[first]) - self._body.rear
+        # Beyond the horizon all keep their last speeds.
+        until = back + reserve
+        step = min(int(np.searchsorted(self._times, until)), len(self._times) - 1)
+        rear = scene.rear[:, step] + scene.speed[:, step] * max(until - float(self._times[-1]), 0.0)
+        return bool((comes & (rear < end)).any())
+
+
+def approach(speed: float, duration: float) -> float:
+    """Return the way of traffic that comes into view, responds to the vehicle in its lane, and brakes [m]."""
+    braking = min(max(duration - RESPONSE, 0.0), speed / RESPONSE_DECELERATION)
+    return speed * min(duration, RESPONSE) + speed * braking - 0.5 * RESPONSE_DECELERATION * braking**2
+
+
+def _beyond_crest(line: ReferenceLine, s: float, ahead: Array) -> Bools:
+    """Return which distances `ahead` of a place on the line (P,) the road between hides."""
+    if line.heights is None:
+        return np.zeros(len(ahead), dtype=bool)
+    here = float(np.interp(s, line.along, line.heights)) + EYE
+    road = np.interp(s + ahead, line.along, line.heights) - here
+    # The steepest line of sight over the road up to each place; traffic below it is hidden.
+    steepest = np.maximum.accumulate(road / ahead)
+    return np.asarray((road + TARGET) / ahead < steepest)
