@@ -24,7 +24,7 @@ from eidrive_scenario.openscenario.model import (
     ParameterDeclarations,
     Property,
 )
-from eidrive_scenario.openscenario.model.element import field_defaults, incomplete_element
+from eidrive_scenario.openscenario.model.element import incomplete_element
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, check_children, rules
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
 from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope, declare
@@ -121,7 +121,7 @@ class Reader:
     ) -> Element:
         known = rules(cls, self.version)
         values: dict[str, Any] = {"line": line_of(node), "source": self.source}
-        if "sibling_index" in field_defaults(cls):
+        if "sibling_index" in cls.field_defaults:
             values["sibling_index"] = cast(etree._Element, node.getparent()).index(node)
         children = list(node.iterchildren(etree.Element))
         if "ParameterDeclarations" in known.children:
