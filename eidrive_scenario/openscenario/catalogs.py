@@ -14,14 +14,8 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
 from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
 from eidrive_scenario.files.untrusted_xml import line_of
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    Catalog,
-    CatalogLocation,
-    CatalogLocations,
-    CatalogReference,
-    Element,
-)
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.reading.parsing import LIMITS, Document, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
@@ -84,18 +78,18 @@ class CatalogLibrary:
 
     def __init__(
         self,
-        locations: CatalogLocations | None,
+        locations: model.CatalogLocations | None,
         folder: Path,
         parameters: Mapping[str, Parameter],
         collector: DiagnosticCollector,
     ) -> None:
-        self.entries: dict[CatalogReference, Element] = {}
+        self.entries: dict[model.CatalogReference, model.Element] = {}
         self._parameters = parameters
         self._collector = collector
         self._places: dict[str, Path] = {}
         for name, location in vars(locations).items() if locations else ():
             if (
-                isinstance(location, CatalogLocation)
+                isinstance(location, model.CatalogLocation)
                 and location.directory
                 and isinstance(location.directory.path, str)
             ):
@@ -106,7 +100,7 @@ class CatalogLibrary:
         self.folders: dict[Path, Listing] = {place: listing_of(place) for place in self._places.values()}
         """Locations of catalogs with their listings, before any file in them is read."""
         self._is_complete = True
-        self._circular: set[CatalogReference] = set()
+        self._circular: set[model.CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
         self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
 
@@ -149,7 +143,7 @@ class CatalogLibrary:
             return None
         return CatalogFiles(self.folders, {path: catalog.document.digest for path, catalog in catalogs.items()})
 
-    def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> Element | None:
+    def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> model.Element | None:
         reference = found.reference
         catalog = self._catalog(found)
         if catalog is None:
@@ -165,7 +159,7 @@ class CatalogLibrary:
         if reference.entry_name in catalog.duplicates:
             self._collector.errors.append(catalog.duplicates[reference.entry_name])
             return None
-        rule = rules(Catalog, catalog.version).children.get(node.tag)
+        rule = rules(model.Catalog, catalog.version).children.get(node.tag)
         if rule is None:
             message = f"catalog entry {quoted(reference.entry_name)} is a {node.tag}, which is not allowed in a catalog"
             self._error(reference, message, f"remove it from {catalog.document.name}:{line_of(node)}")
@@ -257,7 +251,7 @@ class CatalogLibrary:
                 return catalog
         return None
 
-    def _ordered_places(self, kinds: Iterable[type[Element]]) -> list[Path]:
+    def _ordered_places(self, kinds: Iterable[type[model.Element]]) -> list[Path]:
         """Return the folders for these kinds, then all others, as files may use one folder for several kinds."""
         own = [self._places[kind.__name__] for kind in kinds if kind.__name__ in self._places]
         return list(dict.fromkeys([*own, *self._places.values()]))
@@ -277,7 +271,7 @@ class CatalogLibrary:
                 self._unreadable[path] = tuple(collector.errors)
         return self._files[path]
 
-    def _error(self, reference: CatalogReference, message: str, hint: str) -> None:
+    def _error(self, reference: model.CatalogReference, message: str, hint: str) -> None:
         self._collector.error(message, hint, source=reference.source, line=reference.line)
 
 
@@ -331,7 +325,7 @@ def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tupl
     return message, suggestion(name, known)
 
 
-def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
+def _assignments(reference: model.CatalogReference) -> dict[str, Assignment]:
     assignments = reference.parameter_assignments
     return {
         one.parameter_ref: Assignment(one.value, Location.of(one))

@@ -12,15 +12,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    Deterministic,
-    DeterministicMultiParameterDistribution,
-    DeterministicSingleParameterDistribution,
-    DistributionRange,
-    Element,
-    Range,
-)
 from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
 
 Assignments = Mapping[str, Assignment]
@@ -111,15 +104,17 @@ class SteppedRange:
         return {self.name: Assignment(format_value(float(self.lower + index * self.step)), self.origin)}
 
 
-def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
+def combinations_of(deterministic: model.Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
     """Return the product of the distributions in the order of the file; report their errors."""
-    distributions: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
+    distributions: list[
+        model.DeterministicMultiParameterDistribution | model.DeterministicSingleParameterDistribution
+    ] = [
         *deterministic.deterministic_multi_parameter_distribution,
         *deterministic.deterministic_single_parameter_distribution,
     ]
     found: list[ValueSource] = []
     for distribution in sorted(distributions, key=lambda one: one.sibling_index):
-        if isinstance(distribution, DeterministicMultiParameterDistribution):
+        if isinstance(distribution, model.DeterministicMultiParameterDistribution):
             found.append(_value_sets(distribution, collector))
         else:
             choices = _single(distribution, collector)
@@ -146,7 +141,9 @@ def varied_once(names: Iterable[tuple[str, Location]], collector: DiagnosticColl
         seen.setdefault(name, origin)
 
 
-def _value_sets(distribution: DeterministicMultiParameterDistribution, collector: DiagnosticCollector) -> ListedValues:
+def _value_sets(
+    distribution: model.DeterministicMultiParameterDistribution, collector: DiagnosticCollector
+) -> ListedValues:
     choices = []
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
@@ -164,7 +161,7 @@ def _value_sets(distribution: DeterministicMultiParameterDistribution, collector
 
 
 def _single(
-    distribution: DeterministicSingleParameterDistribution, collector: DiagnosticCollector
+    distribution: model.DeterministicSingleParameterDistribution, collector: DiagnosticCollector
 ) -> ValueSource | None:
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
@@ -176,7 +173,7 @@ def _single(
     return None
 
 
-def _steps(name: str, given: DistributionRange, collector: DiagnosticCollector) -> SteppedRange | None:
+def _steps(name: str, given: model.DistributionRange, collector: DiagnosticCollector) -> SteppedRange | None:
     """Return the values from the lower limit in equal steps up to the upper limit."""
     if not valid_range(given.range, collector, finite=True):
         return None
@@ -198,7 +195,7 @@ def _exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def valid_range(given: Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:
+def valid_range(given: model.Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:
     """Whether the limits are ordered numbers; report an error otherwise."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
@@ -212,7 +209,7 @@ def valid_range(given: Range, collector: DiagnosticCollector, *, finite: bool = 
     return True
 
 
-def reject_user_defined(element: Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
+def reject_user_defined(element: model.Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
     """Report a UserDefinedDistribution, which only another tool can expand."""
     collector.error(
         f"UserDefinedDistribution of {name!r} is specific to another tool",
