@@ -19,7 +19,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, ParamSpec, Protocol, Self, TypeVar
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
@@ -34,6 +34,16 @@ _MAX_CANDIDATES = 2000
 """Maximum number of words with which a misspelled word is compared."""
 
 
+class Located(Protocol):
+    """Element with its file and line; "" and None if unknown."""
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def line(self) -> int | None: ...
+
+
 @dataclass(frozen=True)
 class Diagnostic:
     """One error, warning or note about an input: the message, a hint for its correction, and the location."""
@@ -44,6 +54,11 @@ class Diagnostic:
     line: int | None = None
     rule: str = ""
     """Name of the rule of `eidrive check` that is violated (see docs/checks.md); "" for errors outside of rules."""
+
+    @classmethod
+    def at(cls, location: Located, message: str, hint: str = "") -> Self:
+        """Return a diagnostic with the location of an element."""
+        return cls(message, hint, location.source, location.line)
 
     def __post_init__(self) -> None:
         if self.line == 0:  # an element that no file contains
@@ -264,7 +279,7 @@ def limit_diagnostics(diagnostics: Sequence[Diagnostic], count: int = 0) -> list
         return list(diagnostics)  # one more diagnostic takes no more room than its count
     listed = list(diagnostics[:MAX_DIAGNOSTICS])
     unlisted = len(diagnostics) - len(listed) + count
-    return [*listed, Diagnostic(f"{unlisted} more are not listed", "", listed[-1].source, listed[-1].line)]
+    return [*listed, Diagnostic.at(listed[-1], f"{unlisted} more are not listed")]
 
 
 def shortened(text: str, length: int = MAX_TEXT) -> str:

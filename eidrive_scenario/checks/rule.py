@@ -41,9 +41,7 @@ class Rule(Generic[S]):
             yield replace(diagnostic, rule=self.name)
 
 
-def at(element: Element, message: str, hint: str = "") -> Diagnostic:
-    """Return a diagnostic with the location of an element."""
-    return Diagnostic(message, hint, element.source, element.line)
+at = Diagnostic.at
 
 
 @dataclass(frozen=True)

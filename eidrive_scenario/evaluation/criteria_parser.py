@@ -359,7 +359,7 @@ def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
         else:
             continue
         message = f"criterion {name!r} is not evaluated"
-        found.append(Diagnostic(message, hint, condition.source, condition.line))
+        found.append(Diagnostic.at(condition, message, hint))
     return found
 
 
@@ -378,11 +378,10 @@ def _ego(scenario: Scenario, condition: Condition) -> str:
         if name.lower() in ("ego", "hero", "ego_vehicle"):
             return name
     raise SettingError(
-        Diagnostic(
+        Diagnostic.at(
+            condition,
             f"condition {condition.name!r}: the scenario has no ego vehicle",
             'give a Vehicle the property type="ego_vehicle"',
-            condition.source,
-            condition.line,
         )
     )
 

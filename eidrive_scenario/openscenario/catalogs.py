@@ -15,13 +15,13 @@ from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, librar
 from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
 from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector
+from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector, Location
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.reading.parsing import LIMITS, Document, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope
+from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope
 from eidrive_scenario.openscenario.values.scalars import Version
 
 Listing = tuple[str, ...] | bool
@@ -167,7 +167,7 @@ class CatalogLibrary:
         try:
             self._collector.budget.enter_catalog_element(sum(1 for _ in node.iter()))
         except BudgetError as error:
-            diagnostic = Diagnostic(str(error), "use fewer or smaller entries", reference.source, reference.line)
+            diagnostic = Diagnostic.at(reference, str(error), "use fewer or smaller entries")
             raise ScenarioError([*self._collector.errors, diagnostic]) from error
         reader = Reader(catalog.document.name, catalog.version, self._collector, catalog.document.read)
         lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._collector.budget)
@@ -176,8 +176,7 @@ class CatalogLibrary:
             self._collector.warning(
                 f"catalog entry {quoted(reference.entry_name)} uses the parameter {quoted(name)} of the scenario",
                 "declare it in the entry, and assign it in the CatalogReference",
-                source=entry.source,
-                line=entry.line,
+                at=entry,
             )
         self.resolve(reader.references, active)
         return entry
@@ -218,7 +217,7 @@ class CatalogLibrary:
             if path.stem == name:
                 message = f"the catalog in {path.name} is named {quoted(catalog.name)}"
                 line = line_of(catalog.document.root)
-                self._collector.warning(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
+                self._collector.warning(message, f"name it {quoted(name)}", at=Location(catalog.document.name, line))
                 return catalog
         beside = self._beside(name)
         if beside is not None:
@@ -226,8 +225,7 @@ class CatalogLibrary:
             self._collector.warning(
                 f"catalog {quoted(name)} is not in the given folders, but in {place}",
                 f"specify the folder {place}",
-                source=found.reference.source,
-                line=found.reference.line,
+                at=found.reference,
             )
             return beside
         self._error(found.reference, *_missing_catalog(name, places, {catalog.name for catalog in catalogs.values()}))
@@ -272,7 +270,7 @@ class CatalogLibrary:
         return self._files[path]
 
     def _error(self, reference: model.CatalogReference, message: str, hint: str) -> None:
-        self._collector.error(message, hint, source=reference.source, line=reference.line)
+        self._collector.error(message, hint, at=reference)
 
 
 def _listing(folder: Path) -> list[Path]:

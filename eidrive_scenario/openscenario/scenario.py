@@ -40,8 +40,7 @@ def find_road_file(network: model.RoadNetwork | None, folder: Path, collector: D
     collector.error(
         f"road file '{shortened(logic.filepath, 300)}' is neither {_location(folder)} nor in the folders of {MAPS}",
         _hint(logic, folder),
-        source=logic.source,
-        line=logic.line,
+        at=logic,
     )
     return None
 
@@ -277,7 +276,7 @@ class EntitySelections:
             return
         if name in parents:
             text = f"selection {name!r} is a member of itself"
-            raise ScenarioError(Diagnostic(text, "remove it from its members", group.source, group.line))
+            raise ScenarioError(Diagnostic.at(group, text, "remove it from its members"))
         for ref in group.members.entity_ref:
             yield from self._members(ref.entity_ref, (*parents, name))
         for entry in group.members.by_type:

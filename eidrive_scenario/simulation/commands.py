@@ -106,7 +106,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
         reader = readers.get(command.type)
         if reader is None:
             message = f"unknown command type {command.type!r}"
-            diagnostics.append(Diagnostic(message, suggestion(command.type, readers), command.source, command.line))
+            diagnostics.append(Diagnostic.at(command, message, suggestion(command.type, readers)))
             continue
         try:
             reader(command)

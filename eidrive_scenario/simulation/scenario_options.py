@@ -51,11 +51,8 @@ def drive_entities(
         raise SettingError(diagnostics)
     replaced = [(name, controller) for name in drive for controller in scenario.controllers[name]]
     warnings = tuple(
-        Diagnostic(
-            f"controller {controller.name!r} of {name!r} is replaced by a driving stack ({DRIVE})",
-            "",
-            controller.source,
-            controller.line,
+        Diagnostic.at(
+            controller, f"controller {controller.name!r} of {name!r} is replaced by a driving stack ({DRIVE})"
         )
         for name, controller in replaced
     )

@@ -133,7 +133,7 @@ def start_diagnostic(scenario: Scenario, name: str, message: str, hint: str) -> 
             for action in private.private_action:
                 if action.teleport_action is not None:
                     element = action.teleport_action
-    return Diagnostic(message, hint, element.source, element.line)
+    return Diagnostic.at(element, message, hint)
 
 
 BESIDE = 30.0

@@ -13,8 +13,8 @@ from fractions import Fraction
 from typing import Protocol
 
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
+from eidrive_scenario.openscenario.values.parameters import Assignment, format_value
 
 Assignments = Mapping[str, Assignment]
 
@@ -126,7 +126,7 @@ def combinations_of(deterministic: model.Deterministic, collector: DiagnosticCol
         count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
         message = f"the distribution expands to {count} runs"
         hint = "use larger steps in its ranges"
-        collector.error(message, hint, source=deterministic.source, line=deterministic.line)
+        collector.error(message, hint, at=deterministic)
         return CartesianProduct(())
     return CartesianProduct(tuple(found))
 
@@ -137,7 +137,7 @@ def varied_once(names: Iterable[tuple[str, Location]], collector: DiagnosticColl
     for name, origin in names:
         if name in seen:
             message = f"parameter {name!r} is also varied by another distribution"
-            collector.error(message, f"see line {seen[name].line}", source=origin.source, line=origin.line)
+            collector.error(message, f"see line {seen[name].line}", at=origin)
         seen.setdefault(name, origin)
 
 
@@ -149,12 +149,7 @@ def _value_sets(
         choice: dict[str, Assignment] = {}
         for one in value_set.parameter_assignment:
             if one.parameter_ref in choice:
-                collector.error(
-                    f"ParameterValueSet assigns {one.parameter_ref!r} twice",
-                    "remove one",
-                    source=one.source,
-                    line=one.line,
-                )
+                collector.error(f"ParameterValueSet assigns {one.parameter_ref!r} twice", "remove one", at=one)
             choice[one.parameter_ref] = Assignment(one.value, Location.of(one))
         choices.append(choice)
     return ListedValues(tuple(choices))
@@ -178,12 +173,7 @@ def _steps(name: str, given: model.DistributionRange, collector: DiagnosticColle
     if not valid_range(given.range, collector, finite=True):
         return None
     if not (math.isfinite(given.step_width) and given.step_width > 0):
-        collector.error(
-            f"stepWidth is {format_value(given.step_width)}",
-            "specify a number above zero",
-            source=given.source,
-            line=given.line,
-        )
+        collector.error(f"stepWidth is {format_value(given.step_width)}", "specify a number above zero", at=given)
         return None
     lower, upper, step = (
         _exact(value) for value in (given.range.lower_limit, given.range.upper_limit, given.step_width)
@@ -200,20 +190,15 @@ def valid_range(given: model.Range, collector: DiagnosticCollector, *, finite: b
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
         message = f"the range from {format_value(lower)} to {format_value(upper)} is empty"
-        collector.error(message, "lowerLimit must be at most upperLimit", source=given.source, line=given.line)
+        collector.error(message, "lowerLimit must be at most upperLimit", at=given)
         return False
     if math.inf in (lower, -upper) or (finite and math.inf in (-lower, upper)):
         message = f"the range from {format_value(lower)} to {format_value(upper)} is infinite"
-        collector.error(message, "specify finite limits", source=given.source, line=given.line)
+        collector.error(message, "specify finite limits", at=given)
         return False
     return True
 
 
 def reject_user_defined(element: model.Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
     """Report a UserDefinedDistribution, which only another tool can expand."""
-    collector.error(
-        f"UserDefinedDistribution of {name!r} is specific to another tool",
-        f"write {instead}",
-        source=element.source,
-        line=element.line,
-    )
+    collector.error(f"UserDefinedDistribution of {name!r} is specific to another tool", f"write {instead}", at=element)

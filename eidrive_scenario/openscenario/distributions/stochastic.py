@@ -19,14 +19,14 @@ import numpy as np
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
 from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
     reject_user_defined,
     valid_range,
     varied_once,
 )
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
+from eidrive_scenario.openscenario.values.parameters import Assignment, format_value
 
 Quantile = Callable[[float], "float | str"]
 _SMALLEST, _LARGEST = 2.0**-54, 1 - 2.0**-53
@@ -84,7 +84,7 @@ def draws_of(stochastic: model.Stochastic, seed: float, collector: DiagnosticCol
     """
     if stochastic.number_of_test_runs < 1:
         message = f"Stochastic has numberOfTestRuns {stochastic.number_of_test_runs}"
-        collector.error(message, "specify a number above zero", source=stochastic.source, line=stochastic.line)
+        collector.error(message, "specify a number above zero", at=stochastic)
     distributions = stochastic.stochastic_distribution
     varied_once(((one.parameter_name, Location.of(one)) for one in distributions), collector)
     found = {one.parameter_name: quantile_of(one, collector) for one in distributions}
@@ -276,7 +276,7 @@ def _limits(given: model.Range | None, collector: DiagnosticCollector) -> tuple[
 
 def _report(element: model.Element, what: str, hint: str, collector: DiagnosticCollector) -> None:
     kind = type(element).__name__
-    collector.error(f"{kind} {what}", hint, source=element.source, line=element.line)
+    collector.error(f"{kind} {what}", hint, at=element)
 
 
 _BUILD: dict[type[model.Element], Callable[[Any, DiagnosticCollector], Quantile]] = {

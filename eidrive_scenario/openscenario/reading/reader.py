@@ -12,11 +12,11 @@ from lxml import etree
 from eidrive_scenario.errors import quoted, suggestion
 from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
 from eidrive_scenario.openscenario.model.element import incomplete_element
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, check_children, rules
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope, declare
+from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope, declare
 from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version, availability
 
 _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
@@ -206,8 +206,7 @@ class Reader:
             self.collector.warning(
                 f"{node.tag} contains white space; the schema allows no content",
                 f"write <{node.tag} …/>",
-                source=self.source,
-                line=line_of(node),
+                at=Location(self.source, line_of(node)),
             )
 
     def _child(
@@ -236,7 +235,7 @@ class Reader:
         """Report an empty choice, which the schemas up to 1.2 allow; a warning for classes that files leave empty."""
         report = self.collector.warning if cls in _MAY_BE_EMPTY else self.collector.error
         hint = "it contains one of " + ", ".join(known.choice)
-        report(f"{node.tag} is empty", hint, source=self.source, line=line_of(node))
+        report(f"{node.tag} is empty", hint, at=Location(self.source, line_of(node)))
 
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> model.Element:
         """Read declarations in their order, so that each may use those before it."""
@@ -279,13 +278,13 @@ class Reader:
     def _report_duplicate(self, declaration: model.ParameterDeclaration, other: Parameter) -> None:
         message = f"parameter {declaration.name!r} is declared twice"
         report = self.collector.warning if declaration.value == other.declared else self.collector.error
-        report(message, "rename or remove one", source=self.source, line=declaration.line)
+        report(message, "rename or remove one", at=Location(self.source, declaration.line))
 
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
             origin = assignment.origin or Location(self.source)
             hint = suggestion(name, declared)
-            self.collector.error(f"unknown parameter {name!r}", hint, source=origin.source, line=origin.line)
+            self.collector.error(f"unknown parameter {name!r}", hint, at=origin)
 
     def _note_references(self, known: Rules, value: Any) -> None:
         entries = {child.cls for child in rules(model.Catalog, self.version).children.values()}
@@ -296,13 +295,13 @@ class Reader:
     def _warn_of_python(self, name: str, node: etree._Element, text: str, effect: str, hint: str) -> None:
         """Warn of a Python literal that XML does not have; scenariogeneration 0.16 writes some."""
         message = f"{name} of {node.tag} is {quoted(text)}, {effect}"
-        self.collector.warning(message, hint, source=self.source, line=line_of(node))
+        self.collector.warning(message, hint, at=Location(self.source, line_of(node)))
 
     def _deprecated(self, subject: str, since: str, node: etree._Element) -> None:
         self.collector.warning(
-            f"{subject} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
+            f"{subject} is deprecated since OpenSCENARIO {since}", at=Location(self.source, line_of(node))
         )
 
     def _error(self, message: str, hint: str, node: etree._Element) -> None:
         self._error_count += 1
-        self.collector.error(message, hint, source=self.source, line=line_of(node))
+        self.collector.error(message, hint, at=Location(self.source, line_of(node)))

@@ -98,8 +98,7 @@ class StoryboardNames:
                 collector.warning(
                     f"two elements of the kind {named.level.value} are named {named.path[-1]!r}",
                     f"the other one is in line {other.line}",
-                    source=named.element.source,
-                    line=named.element.line,
+                    at=named.element,
                 )
 
     def check_reference(self, condition: model.StoryboardElementStateCondition, collector: DiagnosticCollector) -> None:
@@ -117,7 +116,7 @@ class StoryboardNames:
         else:
             message = f"storyboardElementRef refers to {level.value} {reference!r}, which does not exist"
             hint = suggestion(reference, {named.path[-1] for named in self.named if named.level is level})
-        collector.error(message, hint, source=condition.source, line=condition.line)
+        collector.error(message, hint, at=condition)
 
 
 class ReferenceMatch(Generic[T]):
@@ -184,8 +183,7 @@ def check_names(
             collector.error(
                 f"two {_plural(kind)} are named {name!r}",
                 f"the other one is in line {known[kind][name].line}; rename one",
-                source=element.source,
-                line=element.line,
+                at=element,
             )
         known[kind].setdefault(name, element)
     complete = {kind: names for kind, names in known.items() if kind not in unnamed}
@@ -242,8 +240,7 @@ def _check_references(
             collector.error(
                 f"{spelling} of {type(element).__name__} refers to {kind} {name!r}, which does not exist",
                 suggestion(name, known[kind]),
-                source=element.source,
-                line=element.line,
+                at=element,
             )
 
 

@@ -32,7 +32,7 @@ def check_types(elements: Iterable[model.Element], collector: DiagnosticCollecto
             if _misfits(one.value, one.variable_type):
                 declared = one.variable_type.value
                 message = f"variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
-                collector.warning(message, "the value is used as a text", source=one.source, line=one.line)
+                collector.warning(message, "the value is used as a text", at=one)
         elif isinstance(one, model.ParameterDeclaration):
             types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
     for one in elements:
@@ -56,10 +56,10 @@ def _check_action(
     setting = action.set_action
     if setting is not None and _misfits(setting.value, declared):
         message = f"{kind} {name!r} is declared as {declared.value}, but set to {setting.value!r}"
-        collector.warning(message, "the value is used as a text", source=setting.source, line=setting.line)
+        collector.warning(message, "the value is used as a text", at=setting)
     elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
         message = f"{kind} {name!r} is declared as {declared.value}, but modified as a number"
-        collector.warning(message, "declare it as double", source=action.source, line=action.line)
+        collector.warning(message, "declare it as double", at=action)
 
 
 def _misfits(text: object, declared: model.ParameterType) -> bool:
@@ -199,11 +199,11 @@ def check_values(elements: Sequence[model.Element], version: Version, collector:
         check = _CHECKS.get(type(element))
         message = unusable(element, version) or (check(element) if check else "")
         if message and (element.source, element.line) not in reported:
-            collector.error(message, source=element.source, line=element.line)
+            collector.error(message, at=element)
         if isinstance(element, model.Orientation) and element == _EMPTY_ORIENTATION:
             message = "Orientation is empty, which by the standard is heading 0 of the world frame"
             hint = 'omit it, or write type="relative", for the heading of the road'
-            collector.warning(message, hint, source=element.source, line=element.line)
+            collector.warning(message, hint, at=element)
 
 
 def _distance(action: model.LongitudinalDistanceAction) -> str:

@@ -205,17 +205,14 @@ class RuntimeContext:
         """
         if reference is None:
             message = f"{type(within).__name__}: {kind.__name__} is missing"
-            raise ScenarioError(
-                Diagnostic(message, "define it in place or by a CatalogReference", within.source, within.line)
-            )
+            raise ScenarioError(Diagnostic.at(within, message, "define it in place or by a CatalogReference"))
         entry = self.scenario.resolved(reference)
         if not isinstance(entry, kind):
             raise ScenarioError(
-                Diagnostic(
+                Diagnostic.at(
+                    reference,
                     f"CatalogReference {reference.catalog_name}/{reference.entry_name} has the wrong type",
                     f"got {type(entry).__name__}; expected {kind.__name__}",
-                    reference.source,
-                    reference.line,
                 )
             )
         return entry
