@@ -8,7 +8,6 @@ from enum import Enum
 from typing import Any, Generic, Self, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, limit_diagnostics, sort_diagnostics
-from eidrive_scenario.openscenario.model import Element
 
 S = TypeVar("S", contravariant=True)
 

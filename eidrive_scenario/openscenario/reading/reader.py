@@ -267,18 +267,15 @@ class Reader:
         assignment = assignments.pop(name, None)
         other = scope.parameters.get(name)
         if other is not None:
-            self._report_duplicate(declaration, other)
+            message = f"parameter {declaration.name!r} is declared twice"
+            report = self.collector.warning if declaration.value == other.declared else self.collector.error
+            report(message, "rename or remove one", at=Location(self.source, declaration.line))
             return replace(declaration, value=other.text)
         if not is_valid:
             scope.parameters[name] = Parameter(name, "", "", "", is_valid=False)
             return declaration
         declare(scope, declaration, assignment, self.collector)
         return replace(declaration, value=assignment.text) if assignment else declaration
-
-    def _report_duplicate(self, declaration: model.ParameterDeclaration, other: Parameter) -> None:
-        message = f"parameter {declaration.name!r} is declared twice"
-        report = self.collector.warning if declaration.value == other.declared else self.collector.error
-        report(message, "rename or remove one", at=Location(self.source, declaration.line))
 
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
