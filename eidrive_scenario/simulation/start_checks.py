@@ -196,16 +196,13 @@ def _gaps(roads: RoadNetwork | None, view: WorldView, names: list[str]) -> dict[
 def _on_trajectories(scenario: Scenario) -> frozenset[str]:
     """Return the entities that follow a trajectory at any time."""
     selections, found = EntitySelections(scenario), set[str]()
-    storyboard = scenario.storyboard
-    for private in storyboard.init.actions.private:
+    for private in scenario.storyboard.init.actions.private:
         if any(isinstance(element, model.FollowTrajectoryAction) for element in private.walk()):
             found.update(selections.members(private.entity_ref))
-    for story in storyboard.story:
-        for act in story.act:
-            for group in act.maneuver_group:
-                if any(isinstance(element, model.FollowTrajectoryAction) for element in group.walk()):
-                    for actor in group.actors.entity_ref:
-                        found.update(selections.members(actor.entity_ref))
+    for group in _groups(scenario):
+        if any(isinstance(element, model.FollowTrajectoryAction) for element in group.walk()):
+            for actor in group.actors.entity_ref:
+                found.update(selections.members(actor.entity_ref))
     return frozenset(found)
 
 
