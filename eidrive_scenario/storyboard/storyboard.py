@@ -185,10 +185,7 @@ class Storyboard:
                 commands.placements[back.name] = msgspec.structs.replace(
                     back.motion.placement(), teleport=front.motion.teleported
                 )
-        if self.context.traffic.started:
-            appearances = self.context.appearances.items()
-            invisible = [name for name, appearance in appearances if not appearance.visibility.traffic]
-            self.context.traffic.step(view.without(invisible), self.dt, commands)
+        self.context.step_traffic()
         return self._completed_commands(commands)
 
     def _add_trailers(self) -> list[tuple[Actor, Actor]]:
