@@ -241,11 +241,12 @@ class ErrorSubject:
 class ErrorCollector:
     """Collect diagnostics of several independent checks.
 
-    An InputError raised inside `with collector:` ends that block and is stored. `raise_if_any` raises one InputError
-    with all stored diagnostics, without duplicates.
+    An InputError raised inside `with collector:` ends that block and is stored. `raise_if_any` raises one error of
+    `kind` with all stored diagnostics, without duplicates.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: type[InputError] = InputError) -> None:
+        self._kind = kind
         self._diagnostics: list[Diagnostic] = []
 
     def __enter__(self) -> None:
@@ -258,9 +259,9 @@ class ErrorCollector:
         return True
 
     def raise_if_any(self) -> None:
-        """Raise InputError with the stored diagnostics, each once, if there are any."""
+        """Raise one error with the stored diagnostics, each once, if there are any."""
         if self._diagnostics:
-            raise InputError(list(dict.fromkeys(self._diagnostics)))
+            raise self._kind(list(dict.fromkeys(self._diagnostics)))
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:

@@ -30,6 +30,7 @@ from eidrive_scenario.simulation.recorded_outcome import (
     recorded_context,
     recorded_outcome,
 )
+from eidrive_scenario.simulation.result import verdict_json
 from eidrive_scenario.simulation.run_outcome import UNJUDGED, criteria_metrics, exit_code_of
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
@@ -63,13 +64,12 @@ class Judgement:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that `eidrive judge --json` prints, with the keys of that of a run."""
-        keys = ("name", "passed", "value", "limit", "unit", "reason")
         return {
             "scenario": self.scenario,
             "seed": self.seed,
             "passed": self.passed,
             "end_reason": self.end_reason,
-            "criteria": [{key: getattr(verdict, key) for key in keys} for verdict in self.criteria],
+            "criteria": list(map(verdict_json, self.criteria)),
             "warnings": list(self.warnings),
             "metrics": dict(self.metrics),
             "simulated_s": self.simulated_s,

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack, StackInputs
-from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, ErrorCollector, ScenarioError, SettingError, quoted, suggestion
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
@@ -99,21 +99,15 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
         CRITERION: read_criteria,
         VARIATION: lambda _: variations(scenario),
     }
-    diagnostics: list[Diagnostic] = []
+    errors = ErrorCollector(ScenarioError)
     for command in scenario.custom_commands:
-        if not command.type.startswith(PREFIX):
-            continue
-        reader = readers.get(command.type)
-        if reader is None:
-            message = f"unknown command type {command.type!r}"
-            diagnostics.append(Diagnostic.at(command, message, suggestion(command.type, readers)))
-            continue
-        try:
-            reader(command)
-        except InputError as error:
-            diagnostics += error.diagnostics
-    if diagnostics:
-        raise ScenarioError(list(dict.fromkeys(diagnostics)))
+        with errors:
+            if command.type in readers:
+                readers[command.type](command)
+            elif command.type.startswith(PREFIX):
+                message = f"unknown command type {command.type!r}"
+                raise ScenarioError(Diagnostic.at(command, message, suggestion(command.type, readers)))
+    errors.raise_if_any()
     return criteria
 
 
@@ -155,12 +149,12 @@ def parse_added_criteria(
 
     scope  parameters to which settings refer
     """
-    found: list[CriterionDeclaration] = []
-    diagnostics: list[Diagnostic] = []
+    declarations: list[CriterionDeclaration] = []
+    errors = ErrorCollector(SettingError)
     for source in sources:
-        try:
+        with errors:
             content = read_yaml_source(source, option=CRITERION_OPTION)
-            found += declare_criteria(
+            declarations += declare_criteria(
                 content.data,
                 content.lines,
                 source=content.source,
@@ -171,11 +165,8 @@ def parse_added_criteria(
                 has_routes=context.has_routes,
                 shown=quoted(content.data),
             )
-        except InputError as error:
-            diagnostics += error.diagnostics
-    if diagnostics:
-        raise SettingError(list(dict.fromkeys(diagnostics)))
-    return tuple(found)
+    errors.raise_if_any()
+    return tuple(declarations)
 
 
 def _requests_routes(scenario: Scenario) -> bool:
