@@ -11,6 +11,7 @@ from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, EidriveError, S
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
+    CriteriaContext,
     build_criteria,
     exit_verdict,
     parse_criteria,
@@ -142,8 +143,8 @@ class _Judge:
     def _execute(self, command: ExecutedCommand) -> None:
         source = str(self._recording.path)
         if command.type == CRITERION:
-            has_roads = self._roads is not None
-            declarations = parse_criteria(command.content, source=source, has_roads=has_roads)
+            context = CriteriaContext(has_roads=self._roads is not None)
+            declarations = parse_criteria(command.content, context, source=source)
             self._add(build_criteria(declarations, [one.name for one in self._criteria]))
         elif command.type in EXITS:
             self._exit = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from eidrive_scenario.base.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.evaluation.criteria_parser import CriteriaContext
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
@@ -21,7 +22,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
-from eidrive_scenario.simulation.commands import CriteriaContext, criteria_context
+from eidrive_scenario.simulation.commands import criteria_context
 from eidrive_scenario.simulation.result import RunResult
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
