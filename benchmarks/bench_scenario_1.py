@@ -34,11 +34,12 @@ from typing import Any
 import numpy as np
 from timing import print_shares, sum_of_minima, timed
 
+from eidrive_scenario.base.geometry import quaternion
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world import World
-from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect, quaternion
+from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect
 from eidrive_scenario.world.view import ActorState
 
 SCENARIO = "coop/scenario_1"

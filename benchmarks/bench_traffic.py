@@ -154,7 +154,7 @@ def main() -> None:
     simulation.run()
     profile.disable()
     ticks = round(result.simulated_s / 0.05)
-    swarm = len(simulation.storyboard.context.traffic.names)
+    swarm = len(simulation.storyboard.context.traffic_names)
     print(f"{options.town}: {options.scripted} scripted cars, a swarm of {options.swarm} ({swarm} at the end)")
     comparison = "equal traces" if len(hashes) == 1 else f"{len(hashes)} DIFFERENT TRACES"
     print(f"  simulated {result.simulated_s:.2f} s in {ticks} ticks of 0.05 s, {options.runs} runs, {comparison}")

@@ -46,8 +46,16 @@ _MODULES = (
 )
 _API = "eidrive_scenario.api"
 _OWNERS: dict[str, str] = {}
+
+
+def public_names(module: Any) -> list[str]:
+    """Return the names that a module of the public interface exports: constants, classes, then functions."""
+    names = [name for name in vars(module) if name[0].isalpha()]
+    return sorted(names, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
+
+
 for _module in _MODULES:
-    for _name in importlib.import_module(f"{_API}.{_module}").__all__:
+    for _name in public_names(importlib.import_module(f"{_API}.{_module}")):
         _OWNERS.setdefault(_name, _module)
 
 
@@ -61,11 +69,11 @@ def _convert(app: Any, kind: str, name: str, thing: Any, options: Any, lines: li
     lines[:] = to_rest(lines)
     if kind == "module" and name.startswith(f"{_API}."):
         mine = name.removeprefix(f"{_API}.")
-        others = [(owner, entry) for entry in thing.__all__ if (owner := _OWNERS[entry]) != mine]
+        others = [(owner, entry) for entry in public_names(thing) if (owner := _OWNERS[entry]) != mine]
         for owner in dict.fromkeys(owner for owner, _ in others):
             entries = ", ".join(f"``{entry}``" for other, entry in others if other == owner)
             lines += ["", f"Also here, described in :doc:`{owner} </api/{owner}>`: {entries}."]
-        plain = [entry for entry in thing.__all__ if _OWNERS[entry] == mine and not _is_documented(thing, entry)]
+        plain = [entry for entry in public_names(thing) if _OWNERS[entry] == mine and not _is_documented(thing, entry)]
         if plain:
             lines += ["", f"Constants, types and modules: {', '.join(f'``{entry}``' for entry in plain)}."]
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, ParamSpec, Protocol, Self, TypeVar
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
@@ -34,6 +34,16 @@ _MAX_CANDIDATES = 2000
 """Maximum number of words with which a misspelled word is compared."""
 
 
+class Located(Protocol):
+    """Element with its file and line; "" and None if unknown."""
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def line(self) -> int | None: ...
+
+
 @dataclass(frozen=True)
 class Diagnostic:
     """One error, warning or note about an input: the message, a hint for its correction, and the location."""
@@ -44,6 +54,11 @@ class Diagnostic:
     line: int | None = None
     rule: str = ""
     """Name of the rule of `eidrive check` that is violated (see docs/checks.md); "" for errors outside of rules."""
+
+    @classmethod
+    def at(cls, location: Located, message: str, hint: str = "") -> Self:
+        """Return a diagnostic with the location of an element."""
+        return cls(message, hint, location.source, location.line)
 
     def __post_init__(self) -> None:
         if self.line == 0:  # an element that no file contains
@@ -226,11 +241,12 @@ class ErrorSubject:
 class ErrorCollector:
     """Collect diagnostics of several independent checks.
 
-    An InputError raised inside `with collector:` ends that block and is stored. `raise_if_any` raises one InputError
-    with all stored diagnostics, without duplicates.
+    An InputError raised inside `with collector:` ends that block and is stored. `raise_if_any` raises one error of
+    `kind` with all stored diagnostics, without duplicates.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: type[InputError] = InputError) -> None:
+        self._kind = kind
         self._diagnostics: list[Diagnostic] = []
 
     def __enter__(self) -> None:
@@ -243,9 +259,9 @@ class ErrorCollector:
         return True
 
     def raise_if_any(self) -> None:
-        """Raise InputError with the stored diagnostics, each once, if there are any."""
+        """Raise one error with the stored diagnostics, each once, if there are any."""
         if self._diagnostics:
-            raise InputError(list(dict.fromkeys(self._diagnostics)))
+            raise self._kind(list(dict.fromkeys(self._diagnostics)))
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
@@ -264,7 +280,7 @@ def limit_diagnostics(diagnostics: Sequence[Diagnostic], count: int = 0) -> list
         return list(diagnostics)  # one more diagnostic takes no more room than its count
     listed = list(diagnostics[:MAX_DIAGNOSTICS])
     unlisted = len(diagnostics) - len(listed) + count
-    return [*listed, Diagnostic(f"{unlisted} more are not listed", "", listed[-1].source, listed[-1].line)]
+    return [*listed, Diagnostic.at(listed[-1], f"{unlisted} more are not listed")]
 
 
 def shortened(text: str, length: int = MAX_TEXT) -> str:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import tempfile
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +24,6 @@ from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEH
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import DESCRIPTION
-from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings
@@ -64,11 +62,9 @@ def distant_vehicles(camera: CameraSettings, worlds: int) -> Iterator[Distant]:
     """Yield images of a camera on a car in clear weather, of vehicles ahead on and beside the lanes."""
     for number in range(worlds):
         rng = generator(1, "calibration of edges", number)
-        with tempfile.TemporaryDirectory() as folder:
-            site = random_place(rng, Path(folder))
+        site = random_place(rng)
         positions = LanePositions.of(site.roads)
-        with World(site.roads, picture_maker=picture_maker) as world:
-            site.build_houses(world)
+        with site.world() as world:
             world.set_weather(Weather(name="clear"))
             for _ in range(PER_WORLD):
                 yield _image(world, positions, camera, rng)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -16,7 +14,6 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES
-from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading
@@ -36,6 +33,7 @@ from training.random_scene import (
     random_signals,
     random_traffic,
     random_weather,
+    rows_before,
 )
 
 Array = NDArray[np.float64]
@@ -44,8 +42,6 @@ PER_WORLD = 6
 NEAREST, LEAST_PIXELS = 6.0, 8.0
 """Minimum distance of the camera before a light [m], and minimum height of a usual head in the image [px]."""
 USUAL_HEIGHT = 0.94
-ASIDE = 0.7
-"""Maximum lateral offset of the target light, as a share of the distance."""
 IN_RANGE = 100.0
 CAMERAS = (CameraSettings(width=800, height=600, fov=100.0), CameraSettings(width=800, height=600, fov=60.0))
 """The camera of EI-Drive, and one with a smaller field of view, each in half of the images."""
@@ -94,15 +90,13 @@ def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
     seed, split, number = task
     rng = generator(seed, "training data", split, number)
     while True:
-        with tempfile.TemporaryDirectory() as folder:
-            place = random_place(rng, Path(folder))
+        place = random_place(rng)
         positions = LanePositions.of(place.roads)
         heads = signal_heads(place.roads)
         candidates = [head for head in heads if head.signal.dynamic and len(_before(positions, head, CAMERAS[0]))]
         if candidates:
             break
-    with World(place.roads, picture_maker=picture_maker) as world:
-        place.build_houses(world)
+    with place.world() as world:
         return [_scene(world, place, positions, heads, candidates, rng) for _ in range(PER_WORLD)]
 
 
@@ -140,14 +134,7 @@ def _before(positions: LanePositions, head: SignalHead, camera: CameraSettings) 
     """Return the lane positions from which a driver approaches this signal, near enough for this camera."""
     focal = camera.width / 2.0 / math.tan(math.radians(camera.fov) / 2.0)
     farthest = focal * USUAL_HEIGHT / LEAST_PIXELS
-    rows = np.flatnonzero(positions.kinds == "driving")
-    x, y, heading = positions.poses[rows, 0], positions.poses[rows, 1], positions.poses[rows, 3]
-    dx, dy = head.pose.x - x, head.pose.y - y
-    ahead = np.cos(heading) * dx + np.sin(heading) * dy
-    lateral = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
-    against = np.cos(heading - head.pose.h) < -0.8
-    near = (ahead > NEAREST) & (ahead < farthest) & (lateral < ASIDE * ahead)
-    return np.asarray(rows[near & against], dtype=np.int64)
+    return rows_before(positions, head, nearest=NEAREST, farthest=farthest)
 
 
 def _lights(

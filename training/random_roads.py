@@ -6,12 +6,16 @@ None of them is in the library: widths, lanes, corners, signals and houses are d
 from __future__ import annotations
 
 import math
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from lxml import etree
 
+from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model import curves
 from eidrive_scenario.world import World
@@ -53,15 +57,24 @@ class Place:
     roads: RoadNetwork
     houses: tuple[House, ...]
 
-    def build_houses(self, world: World) -> None:
-        """Add the houses to a world with these roads."""
-        for number, house in enumerate(self.houses):
-            world.add_building(f"house {number}", house.center, house.size, house.yaw, house.color)
+    @contextmanager
+    def world(self) -> Iterator[World]:
+        """Open a world of these roads and houses, which draws images."""
+        with World(self.roads, picture_maker=picture_maker) as world:
+            for number, house in enumerate(self.houses):
+                world.add_building(f"house {number}", house.center, house.size, house.yaw, house.color)
+            yield world
 
 
-def random_place(rng: np.random.Generator, folder: Path) -> Place:
-    """Return a place for this generator state; its OpenDRIVE file is written into the folder and read."""
-    path = folder / "place.xodr"
+def random_place(rng: np.random.Generator) -> Place:
+    """Return a place for this generator state."""
+    with tempfile.TemporaryDirectory() as folder:
+        roads = _random_roads(rng, Path(folder) / "place.xodr")
+    return Place(roads, tuple(random_houses(roads, rng)))
+
+
+def _random_roads(rng: np.random.Generator, path: Path) -> RoadNetwork:
+    """Write random roads into an OpenDRIVE file and read it."""
     if rng.random() < 0.65:
         make_roads.write(random_crossing(rng).layout(), path)
         root = etree.parse(path).getroot()
@@ -74,8 +87,7 @@ def random_place(rng: np.random.Generator, folder: Path) -> Place:
         root = winding_road(rng)
     add_road_objects(root, rng)
     etree.ElementTree(root).write(str(path), xml_declaration=True, encoding="UTF-8")
-    roads = RoadNetwork.load(path)
-    return Place(roads, tuple(random_houses(roads, rng)))
+    return RoadNetwork.load(path)
 
 
 def random_crossing(rng: np.random.Generator) -> Crossing:

@@ -103,7 +103,7 @@ def random_view(rng: np.random.Generator, positions: LanePositions, heads: Seque
     if rng.random() < 0.35:
         return View(settings, _roadside(rng, positions), None)
     rows = np.flatnonzero(positions.kinds == "driving")
-    before = _before_signal(positions, rows, heads[int(rng.integers(len(heads)))]) if heads else rows[:0]
+    before = rows_before(positions, heads[int(rng.integers(len(heads)))]) if heads else rows[:0]
     to_signal = len(before) > 0 and rng.random() < 0.6
     row = int(rng.choice(before if to_signal else rows))
     x, y, z, heading = positions.poses[row].tolist()
@@ -127,14 +127,22 @@ def random_view(rng: np.random.Generator, positions: LanePositions, heads: Seque
     return View(settings, pose, (spec, Placement(x - cos * ahead, y - sin * ahead, z, heading)))
 
 
-def _before_signal(positions: LanePositions, rows: NDArray[np.int64], head: SignalHead) -> NDArray[np.int64]:
-    """Return the rows from which a driver approaches this signal, 4 to 30 m ahead."""
+ASIDE = 0.7
+"""Maximum lateral offset of a signal that a driver approaches, as a share of the distance."""
+
+
+def rows_before(
+    positions: LanePositions, head: SignalHead, *, nearest: float = 4.0, farthest: float = 30.0
+) -> NDArray[np.int64]:
+    """Return the lane positions from which a driver approaches this signal, between two distances ahead [m]."""
+    rows = np.flatnonzero(positions.kinds == "driving")
     x, y, heading = positions.poses[rows, 0], positions.poses[rows, 1], positions.poses[rows, 3]
     dx, dy = head.pose.x - x, head.pose.y - y
     ahead = np.cos(heading) * dx + np.sin(heading) * dy
     lateral = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
     against = np.cos(heading - head.pose.h) < -0.8
-    return np.asarray(rows[(ahead > 4.0) & (ahead < 30.0) & (lateral < 0.7 * ahead) & against], dtype=np.int64)
+    near = (ahead > nearest) & (ahead < farthest) & (lateral < ASIDE * ahead)
+    return np.asarray(rows[near & against], dtype=np.int64)
 
 
 def _roadside(rng: np.random.Generator, positions: LanePositions) -> Array:

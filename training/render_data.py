@@ -8,7 +8,6 @@ their splits; no road of the library is among them.
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from collections.abc import Iterator
 from multiprocessing import get_context
@@ -21,7 +20,6 @@ from rich.progress import Progress
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.learned.image_network import resized
-from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.world import World
 from eidrive_scenario.world.road_objects import signal_heads
@@ -58,11 +56,9 @@ class Shot(NamedTuple):
 def shots(seed: int, split: str, number: int) -> list[Shot]:
     """Return the images of one world."""
     rng = generator(seed, "training data", split, number)
-    with tempfile.TemporaryDirectory() as folder:
-        place = random_place(rng, Path(folder))
+    place = random_place(rng)
     positions = LanePositions.of(place.roads)
-    with World(place.roads, picture_maker=picture_maker) as world:
-        place.build_houses(world)
+    with place.world() as world:
         return [shot(world, place, positions, rng) for _ in range(PER_WORLD)]
 
 

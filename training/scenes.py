@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +11,6 @@ from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller
 from eidrive_scenario.perception.detector import DetectorContext
-from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
@@ -86,11 +83,9 @@ def random_scenes(
     sensors = sensors or default_sensors()
     for number in range(worlds):
         rng = generator(seed, "training data", split, number)
-        with tempfile.TemporaryDirectory() as folder:
-            place = random_place(rng, Path(folder))
+        place = random_place(rng)
         positions = LanePositions.of(place.roads)
-        with World(place.roads, picture_maker=picture_maker) as world:
-            place.build_houses(world)
+        with place.world() as world:
             world.set_weather(weather)
             for _ in range(each):
                 for name in list(world.names):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,11 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.experiments.average_precision import match
-from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
-from eidrive_scenario.rendering import picture_maker
+from eidrive_scenario.perception.learned.image_network import VEHICLES, ImageNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.settings import CameraSettings
-from eidrive_scenario.world import World
 from eidrive_scenario.world.weather import Weather
-from training.dataset import shows_enough
+from training.image_evaluation import objects_of
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
 from training.random_scene import LanePositions, random_traffic, random_view
@@ -46,13 +43,11 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
     required = 0
     for number in range(worlds):
         rng = generator(seed, "training data", "sweeps", number)
-        with tempfile.TemporaryDirectory() as folder:
-            place = random_place(rng, Path(folder))
+        place = random_place(rng)
         positions = LanePositions.of(place.roads)
         view = random_view(rng, positions)
         camera = ImageSensor(CameraSettings())
-        with World(place.roads, picture_maker=picture_maker) as world:
-            place.build_houses(world)
+        with place.world() as world:
             actors = random_traffic(rng, positions, view)
             for spec, placement in actors:
                 world.add(spec, placement)
@@ -90,19 +85,10 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
 
 def _vehicles(labels: list[Label]) -> NDArray[np.float64]:
     """Return boxes (M, 4) of the required vehicles."""
-    boxes = np.array([label.box for label in labels], dtype=float).reshape(-1, 4)
-    height = boxes[:, 3] - boxes[:, 1]
-    visible_pixels, silhouette_pixels, distance = (
-        np.array([getattr(label, key) for label in labels], dtype=float)
-        for key in ("visible_pixels", "silhouette_pixels", "distance")
-    )
-    is_vehicle = np.array([IMAGE_CLASSES[label.number] in VEHICLES for label in labels], dtype=bool)
-    required: NDArray[np.float64] = boxes[
-        shows_enough(height, visible_pixels, silhouette_pixels)
-        & is_vehicle
-        & (distance < FARTHEST)
-        & (height >= LOWEST)
-    ]
+    objects = objects_of(labels)
+    is_vehicle = np.array([name in VEHICLES for name in objects.names], dtype=bool)
+    near = (objects.distance < FARTHEST) & (objects.height >= LOWEST)
+    required: NDArray[np.float64] = objects.boxes[objects.to_find & is_vehicle & near]
     return required
 
 

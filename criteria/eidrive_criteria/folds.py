@@ -1,12 +1,14 @@
-"""Folds that criteria share: limits of a value, its extreme, steps of one actor, sums in a forbidden state."""
+"""Folds that criteria share: limits of a value, its extreme, samples, steps of one actor, sums in a forbidden state."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self, TypeVar
+from array import array
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from eidrive_scenario.api.common import RoadNetwork, WorldView
@@ -95,6 +97,45 @@ def conclude_extreme(criterion: Criterion, extreme: Extreme, reason: str, *, mea
         limit=extreme.limit,
         first_violation=extreme.violated,
     )
+
+
+Measure = Literal["mean", "p95", "max"]
+PHRASES: Mapping[Measure, str] = {"mean": "on average", "p95": "at the 95th percentile", "max": "at most"}
+
+
+class Sample:
+    """Numbers of a run, of which one measure is limited; only a violation by the maximum has a time."""
+
+    def __init__(self, measure: Measure, limit: float | None) -> None:
+        self._measure, self._limit = measure, limit
+        self._numbers = array("d")
+        self._violated: float | None = None
+
+    def add(self, numbers: Sequence[float], time: float) -> None:
+        """Add numbers of a time [s]."""
+        self._numbers.extend(numbers)
+        if self._measure == "max" and self._violated is None and self._limit is not None:
+            self._violated = time if any(number > self._limit for number in numbers) else None
+
+    def values(self) -> dict[Measure, float]:
+        """Return the value of each measure; empty without a number."""
+        if not self._numbers:
+            return {}
+        numbers = np.array(self._numbers)
+        return {"mean": float(numbers.mean()), "p95": float(np.percentile(numbers, 95)), "max": float(numbers.max())}
+
+    @property
+    def value(self) -> float | None:
+        """Value of the limited measure; None without a number."""
+        return self.values().get(self._measure)
+
+    def conclude(self, criterion: Criterion, reason: str, *, measured: bool) -> Verdict:
+        """Return the verdict on the sample: failed by a violation, or unless it was `measured`."""
+        value, limit = self.value, self._limit
+        exceeds = value is not None and limit is not None and value > limit
+        return criterion.conclude(
+            measured and not exceeds, reason, value=value, limit=limit, first_violation=self._violated
+        )
 
 
 class FollowedCriterion(Criterion):

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
+from eidrive_criteria.folds import PHRASES, Measure, Sample
 from eidrive_criteria.perceived import PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.criteria import Frame, Verdict
-
-Measure = Literal["mean", "p95", "max"]
-PHRASES: Mapping[Measure, str] = {"mean": "on average", "p95": "at the 95th percentile", "max": "at most"}
 
 
 class PositionErrorSettings(PerceivedSettings):
@@ -43,31 +39,16 @@ class PositionError(PerceivedCriterion):
         self._settings = settings
         if settings.to is not None:
             self.subjects = (settings.of, settings.to)
-        self._errors = array("d")
-        self._violated: float | None = None
+        self._errors = Sample(settings.measure, settings.at_most)
 
     def evaluate(self, frame: Frame) -> None:
         settings = self._settings
         known = self.known(frame, settings.source)
         errors = [error for name, error in known.items() if settings.to is None or name == settings.to]
-        self._errors.extend(errors)
-        if settings.measure == "max" and self._violated is None and settings.at_most is not None:
-            exceeded = any(error > settings.at_most for error in errors)
-            self._violated = frame.view.time if exceeded else None
-
-    def _values(self) -> dict[Measure, float]:
-        """Return the value of each measure; empty without a known actor."""
-        if not self._errors:
-            return {}
-        errors = np.array(self._errors)
-        return {
-            "mean": float(errors.mean()),
-            "p95": float(np.percentile(errors, 95)),
-            "max": float(errors.max()),
-        }
+        self._errors.add(errors, frame.view.time)
 
     def verdict(self) -> Verdict:
-        settings, value = self._settings, self._values().get(self._settings.measure)
+        settings, value = self._settings, self._errors.value
         what = settings.to or "any actor"
         if not self.perceives:
             reason = self.no_perception()
@@ -76,15 +57,8 @@ class PositionError(PerceivedCriterion):
         else:
             where = f"{self.of}'s {settings.source} objects were {value:.2f} m from {settings.to or 'their actors'}"
             reason = f"{where} {PHRASES[settings.measure]}"
-        exceeds = value is not None and settings.at_most is not None and value > settings.at_most
-        return self.conclude(
-            self.perceives and not exceeds,
-            reason,
-            value=value,
-            limit=settings.at_most,
-            first_violation=self._violated,
-        )
+        return self._errors.conclude(self, reason, measured=self.perceives)
 
     def metrics(self) -> Mapping[str, float]:
         """Return all measures [m]; empty without a known actor."""
-        return {f"{self.name}.{self.of}.{measure}": value for measure, value in self._values().items()}
+        return {f"{self.name}.{self.of}.{measure}": value for measure, value in self._errors.values().items()}

@@ -12,5 +12,6 @@ experiments studies of many runs: jobs, statistics, average precision, the libra
 pages       drawings, reports and replays
 common      names that several groups need: errors, settings, geometry, roads
 
-Extensions import these modules only; the engine itself never does. Each module states which of its names are stable.
+Extensions import these modules only; the engine itself never does. Each module states which of its names are
+stable, and has one line `from … import NAME as NAME` per name that it exports.
 """

@@ -3,15 +3,8 @@
 Stable: all names.
 """
 
-from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.fusion.average import AverageFusion
-from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
-from eidrive_scenario.fusion.method import FusionMethod, Report
-
-__all__ = [
-    "AverageFusion",
-    "CovarianceIntersectionFusion",
-    "Detections",
-    "FusionMethod",
-    "Report",
-]
+from eidrive_scenario.base.detections import Detections as Detections
+from eidrive_scenario.fusion.average import AverageFusion as AverageFusion
+from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion as CovarianceIntersectionFusion
+from eidrive_scenario.fusion.method import FusionMethod as FusionMethod
+from eidrive_scenario.fusion.method import Report as Report

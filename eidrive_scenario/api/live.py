@@ -3,8 +3,4 @@
 Stable: all names.
 """
 
-from eidrive_scenario.reporting.live.live_view import LiveView
-
-__all__ = [
-    "LiveView",
-]
+from eidrive_scenario.reporting.live.live_view import LiveView as LiveView

@@ -3,35 +3,23 @@
 All names may change in a minor version.
 """
 
-from eidrive_scenario.reporting.drawing.canvas import Canvas, Image
-from eidrive_scenario.reporting.drawing.charts import ChartSeries, heat_cells, line_chart
-from eidrive_scenario.reporting.drawing.road_drawing import house_outline, road_drawing
-from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
-from eidrive_scenario.reporting.page import png_address, write_page
-from eidrive_scenario.reporting.replay.page import write_replays
-from eidrive_scenario.reporting.run_report.report import write_report
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, run_of_result
-from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
-
-__all__ = [
-    "Canvas",
-    "ChartSeries",
-    "Image",
-    "ReportedRun",
-    "RoadDrawing",
-    "SnapshotBuilder",
-    "StationSnapshot",
-    "Window",
-    "heat_cells",
-    "house_outline",
-    "legend",
-    "line_chart",
-    "png_address",
-    "road_drawing",
-    "roads_symbol",
-    "run_of_result",
-    "top_view",
-    "write_page",
-    "write_replays",
-    "write_report",
-]
+from eidrive_scenario.reporting.drawing.canvas import Canvas as Canvas
+from eidrive_scenario.reporting.drawing.canvas import Image as Image
+from eidrive_scenario.reporting.drawing.charts import ChartSeries as ChartSeries
+from eidrive_scenario.reporting.drawing.charts import heat_cells as heat_cells
+from eidrive_scenario.reporting.drawing.charts import line_chart as line_chart
+from eidrive_scenario.reporting.drawing.road_drawing import house_outline as house_outline
+from eidrive_scenario.reporting.drawing.road_drawing import road_drawing as road_drawing
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing as RoadDrawing
+from eidrive_scenario.reporting.drawing.top_view import Window as Window
+from eidrive_scenario.reporting.drawing.top_view import legend as legend
+from eidrive_scenario.reporting.drawing.top_view import roads_symbol as roads_symbol
+from eidrive_scenario.reporting.drawing.top_view import top_view as top_view
+from eidrive_scenario.reporting.page import png_address as png_address
+from eidrive_scenario.reporting.page import write_page as write_page
+from eidrive_scenario.reporting.replay.page import write_replays as write_replays
+from eidrive_scenario.reporting.run_report.report import write_report as write_report
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun as ReportedRun
+from eidrive_scenario.reporting.run_report.reported_runs import run_of_result as run_of_result
+from eidrive_scenario.reporting.snapshot import SnapshotBuilder as SnapshotBuilder
+from eidrive_scenario.reporting.snapshot import StationSnapshot as StationSnapshot

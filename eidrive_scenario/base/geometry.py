@@ -49,6 +49,26 @@ def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[float, float, float, float]:
+    """Return x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    if pitch == 0.0 and roll == 0.0:
+        return 0.0, 0.0, sy, cy
+    cp, sp, cr, sr = math.cos(pitch / 2), math.sin(pitch / 2), math.cos(roll / 2), math.sin(roll / 2)
+    return (
+        cy * cp * sr - sy * sp * cr,
+        cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr,
+        cy * cp * cr + sy * sp * sr,
+    )
+
+
+def equidistant(start: float, end: float, spacing: float) -> list[float]:
+    """Return numbers from start to end with equal steps of at most `spacing`."""
+    numbers: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
+    return numbers
+
+
 def footprint(boxes: Array) -> Array:
     """Return the corners (..., 4, 2) of boxes (..., 7) in the plane, counter-clockwise from the front left."""
     boxes = np.asarray(boxes, dtype=float)

@@ -16,25 +16,7 @@ from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.driving.station_declarations import declared_settings
 from eidrive_scenario.driving.station_warnings import areas_off_road
 from eidrive_scenario.errors import Diagnostic, InputError, suggestion
-from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import (
-    AcquirePositionAction,
-    AssignRouteAction,
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LanePosition,
-    Position,
-    RoadPosition,
-    Route,
-    RouteRef,
-    TeleportAction,
-    TrafficSignalCondition,
-    TrafficSignalState,
-    TrafficSignalStateAction,
-    Trajectory,
-    Vehicle,
-    Waypoint,
-)
+from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import Pose, PositionError, RoadNetwork
 from eidrive_scenario.roads.model.map_warnings import MAP_RULES
 from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
@@ -55,7 +37,7 @@ class RoadLintContext(LintContext):
         self.roads = roads
         self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=empty_view())
 
-    def place(self, position: Position) -> ResolvedPosition | None:
+    def place(self, position: model.Position) -> ResolvedPosition | None:
         """Return the resolved position; None if it depends on an entity. Raise InputError if it does not exist."""
         if referenced_entities(position):
             return None
@@ -71,7 +53,7 @@ class RoadLintContext(LintContext):
 
     def _unresolved(self) -> Iterator[tuple[int, InputError]]:
         for element in self.elements:
-            if isinstance(element, Position):
+            if isinstance(element, model.Position):
                 try:
                     self.place(element)
                 except InputError as error:
@@ -145,7 +127,7 @@ def unresolvable_positions(context: RoadLintContext) -> Iterator[Diagnostic]:
 def s_out_of_range(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield positions with an s outside the road; a run uses the end of the road, as other engines do."""
     for element in context.elements:
-        if context.roads is None or not isinstance(element, LanePosition | RoadPosition):
+        if context.roads is None or not isinstance(element, model.LanePosition | model.RoadPosition):
             continue
         road = context.roads.roads.get(element.road_id)
         if road is not None and not -LENGTH_TOLERANCE <= element.s <= road.length + LENGTH_TOLERANCE:
@@ -159,7 +141,9 @@ def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
         return
     known = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
     for element in context.elements:
-        target = element.lane_change_target.absolute_target_lane if isinstance(element, LaneChangeAction) else None
+        target = (
+            element.lane_change_target.absolute_target_lane if isinstance(element, model.LaneChangeAction) else None
+        )
         if target is not None and target.value.strip() not in known - {"0"}:
             shown = ", ".join(sorted(known - {"0"}, key=int))
             yield at(target, f"lane {target.value!r} exists on no road", f"known: {shown}")
@@ -171,9 +155,9 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
         return
     known = set(context.roads.signals)
     for element in context.elements:
-        if isinstance(element, TrafficSignalState):
+        if isinstance(element, model.TrafficSignalState):
             name = element.traffic_signal_id
-        elif isinstance(element, TrafficSignalStateAction | TrafficSignalCondition):
+        elif isinstance(element, model.TrafficSignalStateAction | model.TrafficSignalCondition):
             name = element.name
         else:
             continue
@@ -209,7 +193,7 @@ def trajectories_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
         return
     for action, actors in context.performances:
         for element in action.walk():
-            if isinstance(element, FollowTrajectoryAction) and _vehicles(context, actors):
+            if isinstance(element, model.FollowTrajectoryAction) and _vehicles(context, actors):
                 trajectory = context.trajectory(element)
                 curve = _curve(context, trajectory) if trajectory is not None else None
                 if trajectory is not None and curve is not None:
@@ -217,7 +201,7 @@ def trajectories_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
 
 
 def _departure(
-    context: RoadLintContext, action: FollowTrajectoryAction, trajectory: Trajectory, curve: TrajectoryCurve
+    context: RoadLintContext, action: model.FollowTrajectoryAction, trajectory: model.Trajectory, curve: TrajectoryCurve
 ) -> Iterator[Diagnostic]:
     """Yield a diagnostic at the first point of a curve outside of the road."""
     count = min(max(2, math.ceil(curve.length / SPACING) + 1), MAX_POINTS)
@@ -235,10 +219,10 @@ def _departure(
         )
 
 
-def _curve(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve | None:
+def _curve(context: RoadLintContext, trajectory: model.Trajectory) -> TrajectoryCurve | None:
     """Return the trajectory in the world frame; None if a point depends on an entity or cannot be resolved."""
 
-    def pose(position: Position) -> Pose:
+    def pose(position: model.Position) -> Pose:
         place = context.place(position)
         if place is None:
             raise _RelativePosition
@@ -257,14 +241,16 @@ def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield waypoints and destinations outside of the road."""
     if context.roads is None:
         return
-    waypoints: list[Waypoint | AcquirePositionAction] = [one for route in _routes(context) for one in route.waypoint]
-    waypoints += [element for element in context.elements if isinstance(element, AcquirePositionAction)]
+    waypoints: list[model.Waypoint | model.AcquirePositionAction] = [
+        one for route in _routes(context) for one in route.waypoint
+    ]
+    waypoints += [element for element in context.elements if isinstance(element, model.AcquirePositionAction)]
     for waypoint in waypoints:
         if id(waypoint.position) in context.unresolved or (place := context.place(waypoint.position)) is None:
             continue
         gap = context.outside([place.pose.x], [place.pose.y])[0]
         if gap > MARGIN:
-            what = "waypoint" if isinstance(waypoint, Waypoint) else "destination"
+            what = "waypoint" if isinstance(waypoint, model.Waypoint) else "destination"
             yield at(waypoint, f"the {what} is {gap:.1f} m outside the road", "move it onto a lane")
 
 
@@ -294,42 +280,42 @@ def _is_drivable(build: Callable[..., object]) -> bool:
     return True
 
 
-def _has_wrong_way_driver(context: RoadLintContext, roads: RoadNetwork, route: Route) -> bool:
+def _has_wrong_way_driver(context: RoadLintContext, roads: RoadNetwork, route: model.Route) -> bool:
     """Return True if the first waypoint, or a position to which an actor of the route is teleported, faces traffic."""
     drivers = {
         name
         for action, actors in context.performances
-        if any(isinstance(one, AssignRouteAction) and _route_of(context, one) is route for one in action.walk())
+        if any(isinstance(one, model.AssignRouteAction) and _route_of(context, one) is route for one in action.walk())
         for name in actors
     }
     positions = [route.waypoint[0].position]
     for action, actors in context.performances:
         if drivers.intersection(actors):
-            positions += [one.position for one in action.walk() if isinstance(one, TeleportAction)]
+            positions += [one.position for one in action.walk() if isinstance(one, model.TeleportAction)]
     resolved = [context.place(position) for position in positions if id(position) not in context.unresolved]
     return any(faces_traffic(roads, place) for place in resolved if place is not None)
 
 
-def _routes(context: RoadLintContext) -> Iterator[Route]:
+def _routes(context: RoadLintContext) -> Iterator[model.Route]:
     """Yield the routes that the scenario uses, each once."""
     routes = []
     for element in context.elements:
-        if isinstance(element, AssignRouteAction | RouteRef):
+        if isinstance(element, model.AssignRouteAction | model.RouteRef):
             route = _route_of(context, element)
             if route is not None:
                 routes.append(route)
     yield from {id(route): route for route in routes}.values()
 
 
-def _route_of(context: RoadLintContext, element: AssignRouteAction | RouteRef) -> Route | None:
+def _route_of(context: RoadLintContext, element: model.AssignRouteAction | model.RouteRef) -> model.Route | None:
     """Return the route of an element, possibly from a catalog; None if it is missing."""
     reference = element.catalog_reference
     entry = element.route or (context.scenario.entries.get(reference) if reference else None)
-    return entry if isinstance(entry, Route) else None
+    return entry if isinstance(entry, model.Route) else None
 
 
 def _vehicles(context: RoadLintContext, actors: tuple[str, ...]) -> bool:
-    return any(isinstance(context.scenario.entities.get(name), Vehicle) for name in actors)
+    return any(isinstance(context.scenario.entities.get(name), model.Vehicle) for name in actors)
 
 
 ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (

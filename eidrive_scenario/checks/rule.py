@@ -8,7 +8,6 @@ from enum import Enum
 from typing import Any, Generic, Self, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, limit_diagnostics, sort_diagnostics
-from eidrive_scenario.openscenario.model import Element
 
 S = TypeVar("S", contravariant=True)
 
@@ -41,9 +40,7 @@ class Rule(Generic[S]):
             yield replace(diagnostic, rule=self.name)
 
 
-def at(element: Element, message: str, hint: str = "") -> Diagnostic:
-    """Return a diagnostic with the location of an element."""
-    return Diagnostic(message, hint, element.source, element.line)
+at = Diagnostic.at
 
 
 @dataclass(frozen=True)

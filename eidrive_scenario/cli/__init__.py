@@ -54,7 +54,12 @@ class CommandTable(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         """Return a command. Raise KeyError if none has this name."""
         if name not in self._created:
-            self._created[name] = _create(name, _function(name))
+            function = _function(name)
+            from eidrive_scenario.cli.options import ShortHelp
+
+            app = typer.Typer(add_completion=False)
+            app.command(name=name, cls=ShortHelp if name in _SHORT else None)(function)
+            self._created[name] = get_command(app)
         return self._created[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -82,14 +87,6 @@ def _function(name: str) -> Callable[..., Any]:
         return function
     module, _, function_name = FUNCTIONS[name].partition(":")
     return getattr(import_module(f"eidrive_scenario.cli.{module}"), function_name)  # type: ignore[no-any-return]
-
-
-def _create(name: str, function: Callable[..., Any]) -> Any:
-    from eidrive_scenario.cli.options import ShortHelp
-
-    app = typer.Typer(add_completion=False)
-    app.command(name=name, cls=ShortHelp if name in _SHORT else None)(function)
-    return get_command(app)
 
 
 class _Commands(Guarded):

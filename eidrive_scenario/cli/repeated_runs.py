@@ -78,9 +78,7 @@ def run_distribution(
 
 def _check_not_varied(expansion: DistributionExpansion, parameters: Mapping[str, object]) -> None:
     diagnostics = [
-        Diagnostic(
-            f"--param: the distribution varies parameter {name!r}", "remove the option", origin.source, origin.line
-        )
+        Diagnostic.at(origin, f"--param: the distribution varies parameter {name!r}", "remove the option")
         for name, origin in expansion.varied.names.items()
         if name in parameters
     ]

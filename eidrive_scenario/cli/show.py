@@ -47,7 +47,10 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     from eidrive_scenario.extensions.registry import registry
 
     if what is Names.scenarios:
-        lines = _scenario_lines()
+        # One line per scenario: name, family and description
+        from eidrive_scenario.extensions.library import describe_scenarios
+
+        lines = _columns([(entry.name, entry.family, entry.description) for entry in describe_scenarios()])
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
     elif what is Names.weather:
@@ -67,13 +70,6 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
         lines = _columns([(name, known.value(name)) for name in known])
     for line in lines:
         echo(line)
-
-
-def _scenario_lines() -> list[str]:
-    """Return one line per scenario: name, family and description."""
-    from eidrive_scenario.extensions.library import describe_scenarios
-
-    return _columns([(entry.name, entry.family, entry.description) for entry in describe_scenarios()])
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -136,55 +136,53 @@ def _flow_text(declaration: str, name: str) -> str:
     return flow_yaml(json.loads(declaration), setting=f"criterion {name!r}")
 
 
+@dataclass(frozen=True)
+class CriteriaContext:
+    """Content of a scenario to which criteria refer; None for names that are unknown and therefore not checked.
+
+    entities, monitors  their names
+    has_roads           whether the scenario has roads
+    has_routes          whether the scenario, or an action of an extension, may request a route
+    """
+
+    entities: tuple[str, ...] | None = None
+    monitors: tuple[str, ...] | None = None
+    has_roads: bool = True
+    has_routes: bool = True
+
+
+UNKNOWN = CriteriaContext()
+"""Context in which all criteria are valid."""
+
+
 def parse_criteria(
     text: str,
+    context: CriteriaContext = UNKNOWN,
     *,
     source: str = "",
     line: int | None = None,
-    entities: Collection[str] | None = None,
-    monitors: Collection[str] | None = None,
     scope: Scope | None = None,
-    has_roads: bool = True,
-    has_routes: bool = True,
 ) -> tuple[CriterionDeclaration, ...]:
     """Return the criteria that the text of a command declares, in its order.
 
-    entities  names of the entities of the scenario; None: the actors of the criteria are not checked
-    monitors  names of the monitors of the scenario; None: the monitors of the criteria are not checked
-    scope     parameters to which settings refer as `$name` or `${expression}`
-    has_roads  whether the scenario has roads
-    has_routes  whether the scenario requests a route of an actor
+    scope  parameters to which settings refer as `$name` or `${expression}`
 
     Raise SettingError with file and line of every error.
     """
     data = load_yaml(text, source=source, line=line)
     known = key_lines(text, 1 if line is None else line)
-    return declare_criteria(
-        data,
-        known,
-        source=source,
-        line=line,
-        entities=entities,
-        monitors=monitors,
-        scope=scope,
-        has_roads=has_roads,
-        has_routes=has_routes,
-        command=CRITERION,
-        shown=repr(text.strip()),
-    )
+    shown = repr(text.strip())
+    return declare_criteria(data, known, context, source=source, line=line, scope=scope, command=CRITERION, shown=shown)
 
 
 def declare_criteria(
     data: Any,
     known_lines: Mapping[str, int],
+    context: CriteriaContext = UNKNOWN,
     *,
     source: str = "",
     line: int | None = None,
-    entities: Collection[str] | None = None,
-    monitors: Collection[str] | None = None,
     scope: Scope | None = None,
-    has_roads: bool = True,
-    has_routes: bool = True,
     command: str = "",
     shown: str = "",
 ) -> tuple[CriterionDeclaration, ...]:
@@ -209,10 +207,7 @@ def declare_criteria(
             settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
             declaration = _declare(kind, settings, source, here, lines, origins)
             criterion = declaration.build()
-            _check_known(criterion, criterion.subjects, "entity", entities, source, here)
-            _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
-            _check_roads(criterion, has_roads, source, here)
-            _check_routes(criterion, has_routes, source, here)
+            _check_context(criterion, context, source, here)
         except SettingError as error:
             diagnostics.extend(error.diagnostics)
             continue
@@ -272,38 +267,23 @@ def _declare(
     return CriterionDeclaration(kind, criterion_type, parsed)
 
 
-def _check_known(
-    criterion: Criterion,
-    names: Collection[str],
-    kind: str,
-    known: Collection[str] | None,
-    source: str,
-    line: int | None,
-) -> None:
-    unknown = [name for name in names if known is not None and name not in known]
-    if unknown:
-        raise SettingError(
-            [
-                Diagnostic(
-                    f"criterion {criterion.name!r}: unknown {kind} {name!r}",
-                    suggestion(name, known) if known else f"the scenario declares no {kind}",
-                    source,
-                    line,
-                )
-                for name in unknown
-            ]
-        )
-
-
-def _check_roads(criterion: Criterion, has_roads: bool, source: str, line: int | None) -> None:
-    if criterion.needs_roads and not has_roads:
-        message = f"criterion {criterion.name!r} requires roads, and the scenario has none"
+def _check_context(criterion: Criterion, context: CriteriaContext, source: str, line: int | None) -> None:
+    """Raise SettingError if the scenario lacks what a criterion requires."""
+    name = criterion.name
+    for kind, names, known in (
+        ("entity", criterion.subjects, context.entities),
+        ("monitor", criterion.monitors, context.monitors),
+    ):
+        unknown = [one for one in names if known is not None and one not in known]
+        if unknown:
+            hints = [suggestion(one, known) if known else f"the scenario declares no {kind}" for one in unknown]
+            messages = [f"criterion {name!r}: unknown {kind} {one!r}" for one in unknown]
+            raise SettingError([Diagnostic(*text, source, line) for text in zip(messages, hints, strict=True)])
+    if criterion.needs_roads and not context.has_roads:
+        message = f"criterion {name!r} requires roads, and the scenario has none"
         raise SettingError(Diagnostic(message, "add a LogicFile to its RoadNetwork", source, line))
-
-
-def _check_routes(criterion: Criterion, has_routes: bool, source: str, line: int | None) -> None:
-    if criterion.needs_route and not has_routes:
-        message = f"criterion {criterion.name!r} evaluates a route, and the scenario requests none"
+    if criterion.needs_route and not context.has_routes:
+        message = f"criterion {name!r} evaluates a route, and the scenario requests none"
         hint = "add an AssignRouteAction or an AcquirePositionAction, or give the points of the setting 'route'"
         raise SettingError(Diagnostic(message, hint, source, line))
 
@@ -359,7 +339,7 @@ def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
         else:
             continue
         message = f"criterion {name!r} is not evaluated"
-        found.append(Diagnostic(message, hint, condition.source, condition.line))
+        found.append(Diagnostic.at(condition, message, hint))
     return found
 
 
@@ -378,11 +358,10 @@ def _ego(scenario: Scenario, condition: Condition) -> str:
         if name.lower() in ("ego", "hero", "ego_vehicle"):
             return name
     raise SettingError(
-        Diagnostic(
+        Diagnostic.at(
+            condition,
             f"condition {condition.name!r}: the scenario has no ego vehicle",
             'give a Vehicle the property type="ego_vehicle"',
-            condition.source,
-            condition.line,
         )
     )
 

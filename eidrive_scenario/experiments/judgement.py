@@ -11,6 +11,7 @@ from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, EidriveError, S
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
+    CriteriaContext,
     build_criteria,
     exit_verdict,
     parse_criteria,
@@ -30,6 +31,7 @@ from eidrive_scenario.simulation.recorded_outcome import (
     recorded_context,
     recorded_outcome,
 )
+from eidrive_scenario.simulation.result import verdict_json
 from eidrive_scenario.simulation.run_outcome import UNJUDGED, criteria_metrics, exit_code_of
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
@@ -63,13 +65,12 @@ class Judgement:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that `eidrive judge --json` prints, with the keys of that of a run."""
-        keys = ("name", "passed", "value", "limit", "unit", "reason")
         return {
             "scenario": self.scenario,
             "seed": self.seed,
             "passed": self.passed,
             "end_reason": self.end_reason,
-            "criteria": [{key: getattr(verdict, key) for key in keys} for verdict in self.criteria],
+            "criteria": list(map(verdict_json, self.criteria)),
             "warnings": list(self.warnings),
             "metrics": dict(self.metrics),
             "simulated_s": self.simulated_s,
@@ -142,8 +143,8 @@ class _Judge:
     def _execute(self, command: ExecutedCommand) -> None:
         source = str(self._recording.path)
         if command.type == CRITERION:
-            has_roads = self._roads is not None
-            declarations = parse_criteria(command.content, source=source, has_roads=has_roads)
+            context = CriteriaContext(has_roads=self._roads is not None)
+            declarations = parse_criteria(command.content, context, source=source)
             self._add(build_criteria(declarations, [one.name for one in self._criteria]))
         elif command.type in EXITS:
             self._exit = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)

@@ -166,7 +166,10 @@ def _record(
         **axle_metadata(scenario),
     }
     text = scenario.text if scenario.text is not None else _text(source)
-    attachments = _attachments(text, scenario)
+    # The text of the scenario and its road, so that a replay needs no other files
+    attachments = {SCENARIO_FILE: text}
+    if scenario.road_file is not None:
+        attachments[ROAD_FILE] = read_road_text(scenario.road_file)
     simulation.add_observer(RunRecorder(folder.recording, metadata=metadata, attachments=attachments, at_once=at_once))
 
 
@@ -215,11 +218,3 @@ def _given_settings(scenario: Scenario, seed: int, run: int | None, settings: Ru
     given |= {"run": None if run is None else str(run), "parameters": json.dumps(scenario.parameters)}
     texts = {name: text for name, text in given.items() if text is not None}
     return {"scenario": scenario.name, "seed": str(seed), **texts}
-
-
-def _attachments(text: bytes, scenario: Scenario) -> dict[str, bytes]:
-    """Return the text of the scenario and its road, so that a replay needs no other files."""
-    texts = {SCENARIO_FILE: text}
-    if scenario.road_file is not None:
-        texts[ROAD_FILE] = read_road_text(scenario.road_file)
-    return texts

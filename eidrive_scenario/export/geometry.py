@@ -10,38 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import equidistant
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 
 
-def rotations(yaw: Array, pitch: Array, roll: Array) -> Array:
-    """Return the matrices (N, 3, 3) of z-y'-x'' rotations, which turn vectors of the bodies into the world."""
-    cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
-    rows = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
 def angles(turn: Array) -> tuple[float, float, float]:
-    """Return yaw, pitch and roll of a rotation matrix (3, 3), the inverse of `rotations` [rad]."""
+    """Return yaw, pitch and roll of a rotation matrix (3, 3), the inverse of `rotation_matrix` [rad]."""
     (xx, _, _), (yx, _, _), (zx, zy, zz) = turn.tolist()
     return math.atan2(yx, xx), math.asin(min(max(-zx, -1.0), 1.0)), math.atan2(zy, zz)
-
-
-def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of a z-y'-x'' rotation [rad]."""
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
 
 
 SPACING = 2.0
@@ -98,7 +75,7 @@ def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
 
 def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, spacing: float) -> Line:
     """Return the center line of a lane in the direction of s, with the height of the lane above the road."""
-    stations = _stations(section.s, section.end, spacing)
+    stations = equidistant(section.s, section.end, spacing)
     aside = [lane.side * lane.center.value(s - section.s) + road.lane_offset.value(s) for s in stations]
     points = _line(roads, road, stations, aside)
     return [[x, y, z + _height(lane, s - section.s)] for s, (x, y, z) in zip(stations, points, strict=True)]
@@ -106,7 +83,7 @@ def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane
 
 def edge_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, edge: LaneEdge, spacing: float) -> Line:
     """Return an outer edge of a lane on the surface of the road, in the direction of s."""
-    stations = _stations(edge.start, edge.end, spacing)
+    stations = equidistant(edge.start, edge.end, spacing)
     aside = [lane.side * lane.outer.value(s - section.s) + road.lane_offset.value(s) for s in stations]
     return _line(roads, road, stations, aside)
 
@@ -121,8 +98,3 @@ def _height(lane: Lane, along: float) -> float:
     """Return the height of the middle of a lane above the road [m], for example of a sidewalk."""
     index = bisect_right(lane.heights, along, key=lambda entry: entry.s_offset) - 1
     return 0.5 * (lane.heights[index].inner + lane.heights[index].outer) if index >= 0 else 0.0
-
-
-def _stations(start: float, end: float, spacing: float) -> list[float]:
-    found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
-    return found

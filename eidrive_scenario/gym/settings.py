@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -75,11 +75,7 @@ class ShareObjects(Settings):
 ActionSettings: TypeAlias = TargetSpeed | MetaSpeed | Pedals | SendMessages | ShareObjects
 
 _KINDS: Mapping[str, type[ActionSettings]] = {
-    "target_speed": TargetSpeed,
-    "meta_speed": MetaSpeed,
-    "pedals": Pedals,
-    "send": SendMessages,
-    "share": ShareObjects,
+    action.model_fields["kind"].default: action for action in get_args(ActionSettings)
 }
 DRIVING = frozenset({"target_speed", "meta_speed", "pedals"})
 """Kinds of actions that drive the vehicle; the others concern its messages."""
@@ -102,7 +98,7 @@ def parse_actions(given: Any) -> tuple[ActionSettings, ...]:
 
 
 def _parse(given: Any) -> ActionSettings:
-    if isinstance(given, TargetSpeed | MetaSpeed | Pedals | SendMessages | ShareObjects):
+    if isinstance(given, ActionSettings):
         return given
     data = {"kind": given} if isinstance(given, str) else given
     if not isinstance(data, Mapping):

@@ -14,20 +14,14 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
 from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    Catalog,
-    CatalogLocation,
-    CatalogLocations,
-    CatalogReference,
-    Element,
-)
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector, Location
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.reading.parsing import LIMITS, Document, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope
+from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope
 from eidrive_scenario.openscenario.values.scalars import Version
 
 Listing = tuple[str, ...] | bool
@@ -84,18 +78,18 @@ class CatalogLibrary:
 
     def __init__(
         self,
-        locations: CatalogLocations | None,
+        locations: model.CatalogLocations | None,
         folder: Path,
         parameters: Mapping[str, Parameter],
         collector: DiagnosticCollector,
     ) -> None:
-        self.entries: dict[CatalogReference, Element] = {}
+        self.entries: dict[model.CatalogReference, model.Element] = {}
         self._parameters = parameters
         self._collector = collector
         self._places: dict[str, Path] = {}
         for name, location in vars(locations).items() if locations else ():
             if (
-                isinstance(location, CatalogLocation)
+                isinstance(location, model.CatalogLocation)
                 and location.directory
                 and isinstance(location.directory.path, str)
             ):
@@ -106,7 +100,7 @@ class CatalogLibrary:
         self.folders: dict[Path, Listing] = {place: listing_of(place) for place in self._places.values()}
         """Locations of catalogs with their listings, before any file in them is read."""
         self._is_complete = True
-        self._circular: set[CatalogReference] = set()
+        self._circular: set[model.CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
         self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
 
@@ -149,7 +143,7 @@ class CatalogLibrary:
             return None
         return CatalogFiles(self.folders, {path: catalog.document.digest for path, catalog in catalogs.items()})
 
-    def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> Element | None:
+    def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> model.Element | None:
         reference = found.reference
         catalog = self._catalog(found)
         if catalog is None:
@@ -165,7 +159,7 @@ class CatalogLibrary:
         if reference.entry_name in catalog.duplicates:
             self._collector.errors.append(catalog.duplicates[reference.entry_name])
             return None
-        rule = rules(Catalog, catalog.version).children.get(node.tag)
+        rule = rules(model.Catalog, catalog.version).children.get(node.tag)
         if rule is None:
             message = f"catalog entry {quoted(reference.entry_name)} is a {node.tag}, which is not allowed in a catalog"
             self._error(reference, message, f"remove it from {catalog.document.name}:{line_of(node)}")
@@ -173,7 +167,7 @@ class CatalogLibrary:
         try:
             self._collector.budget.enter_catalog_element(sum(1 for _ in node.iter()))
         except BudgetError as error:
-            diagnostic = Diagnostic(str(error), "use fewer or smaller entries", reference.source, reference.line)
+            diagnostic = Diagnostic.at(reference, str(error), "use fewer or smaller entries")
             raise ScenarioError([*self._collector.errors, diagnostic]) from error
         reader = Reader(catalog.document.name, catalog.version, self._collector, catalog.document.read)
         lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._collector.budget)
@@ -182,8 +176,7 @@ class CatalogLibrary:
             self._collector.warning(
                 f"catalog entry {quoted(reference.entry_name)} uses the parameter {quoted(name)} of the scenario",
                 "declare it in the entry, and assign it in the CatalogReference",
-                source=entry.source,
-                line=entry.line,
+                at=entry,
             )
         self.resolve(reader.references, active)
         return entry
@@ -224,7 +217,7 @@ class CatalogLibrary:
             if path.stem == name:
                 message = f"the catalog in {path.name} is named {quoted(catalog.name)}"
                 line = line_of(catalog.document.root)
-                self._collector.warning(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
+                self._collector.warning(message, f"name it {quoted(name)}", at=Location(catalog.document.name, line))
                 return catalog
         beside = self._beside(name)
         if beside is not None:
@@ -232,8 +225,7 @@ class CatalogLibrary:
             self._collector.warning(
                 f"catalog {quoted(name)} is not in the given folders, but in {place}",
                 f"specify the folder {place}",
-                source=found.reference.source,
-                line=found.reference.line,
+                at=found.reference,
             )
             return beside
         self._error(found.reference, *_missing_catalog(name, places, {catalog.name for catalog in catalogs.values()}))
@@ -257,7 +249,7 @@ class CatalogLibrary:
                 return catalog
         return None
 
-    def _ordered_places(self, kinds: Iterable[type[Element]]) -> list[Path]:
+    def _ordered_places(self, kinds: Iterable[type[model.Element]]) -> list[Path]:
         """Return the folders for these kinds, then all others, as files may use one folder for several kinds."""
         own = [self._places[kind.__name__] for kind in kinds if kind.__name__ in self._places]
         return list(dict.fromkeys([*own, *self._places.values()]))
@@ -277,8 +269,8 @@ class CatalogLibrary:
                 self._unreadable[path] = tuple(collector.errors)
         return self._files[path]
 
-    def _error(self, reference: CatalogReference, message: str, hint: str) -> None:
-        self._collector.error(message, hint, source=reference.source, line=reference.line)
+    def _error(self, reference: model.CatalogReference, message: str, hint: str) -> None:
+        self._collector.error(message, hint, at=reference)
 
 
 def _listing(folder: Path) -> list[Path]:
@@ -331,7 +323,7 @@ def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tupl
     return message, suggestion(name, known)
 
 
-def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
+def _assignments(reference: model.CatalogReference) -> dict[str, Assignment]:
     assignments = reference.parameter_assignments
     return {
         one.parameter_ref: Assignment(one.value, Location.of(one))

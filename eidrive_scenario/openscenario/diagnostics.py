@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from eidrive_scenario.errors import (
     MAX_DIAGNOSTICS,
     ConstraintError,
     Diagnostic,
+    Located,
     ScenarioError,
     limit_diagnostics,
     sort_diagnostics,
@@ -21,6 +23,18 @@ MAX_CATALOG_ELEMENTS = 300_000
 """Maximum number of elements of the used catalog entries; an entry counts once for each reference to it."""
 MAX_NESTED_REFERENCES = 50
 """Maximum nesting depth of catalog entries that refer to others."""
+
+
+class Location(NamedTuple):
+    """File and line of a value; "" and None if unknown."""
+
+    source: str = ""
+    line: int | None = None
+
+    @classmethod
+    def of(cls, element: Located) -> Location:
+        """Return the location of an element."""
+        return cls(element.source, element.line)
 
 
 class BudgetError(Exception):
@@ -74,18 +88,18 @@ class DiagnosticCollector:
         """Number of errors and warnings."""
         return len(self.errors) + len(self.warnings) + self.unlisted_warnings
 
-    def error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
+    def error(self, message: str, hint: str = "", *, at: Located | None = None) -> None:
         """Store an error. Raise ScenarioError with all errors at error number MAX_DIAGNOSTICS."""
-        self._add(Diagnostic(message, hint, source, line))
+        self._add(Diagnostic.at(at or Location(), message, hint))
 
-    def constraint_error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
+    def constraint_error(self, message: str, hint: str = "", *, at: Located | None = None) -> None:
         """Store a violation of parameter constraints, like `error`."""
-        self._add(ConstraintDiagnostic(message, hint, source, line))
+        self._add(ConstraintDiagnostic.at(at or Location(), message, hint))
 
-    def warning(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
+    def warning(self, message: str, hint: str = "", *, at: Located | None = None) -> None:
         """Store a warning about something deprecated or questionable."""
         if len(self.warnings) < MAX_DIAGNOSTICS:
-            self.warnings.append(Diagnostic(message, hint, source, line))
+            self.warnings.append(Diagnostic.at(at or Location(), message, hint))
         else:
             self.unlisted_warnings += 1
 
@@ -109,4 +123,4 @@ class DiagnosticCollector:
         if len(self.errors) >= MAX_DIAGNOSTICS:
             listed = sort_diagnostics(self.errors)
             message = f"reading ends after {MAX_DIAGNOSTICS} errors"
-            raise ScenarioError([*listed, Diagnostic(message, "", listed[-1].source, listed[-1].line)])
+            raise ScenarioError([*listed, Diagnostic.at(listed[-1], message)])

@@ -12,31 +12,9 @@ from typing import TypeAlias
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened, suggestion
 from eidrive_scenario.extensions.library import ROADS_SUFFIX, from_library, resolve_path
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.catalogs import CatalogFiles, CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    BoundingBox,
-    CatalogReference,
-    Center,
-    Controller,
-    CustomCommandAction,
-    Dimensions,
-    Element,
-    EntitySelection,
-    ExternalObjectReference,
-    File,
-    MiscObject,
-    MiscObjectCategory,
-    ObjectType,
-    OpenScenario,
-    ParameterDeclarations,
-    Pedestrian,
-    RoadNetwork,
-    ScenarioObject,
-    Storyboard,
-    VariableDeclarations,
-    Vehicle,
-)
 from eidrive_scenario.openscenario.reading.document import read_root
 from eidrive_scenario.openscenario.reading.parsing import Source, open_document
 from eidrive_scenario.openscenario.validation.names import scenario_objects
@@ -47,7 +25,7 @@ MAPS = "EIDRIVE_MAPS"
 """Environment variable with the folders in which a road file is searched by its name."""
 
 
-def find_road_file(network: RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
+def find_road_file(network: model.RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
     """Return the road file of a scenario; None if it has none.
 
     The file is searched relative to the scenario, then by its name in the folders of EIDRIVE_MAPS. A name without a
@@ -62,8 +40,7 @@ def find_road_file(network: RoadNetwork | None, folder: Path, collector: Diagnos
     collector.error(
         f"road file '{shortened(logic.filepath, 300)}' is neither {_location(folder)} nor in the folders of {MAPS}",
         _hint(logic, folder),
-        source=logic.source,
-        line=logic.line,
+        at=logic,
     )
     return None
 
@@ -73,7 +50,7 @@ def _location(folder: Path) -> str:
     return "in the current folder" if folder == Path() else "in the folder of the scenario"
 
 
-def _candidates(logic: File, folder: Path) -> Iterator[Path]:
+def _candidates(logic: model.File, folder: Path) -> Iterator[Path]:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
         yield resolve_path(str(name), folder)
@@ -85,7 +62,7 @@ def _map_folders() -> list[Path]:
     return [Path(entry) for entry in os.environ.get(MAPS, "").split(os.pathsep) if entry]
 
 
-def _hint(logic: File, folder: Path) -> str:
+def _hint(logic: model.File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
     known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{ROADS_SUFFIX}")}
@@ -94,12 +71,12 @@ def _hint(logic: File, folder: Path) -> str:
     return f"check LogicFile, or set {MAPS} to the folders of the maps"
 
 
-EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
+EntityObject: TypeAlias = model.Vehicle | model.Pedestrian | model.MiscObject
 
-_OBJECT_TYPES: Mapping[type[EntityObject], ObjectType] = {
-    Vehicle: ObjectType.VEHICLE,
-    Pedestrian: ObjectType.PEDESTRIAN,
-    MiscObject: ObjectType.MISCELLANEOUS,
+_OBJECT_TYPES: Mapping[type[EntityObject], model.ObjectType] = {
+    model.Vehicle: model.ObjectType.VEHICLE,
+    model.Pedestrian: model.ObjectType.PEDESTRIAN,
+    model.MiscObject: model.ObjectType.MISCELLANEOUS,
 }
 
 
@@ -129,15 +106,15 @@ class Scenario:
     name: str
     path: Path | None
     version: tuple[int, int]
-    document: OpenScenario
+    document: model.OpenScenario
     parameters: Mapping[str, str]
     variables: Mapping[str, str]
     entities: Mapping[str, EntityObject]
-    controllers: Mapping[str, tuple[Controller, ...]]
+    controllers: Mapping[str, tuple[model.Controller, ...]]
     road_file: Path | None
     warnings: tuple[Diagnostic, ...]
-    external: Mapping[str, ExternalObjectReference]
-    entries: Mapping[CatalogReference, Element] = field(repr=False)
+    external: Mapping[str, model.ExternalObjectReference]
+    entries: Mapping[model.CatalogReference, model.Element] = field(repr=False)
     text: bytes | None = field(repr=False, default=None)
     source: Source = field(repr=False, default=b"")
     assigned: Mapping[str, Assignment] = field(repr=False, default_factory=dict)
@@ -148,26 +125,26 @@ class Scenario:
     driven: frozenset[str] = frozenset()
 
     @property
-    def storyboard(self) -> Storyboard:
+    def storyboard(self) -> model.Storyboard:
         """Return the storyboard."""
         assert self.document.storyboard is not None
         return self.document.storyboard
 
     @cached_property
-    def custom_commands(self) -> tuple[CustomCommandAction, ...]:
+    def custom_commands(self) -> tuple[model.CustomCommandAction, ...]:
         """Return all CustomCommandActions of the storyboard in the order of the file."""
-        return tuple(one for one in self.storyboard.walk() if isinstance(one, CustomCommandAction))
+        return tuple(one for one in self.storyboard.walk() if isinstance(one, model.CustomCommandAction))
 
     @cached_property
-    def entities_by_type(self) -> Mapping[ObjectType, tuple[str, ...]]:
+    def entities_by_type(self) -> Mapping[model.ObjectType, tuple[str, ...]]:
         """Return the names of the entities of each type in the order of the file; external objects are a type."""
-        found: dict[ObjectType, tuple[str, ...]] = {}
+        found: dict[model.ObjectType, tuple[str, ...]] = {}
         for name, entity in self.entities.items():
-            kind = ObjectType.EXTERNAL if name in self.external else _OBJECT_TYPES[type(entity)]
+            kind = model.ObjectType.EXTERNAL if name in self.external else _OBJECT_TYPES[type(entity)]
             found[kind] = (*found.get(kind, ()), name)
         return found
 
-    def resolved(self, reference: CatalogReference) -> Element:
+    def resolved(self, reference: model.CatalogReference) -> model.Element:
         """Return the catalog entry with the parameters that the reference assigns."""
         return self.entries[reference]
 
@@ -209,7 +186,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         parameters=_values(root.parameter_declarations),
         variables=_values(root.variable_declarations),
         entities={one.name: found for one, body in objects if (found := _body(one, body)) is not None},
-        external={one.name: body for one, body in objects if isinstance(body, ExternalObjectReference)},
+        external={one.name: body for one, body in objects if isinstance(body, model.ExternalObjectReference)},
         controllers={one.name: _controllers(one, library.entries) for one, _ in objects},
         road_file=road_file,
         warnings=warnings,
@@ -224,37 +201,41 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     )
 
 
-def _body(one: ScenarioObject, body: Element | None) -> EntityObject | None:
+def _body(one: model.ScenarioObject, body: model.Element | None) -> EntityObject | None:
     """Return the body of an entity; an external object has a body without size."""
-    if isinstance(body, ExternalObjectReference):
-        box = BoundingBox(center=Center(x=0.0, y=0.0, z=0.0), dimensions=Dimensions(length=0.0, width=0.0, height=0.0))
-        return MiscObject(
+    if isinstance(body, model.ExternalObjectReference):
+        box = model.BoundingBox(
+            center=model.Center(x=0.0, y=0.0, z=0.0), dimensions=model.Dimensions(length=0.0, width=0.0, height=0.0)
+        )
+        return model.MiscObject(
             name=body.name,
             mass=0.0,
-            misc_object_category=MiscObjectCategory.NONE,
+            misc_object_category=model.MiscObjectCategory.NONE,
             bounding_box=box,
             line=one.line,
             source=one.source,
         )
-    return body if isinstance(body, Vehicle | Pedestrian | MiscObject) else None
+    return body if isinstance(body, model.Vehicle | model.Pedestrian | model.MiscObject) else None
 
 
-def _values(declarations: ParameterDeclarations | VariableDeclarations | None) -> dict[str, str]:
+def _values(declarations: model.ParameterDeclarations | model.VariableDeclarations | None) -> dict[str, str]:
     if declarations is None:
         return {}
-    if isinstance(declarations, ParameterDeclarations):
+    if isinstance(declarations, model.ParameterDeclarations):
         return {one.name: one.value for one in declarations.parameter_declaration}
     return {one.name: one.value for one in declarations.variable_declaration}
 
 
-def _controllers(one: ScenarioObject, entries: Mapping[CatalogReference, Element]) -> tuple[Controller, ...]:
-    found: list[Element | None] = []
+def _controllers(
+    one: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
+) -> tuple[model.Controller, ...]:
+    found: list[model.Element | None] = []
     for assigned in one.object_controller:
         found.append(entries.get(assigned.catalog_reference) if assigned.catalog_reference else assigned.controller)
-    return tuple(controller for controller in found if isinstance(controller, Controller))
+    return tuple(controller for controller in found if isinstance(controller, model.Controller))
 
 
-def _other_kind(root: OpenScenario, name: str) -> Diagnostic:
+def _other_kind(root: model.OpenScenario, name: str) -> Diagnostic:
     """Return the error for a catalog or a parameter value distribution."""
     if root.catalog is not None:
         return Diagnostic(
@@ -280,7 +261,7 @@ class EntitySelections:
         self._entities_by_type = scenario.entities_by_type
         entities = scenario.document.entities
         declarations = entities.entity_selection if entities is not None else ()
-        self.declared: Mapping[str, EntitySelection] = {
+        self.declared: Mapping[str, model.EntitySelection] = {
             one.name: one for one in declarations if one.name not in scenario.entities
         }
 
@@ -295,7 +276,7 @@ class EntitySelections:
             return
         if name in parents:
             text = f"selection {name!r} is a member of itself"
-            raise ScenarioError(Diagnostic(text, "remove it from its members", group.source, group.line))
+            raise ScenarioError(Diagnostic.at(group, text, "remove it from its members"))
         for ref in group.members.entity_ref:
             yield from self._members(ref.entity_ref, (*parents, name))
         for entry in group.members.by_type:

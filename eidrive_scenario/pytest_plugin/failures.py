@@ -51,14 +51,7 @@ class RunRecord:
 
     def as_report(self) -> dict[str, Any]:
         """Return the facts in types that pytest-xdist sends to its controller."""
-        return {
-            "reasons": self.reasons,
-            "commands": self.commands,
-            "attachments": self.attachments,
-            "folders": self.folders,
-            "file": self.file,
-            "line": self.line,
-        }
+        return {name: value for name, value in vars(self).items() if name != "properties"}
 
     def place_at(self, file: str | Path, line: int | None) -> None:
         """Set the place unless an earlier reason has set it."""

@@ -138,19 +138,16 @@ class _Reading:
     def add(self, record: mcap.Record) -> None:
         """Process a record. An unreadable record is reported as damage."""
         try:
-            self._add(record)
+            if record.opcode == mcap.METADATA:
+                self._add_metadata(record)
+            elif record.opcode == mcap.ATTACHMENT:
+                self._add_attachment(record)
+            elif record.opcode in (mcap.CHUNK, mcap.MESSAGE):
+                self._add_frames(record)
+            elif record.opcode == mcap.STATISTICS:
+                self._stated = mcap.message_count(record.body, FRAMES)
         except (ValueError, struct.error):
             self.damage.add("a record cannot be read", f"byte {record.offset}")
-
-    def _add(self, record: mcap.Record) -> None:
-        if record.opcode == mcap.METADATA:
-            self._add_metadata(record)
-        elif record.opcode == mcap.ATTACHMENT:
-            self._add_attachment(record)
-        elif record.opcode in (mcap.CHUNK, mcap.MESSAGE):
-            self._add_frames(record)
-        elif record.opcode == mcap.STATISTICS:
-            self._stated = mcap.message_count(record.body, FRAMES)
 
     def _add_metadata(self, record: mcap.Record) -> None:
         if len(record.body) > _LARGEST_METADATA:

@@ -1,53 +1,32 @@
 """OpenDRIVE roads: lane and road coordinates to x, y, z and back, and routes over lanes."""
 
-from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, LaneLocations, Pose, Poses, PositionError
-from eidrive_scenario.roads.model.road_map import (
-    Junction,
-    Lane,
-    LaneSection,
-    Road,
-    RoadObject,
-    Signal,
-    SignalController,
-    SignalPlace,
-)
-from eidrive_scenario.roads.network import RoadNetwork, fastest, fewest_junctions, random_costs
-from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
-from eidrive_scenario.roads.routing.distance import Chain
-from eidrive_scenario.roads.routing.graph import Cost, RouteError
-from eidrive_scenario.roads.routing.movement import Branch, BranchSelector
-from eidrive_scenario.roads.routing.route import Route
-from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes
-
-__all__ = [
-    "KINDS",
-    "Branch",
-    "BranchSelector",
-    "Chain",
-    "Cost",
-    "Junction",
-    "Lane",
-    "LaneKey",
-    "LaneLocation",
-    "LaneLocations",
-    "LaneSection",
-    "PlacedObject",
-    "Pose",
-    "Poses",
-    "PositionError",
-    "Road",
-    "RoadNetwork",
-    "RoadObject",
-    "Route",
-    "RouteError",
-    "Signal",
-    "SignalController",
-    "SignalPlace",
-    "SurfaceMesh",
-    "fastest",
-    "fewest_junctions",
-    "outlines",
-    "placed_objects",
-    "random_costs",
-    "surface_meshes",
-]
+from eidrive_scenario.roads.model.location import LaneKey as LaneKey
+from eidrive_scenario.roads.model.location import LaneLocation as LaneLocation
+from eidrive_scenario.roads.model.location import LaneLocations as LaneLocations
+from eidrive_scenario.roads.model.location import Pose as Pose
+from eidrive_scenario.roads.model.location import Poses as Poses
+from eidrive_scenario.roads.model.location import PositionError as PositionError
+from eidrive_scenario.roads.model.road_map import Junction as Junction
+from eidrive_scenario.roads.model.road_map import Lane as Lane
+from eidrive_scenario.roads.model.road_map import LaneSection as LaneSection
+from eidrive_scenario.roads.model.road_map import Road as Road
+from eidrive_scenario.roads.model.road_map import RoadObject as RoadObject
+from eidrive_scenario.roads.model.road_map import Signal as Signal
+from eidrive_scenario.roads.model.road_map import SignalController as SignalController
+from eidrive_scenario.roads.model.road_map import SignalPlace as SignalPlace
+from eidrive_scenario.roads.network import RoadNetwork as RoadNetwork
+from eidrive_scenario.roads.network import fastest as fastest
+from eidrive_scenario.roads.network import fewest_junctions as fewest_junctions
+from eidrive_scenario.roads.network import random_costs as random_costs
+from eidrive_scenario.roads.objects import PlacedObject as PlacedObject
+from eidrive_scenario.roads.objects import outlines as outlines
+from eidrive_scenario.roads.objects import placed_objects as placed_objects
+from eidrive_scenario.roads.routing.distance import Chain as Chain
+from eidrive_scenario.roads.routing.graph import Cost as Cost
+from eidrive_scenario.roads.routing.graph import RouteError as RouteError
+from eidrive_scenario.roads.routing.movement import Branch as Branch
+from eidrive_scenario.roads.routing.movement import BranchSelector as BranchSelector
+from eidrive_scenario.roads.routing.route import Route as Route
+from eidrive_scenario.roads.surfaces import KINDS as KINDS
+from eidrive_scenario.roads.surfaces import SurfaceMesh as SurfaceMesh
+from eidrive_scenario.roads.surfaces import surface_meshes as surface_meshes

@@ -78,7 +78,7 @@ def parse_geo_reference(text: str) -> GeoReference:
     number = re.search(r"(?i)epsg:*([0-9]{1,9})\s*$", text.strip())
     if number:
         return GeoReference(_epsg_transformer(int(number[1])))
-    given = _parameters(text)
+    given = {name: value for name, _, value in (part.lstrip("+").partition("=") for part in text.split())}
     if "proj" in given:
         return GeoReference(_build_transformer(_pipeline(given)))
     if "lat_0" not in given or "lon_0" not in given:
@@ -180,10 +180,6 @@ def _datum(given: Mapping[str, str]) -> tuple[str, tuple[float, ...]]:
     if values and not (len(values) in (3, 7) and all(map(math.isfinite, values))):
         raise ValueError(f"<geoReference>: towgs84 is invalid (got {shift[:60]!r}; expected 3 or 7 numbers)")
     return " ".join([*([f"+ellps={name}"] if name else []), *numbers]), values
-
-
-def _parameters(text: str) -> dict[str, str]:
-    return {name: value for name, _, value in (part.lstrip("+").partition("=") for part in text.split())}
 
 
 def _number(given: Mapping[str, str], name: str) -> float:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack, StackInputs
-from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, ErrorCollector, ScenarioError, SettingError, quoted, suggestion
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
+    CriteriaContext,
     CriterionDeclaration,
     build_criteria,
     declaration_text,
@@ -80,18 +80,11 @@ def profile_files(scenario: Scenario) -> Iterator[Path]:
 def check_commands(scenario: Scenario) -> DeclaredCriteria:
     """Parse all commands of this project and return the declared criteria. Raise ScenarioError with all diagnostics."""
     criteria: dict[CommandKey, tuple[CriterionDeclaration, ...]] = {}
-    has_routes = cache(lambda: _requests_routes(scenario))
+    context = cache(lambda: criteria_context(scenario))
 
     def read_criteria(command: CustomCommandAction) -> None:
         criteria[command_key(command)] = parse_criteria(
-            command.content,
-            source=command.source,
-            line=command.line,
-            entities=scenario.entities,
-            monitors=_monitors(scenario),
-            scope=command.scope,
-            has_roads=scenario.road_file is not None,
-            has_routes=has_routes(),
+            command.content, context(), source=command.source, line=command.line, scope=command.scope
         )
 
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
@@ -99,21 +92,15 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
         CRITERION: read_criteria,
         VARIATION: lambda _: variations(scenario),
     }
-    diagnostics: list[Diagnostic] = []
+    errors = ErrorCollector(ScenarioError)
     for command in scenario.custom_commands:
-        if not command.type.startswith(PREFIX):
-            continue
-        reader = readers.get(command.type)
-        if reader is None:
-            message = f"unknown command type {command.type!r}"
-            diagnostics.append(Diagnostic(message, suggestion(command.type, readers), command.source, command.line))
-            continue
-        try:
-            reader(command)
-        except InputError as error:
-            diagnostics += error.diagnostics
-    if diagnostics:
-        raise ScenarioError(list(dict.fromkeys(diagnostics)))
+        with errors:
+            if command.type in readers:
+                readers[command.type](command)
+            elif command.type.startswith(PREFIX):
+                message = f"unknown command type {command.type!r}"
+                raise ScenarioError(Diagnostic.at(command, message, suggestion(command.type, readers)))
+    errors.raise_if_any()
     return criteria
 
 
@@ -127,25 +114,12 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
     return parse_added_criteria(sources, criteria_context(scenario), scope=scenario.scope)
 
 
-@dataclass(frozen=True)
-class CriteriaContext:
-    """Content of a scenario to which criteria refer; None for names that are unknown and therefore not checked.
-
-    entities, monitors  their names
-    has_roads           whether the scenario has roads
-    has_routes          whether the scenario, or an action of an extension, may request a route
-    """
-
-    entities: tuple[str, ...] | None = None
-    monitors: tuple[str, ...] | None = None
-    has_roads: bool = True
-    has_routes: bool = True
-
-
 def criteria_context(scenario: Scenario) -> CriteriaContext:
     """Return the content of a scenario to which criteria refer."""
+    declared = scenario.document.monitor_declarations
+    monitors = () if declared is None else tuple(monitor.name for monitor in declared.monitor_declaration)
     roads = scenario.road_file is not None
-    return CriteriaContext(tuple(scenario.entities), tuple(_monitors(scenario)), roads, _requests_routes(scenario))
+    return CriteriaContext(tuple(scenario.entities), monitors, roads, _requests_routes(scenario))
 
 
 def parse_added_criteria(
@@ -155,27 +129,21 @@ def parse_added_criteria(
 
     scope  parameters to which settings refer
     """
-    found: list[CriterionDeclaration] = []
-    diagnostics: list[Diagnostic] = []
+    declarations: list[CriterionDeclaration] = []
+    errors = ErrorCollector(SettingError)
     for source in sources:
-        try:
+        with errors:
             content = read_yaml_source(source, option=CRITERION_OPTION)
-            found += declare_criteria(
+            declarations += declare_criteria(
                 content.data,
                 content.lines,
+                context,
                 source=content.source,
-                entities=context.entities,
-                monitors=context.monitors,
                 scope=scope,
-                has_roads=context.has_roads,
-                has_routes=context.has_routes,
                 shown=quoted(content.data),
             )
-        except InputError as error:
-            diagnostics += error.diagnostics
-    if diagnostics:
-        raise SettingError(list(dict.fromkeys(diagnostics)))
-    return tuple(found)
+    errors.raise_if_any()
+    return tuple(declarations)
 
 
 def _requests_routes(scenario: Scenario) -> bool:
@@ -186,11 +154,6 @@ def _requests_routes(scenario: Scenario) -> bool:
         for tree in (scenario.document, *scenario.entries.values())
         for element in tree.walk()
     )
-
-
-def _monitors(scenario: Scenario) -> list[str]:
-    declared = scenario.document.monitor_declarations
-    return [one.name for one in declared.monitor_declaration] if declared is not None else []
 
 
 SUN_PERIOD = 60.0
@@ -323,13 +286,9 @@ def declare(command: CustomCommand, run: RunState) -> None:
     """Add the criteria of a command `eidrive.criterion`."""
     declarations = run.declared.get(command_key(command))
     if declarations is None:  # A command that an action of an extension has created
+        context = CriteriaContext(tuple(run.scenario.entities), has_roads=run.roads is not None)
         declarations = parse_criteria(
-            command.content,
-            source=command.source,
-            line=command.line,
-            entities=run.scenario.entities,
-            scope=command.scope,
-            has_roads=run.roads is not None,
+            command.content, context, source=command.source, line=command.line, scope=command.scope
         )
     add_criteria(declarations, run)
 

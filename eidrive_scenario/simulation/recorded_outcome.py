@@ -7,9 +7,11 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 from eidrive_scenario.base.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.evaluation.criteria_parser import CriteriaContext
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
@@ -20,20 +22,19 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
-from eidrive_scenario.simulation.commands import CriteriaContext, criteria_context
+from eidrive_scenario.simulation.commands import criteria_context
 from eidrive_scenario.simulation.result import RunResult
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+
+_Entry = TypeVar("_Entry")
 
 OUTCOME = "outcome.json"
 """Name of the attachment with the outcome."""
 CONTEXT = "criteria_context"
 """Entry of the metadata with the names of the scenario to which criteria refer."""
-
 TRAILERS = "trailers"
 """Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
-
-
 AXLES = "axles"
 """Entry of the metadata with the axles of the vehicles of the scenario, by name."""
 
@@ -142,10 +143,9 @@ class RunRecorder(Recorder):
 
 def plain_verdict(verdict: Verdict) -> Verdict:
     """Return a verdict with numbers of Python instead of those of numpy, which some criteria return."""
-    numbers = [None if one is None else float(one) for one in (verdict.value, verdict.limit, verdict.first_violation)]
-    value, limit, first = numbers
-    passed, fatal = bool(verdict.passed), bool(verdict.fatal)
-    return Verdict(verdict.name, passed, value, limit, verdict.unit, first, verdict.reason, fatal)
+    numbers = {name: getattr(verdict, name) for name in ("value", "limit", "first_violation")}
+    plain: dict[str, Any] = {name: None if number is None else float(number) for name, number in numbers.items()}
+    return replace(verdict, passed=bool(verdict.passed), fatal=bool(verdict.fatal), **plain)
 
 
 def criteria_context_text(scenario: Scenario) -> str:
@@ -156,22 +156,22 @@ def criteria_context_text(scenario: Scenario) -> str:
 def trailer_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the entry `TRAILERS` of the metadata of a run; empty without trailers."""
     towed = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)
-    found = {
+    trailers = {
         name: entity.vehicle_category.value
         for name, entity in scenario.entities.items()
         if isinstance(entity, Vehicle) and entity.vehicle_category in towed
     }
-    return {TRAILERS: canonical_json(found)} if found else {}
+    return {TRAILERS: canonical_json(trailers)} if trailers else {}
 
 
 def axle_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the entry `AXLES` of the metadata of a run; empty without vehicles."""
     vehicles = {name: entity.axles for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
-    found = {
+    centers = {
         name: AxleCenters(_center(axles.rear_axle), None if axles.front_axle is None else _center(axles.front_axle))
         for name, axles in vehicles.items()
     }
-    return {AXLES: canonical_json(codec(Mapping[str, AxleCenters]).encode(found))} if found else {}
+    return {AXLES: canonical_json(codec(Mapping[str, AxleCenters]).encode(centers))} if centers else {}
 
 
 def _center(axle: Axle) -> tuple[float, float]:
@@ -180,32 +180,27 @@ def _center(axle: Axle) -> tuple[float, float]:
 
 def recorded_axles(recording: Recording) -> Mapping[str, AxleCenters]:
     """Return the axles of vehicles by name. Those of an older or damaged recording are unknown."""
-    try:
-        found: Mapping[str, AxleCenters] = codec(Mapping[str, AxleCenters]).decode(
-            load_json(recording.metadata[AXLES].encode())
-        )
-    except (AttributeError, LookupError, TypeError, ValueError):
-        return {}
-    return found
+    return _metadata(recording, AXLES, Mapping[str, AxleCenters], {})
 
 
 def recorded_trailers(recording: Recording) -> Mapping[str, str]:
     """Return the vehicle categories of trailers by name. Those of an older or damaged recording are unknown."""
-    try:
-        found: Mapping[str, str] = codec(Mapping[str, str]).decode(load_json(recording.metadata[TRAILERS].encode()))
-    except (AttributeError, LookupError, TypeError, ValueError):
-        return {}
-    return found
+    return _metadata(recording, TRAILERS, Mapping[str, str], {})
 
 
 def recorded_context(recording: Recording) -> CriteriaContext:
     """Return the names to which criteria on a recording refer. Those of an older or damaged recording are unknown."""
-    has_roads = ROAD_FILE in recording.attachments
+    context = _metadata(recording, CONTEXT, CriteriaContext, CriteriaContext())
+    return replace(context, has_roads=ROAD_FILE in recording.attachments)
+
+
+def _metadata(recording: Recording, name: str, kind: Any, unknown: _Entry) -> _Entry:
+    """Return a decoded entry of the metadata, or what stands for that of an older or damaged recording."""
     try:
-        found: CriteriaContext = codec(CriteriaContext).decode(load_json(recording.metadata[CONTEXT].encode()))
+        entry: _Entry = codec(kind).decode(load_json(recording.metadata[name].encode()))
     except (AttributeError, LookupError, TypeError, ValueError):
-        return CriteriaContext(has_roads=has_roads)
-    return replace(found, has_roads=has_roads)
+        return unknown
+    return entry
 
 
 def recorded_outcome(recording: Recording) -> RecordedOutcome | None:
@@ -217,9 +212,9 @@ def recorded_outcome(recording: Recording) -> RecordedOutcome | None:
     if data is None:
         return None
     try:
-        found: RecordedOutcome = codec(RecordedOutcome).decode(load_json(data))
+        outcome: RecordedOutcome = codec(RecordedOutcome).decode(load_json(data))
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         message = f"{OUTCOME} cannot be decoded: {type(error).__name__}: {error}"[:200]
         hint = f"read it with the version that wrote it ({recording.metadata.get('eidrive-scenario', 'unknown')})"
         raise InputError(Diagnostic(message, hint, str(recording.path))) from error
-    return found
+    return outcome

@@ -93,17 +93,7 @@ class RunResult:
             "channel": self.channel,
             "passed": self.passed,
             "end_reason": self.end_reason,
-            "criteria": [
-                {
-                    "name": verdict.name,
-                    "passed": verdict.passed,
-                    "value": verdict.value,
-                    "limit": verdict.limit,
-                    "unit": verdict.unit,
-                    "reason": verdict.reason,
-                }
-                for verdict in self.criteria
-            ],
+            "criteria": list(map(verdict_json, self.criteria)),
             "final_state": list(self.final_state),
             "warnings": list(self.warnings),
             "metrics": dict(self.metrics),
@@ -118,6 +108,11 @@ class RunResult:
             "settings_sha256": self.settings.digest,
             "command": self.command,
         }
+
+
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
+    """Return the object of a verdict that `--json` prints."""
+    return {key: getattr(verdict, key) for key in ("name", "passed", "value", "limit", "unit", "reason")}
 
 
 def result_row(result: RunResult) -> dict[str, Scalar]:

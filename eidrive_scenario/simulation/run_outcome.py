@@ -198,7 +198,8 @@ def late_warnings(
     """
     time = end.frame.view.time
     yield from map(str, storyboard.context.warnings)
-    yield from map(str, storyboard.context.traffic.shortages())
+    if storyboard.context.traffic is not None:
+        yield from map(str, storyboard.context.traffic.shortages())
     yield from user_value_warnings(storyboard.context.requested_user_values, *user_values)
     yield from map(str, motionless.warnings(scenario, time))
     if not _is_failed_early(end.reason):

@@ -83,98 +83,66 @@ def set_up_run(
 
     stack  builds the driving stack
 
-    Raise InputError with the diagnostics of all parts.
+    Raise InputError with the diagnostics of all parts: an error of one does not hide those of the others.
     """
-    return _RunBuilder(source, seed, settings, load_weights, stack).build()
-
-
-class _RunBuilder:
-    """Builder of the parts of one run; each gets what the settings of the run say about it.
-
-    An error of one part does not hide those of the others.
-    """
-
-    def __init__(
-        self,
-        source: Scenario | Source | ConcreteRun,
-        seed: int,
-        settings: RunSettings,
-        load_weights: bool,
-        stack: StackFactory,
-    ) -> None:
-        self._source, self._seed, self._settings = source, seed, settings
-        self._load_weights, self._stack = load_weights, stack
-        self._errors = ErrorCollector()
-
-    def build(self) -> RunSetup:
-        """Return all parts. Raise InputError with the diagnostics of all."""
-        settings = self._settings
-        scenario, replaced = self._load_scenario()
-        roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
-        declared: DeclaredCriteria = {}
-        added: tuple[CriterionDeclaration, ...] = ()
-        criteria: tuple[CriterionDeclaration, ...] = ()
-        weather: Weather | None = None
-        with self._errors:
-            declared = check_commands(scenario)
-        with self._errors:
-            added = check_added_criteria(scenario, settings.criteria_sources)
-        with self._errors:
-            storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=self._seed, controllers=settings.controllers)
-        with self._errors:
-            driving = build_stack(self._stack, self._stack_context(scenario, roads))
-        with self._errors:
-            criteria = tuple(stop_trigger_declarations(scenario))
-        with self._errors:
-            if settings.weather is not None:
-                weather = load_weather(settings.weather, origin=option_of("weather").flag)
-        self._errors.raise_if_any()
-        declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
-        all_criteria = [one.build() for one in declarations]
-        progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
-        warnings = [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)]
-        can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)
-        world = World(roads, dt=settings.dt, entities=storyboard.road_objects, picture_maker=picture_maker)
-        if weather is not None:
-            world.set_weather(weather)
-        return RunSetup(
+    errors = ErrorCollector()
+    scenario = load_for_run(source, seed, settings.parameters, errors)
+    replaced: tuple[Diagnostic, ...] = ()
+    with errors:
+        scenario, replaced = drive_entities(scenario, settings.stacks)
+        scenario = select_planner(scenario, settings.planner)
+    roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+    declared: DeclaredCriteria = {}
+    added: tuple[CriterionDeclaration, ...] = ()
+    criteria: tuple[CriterionDeclaration, ...] = ()
+    weather: Weather | None = None
+    with errors:
+        declared = check_commands(scenario)
+    with errors:
+        added = check_added_criteria(scenario, settings.criteria_sources)
+    with errors:
+        storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=seed, controllers=settings.controllers)
+    with errors:
+        context = StackContext(
             scenario,
             roads,
-            storyboard,
-            driving,
-            criteria,
-            declared,
-            added,
-            weather,
-            world,
-            tuple(map(str, warnings)),
-            progress,
-            can_be_judged,
-        )
-
-    def _load_scenario(self) -> tuple[Scenario, tuple[Diagnostic, ...]]:
-        """Return the scenario with the parameters, stacks and planner of the settings, and warnings about them."""
-        settings = self._settings
-        scenario = load_for_run(self._source, self._seed, settings.parameters, self._errors)
-        replaced: tuple[Diagnostic, ...] = ()
-        with self._errors:
-            scenario, replaced = drive_entities(scenario, settings.stacks)
-            scenario = select_planner(scenario, settings.planner)
-        return scenario, replaced
-
-    def _stack_context(self, scenario: Scenario, roads: RoadNetwork | None) -> StackContext:
-        settings = self._settings
-        return StackContext(
-            scenario,
-            roads,
-            self._seed,
+            seed,
             settings.dt,
             channel=settings.channel,
             detector=settings.detector,
             cooperate=settings.cooperate,
-            load_weights=self._load_weights,
+            load_weights=load_weights,
             allow_torchscript=settings.allow_torchscript,
         )
+        driving = build_stack(stack, context)
+    with errors:
+        criteria = tuple(stop_trigger_declarations(scenario))
+    with errors:
+        if settings.weather is not None:
+            weather = load_weather(settings.weather, origin=option_of("weather").flag)
+    errors.raise_if_any()
+    declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
+    all_criteria = [one.build() for one in declarations]
+    progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
+    warnings = [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)]
+    can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)
+    world = World(roads, dt=settings.dt, entities=storyboard.road_objects, picture_maker=picture_maker)
+    if weather is not None:
+        world.set_weather(weather)
+    return RunSetup(
+        scenario,
+        roads,
+        storyboard,
+        driving,
+        criteria,
+        declared,
+        added,
+        weather,
+        world,
+        tuple(map(str, warnings)),
+        progress,
+        can_be_judged,
+    )
 
 
 def _warnings(scenario: Scenario, roads: RoadNetwork | None, stack: DrivingStack) -> Iterator[Diagnostic]:

@@ -11,23 +11,15 @@ from eidrive_scenario.driving.settings import NAME_PROPERTIES, agent_settings
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.files.yaml_text import YamlContent, flow_yaml, read_yaml_source
-from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import MODULE, is_agent_controller, property_entries
-from eidrive_scenario.openscenario.model import (
-    Controller,
-    Pedestrian,
-    Properties,
-    Property,
-    Vehicle,
-    VehicleCategory,
-)
 from eidrive_scenario.run_options import YamlSource, option_of
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.world.specs import actor_spec
 
 DRIVE = option_of("drive").flag
 PLANNER = option_of("planner").flag
-_TOWED = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)
+_TOWED = (model.VehicleCategory.TRAILER, model.VehicleCategory.SEMITRAILER)
 _OF_SPEED = ("target_speed", "follow_speed_limit")
 _EXAMPLE = "{planner: route, detector: oracle}"
 
@@ -59,11 +51,8 @@ def drive_entities(
         raise SettingError(diagnostics)
     replaced = [(name, controller) for name in drive for controller in scenario.controllers[name]]
     warnings = tuple(
-        Diagnostic(
-            f"controller {controller.name!r} of {name!r} is replaced by a driving stack ({DRIVE})",
-            "",
-            controller.source,
-            controller.line,
+        Diagnostic.at(
+            controller, f"controller {controller.name!r} of {name!r} is replaced by a driving stack ({DRIVE})"
         )
         for name, controller in replaced
     )
@@ -77,7 +66,7 @@ def _unsuitable(scenario: Scenario, name: str) -> Iterator[Diagnostic]:
     vehicles = [
         other
         for other, body in scenario.entities.items()
-        if isinstance(body, Vehicle) and other not in towed and body.vehicle_category not in _TOWED
+        if isinstance(body, model.Vehicle) and other not in towed and body.vehicle_category not in _TOWED
     ]
     hint = f"the scenario has the vehicles {', '.join(vehicles)}" if vehicles else "the scenario has no vehicle"
     if entity is None:
@@ -85,8 +74,8 @@ def _unsuitable(scenario: Scenario, name: str) -> Iterator[Diagnostic]:
         yield Diagnostic(f"the scenario has no entity {quoted(name)}", hint, DRIVE)
     elif name in scenario.external:
         yield Diagnostic(f"{name!r} is an object of the road network or of another tool", hint, DRIVE)
-    elif not isinstance(entity, Vehicle):
-        kind = "a pedestrian" if isinstance(entity, Pedestrian) else "a miscellaneous object"
+    elif not isinstance(entity, model.Vehicle):
+        kind = "a pedestrian" if isinstance(entity, model.Pedestrian) else "a miscellaneous object"
         yield Diagnostic(f"{name!r} is {kind}, not a vehicle", hint, DRIVE)
     elif name not in vehicles:
         yield Diagnostic(f"{name!r} is a trailer, which is towed", hint, DRIVE)
@@ -98,7 +87,7 @@ def _unsuitable(scenario: Scenario, name: str) -> Iterator[Diagnostic]:
             yield Diagnostic(what, "change the properties of its controller, or remove the option", DRIVE)
 
 
-def _stack(scenario: Scenario, name: str, source: YamlSource | None) -> Controller:
+def _stack(scenario: Scenario, name: str, source: YamlSource | None) -> model.Controller:
     """Return an eidrive controller with the properties of a YAML mapping. Raise SettingError if it is not a mapping."""
     origin = f"{DRIVE} {name}"
     content = YamlContent({}, origin) if source is None else read_yaml_source(source, option=origin)
@@ -113,7 +102,7 @@ def _stack(scenario: Scenario, name: str, source: YamlSource | None) -> Controll
     if not any(key in data for key in _OF_SPEED):
         data["follow_speed_limit"] = True
     entries = tuple(
-        Property(
+        model.Property(
             name=str(key),
             value=value if key in NAME_PROPERTIES and isinstance(value, str) else flow_yaml(value, setting=str(key)),
             scope=scenario.scope,
@@ -124,8 +113,8 @@ def _stack(scenario: Scenario, name: str, source: YamlSource | None) -> Controll
         if value is not None or key not in NAME_PROPERTIES
     )
     line = 1 if content.lines else 0
-    properties = Properties(property=entries, line=line, source=content.source)
-    return Controller(name=MODULE, properties=properties, line=line, source=content.source)
+    properties = model.Properties(property=entries, line=line, source=content.source)
+    return model.Controller(name=MODULE, properties=properties, line=line, source=content.source)
 
 
 def select_planner(scenario: Scenario, planner: str | None, *, only: str | None = None) -> Scenario:
@@ -158,7 +147,7 @@ def _has_driver(scenario: Scenario) -> bool:
     )
 
 
-def _planner_of(scenario: Scenario, name: str, controller: Controller) -> str | None:
+def _planner_of(scenario: Scenario, name: str, controller: model.Controller) -> str | None:
     """Return the planner of a controller; "" for the default, None for one that does not drive."""
     if not is_agent_controller(controller) or not actor_spec(name, scenario.entities[name]).has_wheels:
         return None
@@ -169,13 +158,13 @@ def _planner_of(scenario: Scenario, name: str, controller: Controller) -> str | 
     return None if planner == NO_PLANNER else planner or ""
 
 
-def _with_planner(scenario: Scenario, name: str, controller: Controller, planner: str) -> Controller:
+def _with_planner(scenario: Scenario, name: str, controller: model.Controller, planner: str) -> model.Controller:
     """Return a controller with the planner if it drives; its other properties are kept."""
     before = _planner_of(scenario, name, controller)
     if before is None or before == planner:
         return controller
     replaced = ("planner", "planner_settings")
     kept = tuple(entry for entry in property_entries(controller) if entry.name not in replaced)
-    selected = Property(name="planner", value=planner, scope=scenario.scope, line=controller.line, source=PLANNER)
+    selected = model.Property(name="planner", value=planner, scope=scenario.scope, line=controller.line, source=PLANNER)
     line, source = controller.line, controller.source
-    return replace(controller, properties=Properties(property=(*kept, selected), line=line, source=source))
+    return replace(controller, properties=model.Properties(property=(*kept, selected), line=line, source=source))

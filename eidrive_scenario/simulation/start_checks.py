@@ -17,18 +17,8 @@ from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.driving.station_warnings import MARGIN
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted
 from eidrive_scenario.extensions.registry import registry
-from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
-from eidrive_scenario.openscenario.model import (
-    CatalogReference,
-    Element,
-    EntityAction,
-    FollowTrajectoryAction,
-    ManeuverGroup,
-    PrivateAction,
-    TeleportAction,
-    Vehicle,
-)
 from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
@@ -136,14 +126,14 @@ def _off_road(
 
 def start_diagnostic(scenario: Scenario, name: str, message: str, hint: str) -> Diagnostic:
     """Return a diagnostic at the last TeleportAction of an actor in Init, or at the actor without one."""
-    element: Element = scenario.entities[name]
+    element: model.Element = scenario.entities[name]
     selections = EntitySelections(scenario)
     for private in scenario.storyboard.init.actions.private:
         if name in selections.members(private.entity_ref):
             for action in private.private_action:
                 if action.teleport_action is not None:
                     element = action.teleport_action
-    return Diagnostic(message, hint, element.source, element.line)
+    return Diagnostic.at(element, message, hint)
 
 
 BESIDE = 30.0
@@ -166,7 +156,7 @@ def spawn_warnings(
     names = [
         name
         for name, entity in scenario.entities.items()
-        if isinstance(entity, Vehicle) and name in view.rows and name not in drivers
+        if isinstance(entity, model.Vehicle) and name in view.rows and name not in drivers
     ]
     if not names:
         return
@@ -206,16 +196,13 @@ def _gaps(roads: RoadNetwork | None, view: WorldView, names: list[str]) -> dict[
 def _on_trajectories(scenario: Scenario) -> frozenset[str]:
     """Return the entities that follow a trajectory at any time."""
     selections, found = EntitySelections(scenario), set[str]()
-    storyboard = scenario.storyboard
-    for private in storyboard.init.actions.private:
-        if any(isinstance(element, FollowTrajectoryAction) for element in private.walk()):
+    for private in scenario.storyboard.init.actions.private:
+        if any(isinstance(element, model.FollowTrajectoryAction) for element in private.walk()):
             found.update(selections.members(private.entity_ref))
-    for story in storyboard.story:
-        for act in story.act:
-            for group in act.maneuver_group:
-                if any(isinstance(element, FollowTrajectoryAction) for element in group.walk()):
-                    for actor in group.actors.entity_ref:
-                        found.update(selections.members(actor.entity_ref))
+    for group in _groups(scenario):
+        if any(isinstance(element, model.FollowTrajectoryAction) for element in group.walk()):
+            for actor in group.actors.entity_ref:
+                found.update(selections.members(actor.entity_ref))
     return frozenset(found)
 
 
@@ -260,9 +247,9 @@ def _added(scenario: Scenario) -> frozenset[str]:
     selections, found = EntitySelections(scenario), set[str]()
     for group in _groups(scenario):
         for element in _elements(scenario, group):
-            if isinstance(element, EntityAction) and element.add_entity_action is not None:
+            if isinstance(element, model.EntityAction) and element.add_entity_action is not None:
                 found.update(selections.members(element.entity_ref))
-            elif isinstance(element, TeleportAction):
+            elif isinstance(element, model.TeleportAction):
                 found.update(_actors(scenario, selections, group))
     return frozenset(found)
 
@@ -277,12 +264,12 @@ def _moved(scenario: Scenario) -> frozenset[str]:
         if any(map(_moves, private.private_action)):
             found.update(selections.members(private.entity_ref))
     for group in _groups(scenario):
-        if any(isinstance(element, PrivateAction) and _moves(element) for element in _elements(scenario, group)):
+        if any(isinstance(element, model.PrivateAction) and _moves(element) for element in _elements(scenario, group)):
             found.update(_actors(scenario, selections, group))
     return frozenset(found)
 
 
-def _moves(action: PrivateAction) -> bool:
+def _moves(action: model.PrivateAction) -> bool:
     """Whether an action requests a speed, overrides pedals, or assigns another controller. Routes have no speed."""
     longitudinal, control = action.longitudinal_action, action.controller_action
     if longitudinal is not None:
@@ -294,22 +281,22 @@ def _moves(action: PrivateAction) -> bool:
     return action.synchronize_action is not None
 
 
-def _groups(scenario: Scenario) -> Iterator[ManeuverGroup]:
+def _groups(scenario: Scenario) -> Iterator[model.ManeuverGroup]:
     for story in scenario.storyboard.story:
         for act in story.act:
             yield from act.maneuver_group
 
 
-def _elements(scenario: Scenario, group: ManeuverGroup) -> Iterator[Element]:
+def _elements(scenario: Scenario, group: model.ManeuverGroup) -> Iterator[model.Element]:
     """Yield the elements of a maneuver group, and those of its maneuvers of catalogs."""
     for element in group.walk():
         yield element
-        entry = scenario.entries.get(element) if isinstance(element, CatalogReference) else None
+        entry = scenario.entries.get(element) if isinstance(element, model.CatalogReference) else None
         if entry is not None:
             yield from entry.walk()
 
 
-def _actors(scenario: Scenario, selections: EntitySelections, group: ManeuverGroup) -> Collection[str]:
+def _actors(scenario: Scenario, selections: EntitySelections, group: model.ManeuverGroup) -> Collection[str]:
     """Return the entities that may be actors of a group."""
     if group.actors.select_triggering_entities:
         return list(scenario.entities)

@@ -46,12 +46,11 @@ class ExternalObjects:
             name: _find(reference.name, roads) for name, reference in scenario.external.items()
         }
         self.warnings = tuple(
-            Diagnostic(
+            Diagnostic.at(
+                scenario.external[name],
                 f"entity {name!r} is represented by a box of 0.5 m: the external object "
                 f"{scenario.external[name].name!r} is unknown",
                 "define a Vehicle, Pedestrian or MiscObject",
-                scenario.external[name].source,
-                scenario.external[name].line,
             )
             for name, found in self._objects.items()
             if found is None
@@ -186,10 +185,7 @@ class Storyboard:
                 commands.placements[back.name] = msgspec.structs.replace(
                     back.motion.placement(), teleport=front.motion.teleported
                 )
-        if self.context.traffic.started:
-            appearances = self.context.appearances.items()
-            invisible = [name for name, appearance in appearances if not appearance.visibility.traffic]
-            self.context.traffic.step(view.without(invisible), self.dt, commands)
+        self.context.step_traffic()
         return self._completed_commands(commands)
 
     def _add_trailers(self) -> list[tuple[Actor, Actor]]:

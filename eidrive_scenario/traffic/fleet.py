@@ -300,7 +300,11 @@ class Fleet:
         cars.progress = cars.progress + covered / self.lanes.stretch(cars.row, cars.progress)
         self._changes.advance(cars, covered)
         self._poses = None
-        self._pass_ends()
+        # Move cars at the end of their lane to the next one, or remove them
+        gone = self._plans.pass_ends(self._cars)
+        for name in gone:
+            self.remove(name)
+        self.departed = frozenset(gone)
         return self.placements()
 
     def _decide(self, dt: float) -> None:
@@ -340,10 +344,3 @@ class Fleet:
             cars.plan[index] = (target, *(-1,) * (cars.plan.shape[1] - 1))
             cars.granted[index] = False
             self._plans.extend(cars, index)
-
-    def _pass_ends(self) -> None:
-        """Move cars at the end of their lane to the next one, or remove them."""
-        gone = self._plans.pass_ends(self._cars)
-        for name in gone:
-            self.remove(name)
-        self.departed = frozenset(gone)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -48,9 +48,7 @@ class Occupants:
     def without(self, owner: int) -> Occupants:
         """Return the occupants of other owners."""
         kept = self.owner != owner
-        return Occupants(
-            self.row[kept], self.key[kept], self.rear[kept], self.front[kept], self.speed[kept], self.owner[kept]
-        )
+        return Occupants(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -169,5 +167,4 @@ def no_occupants() -> Occupants:
 
 def concatenate_occupants(*parts: Occupants) -> Occupants:
     """Return the union of occupants."""
-    names = ("row", "key", "rear", "front", "speed", "owner")
-    return Occupants(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return Occupants(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Occupants)))

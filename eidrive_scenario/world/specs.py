@@ -79,9 +79,7 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     given = (dimensions.length, dimensions.width, dimensions.height)
     if min(given) < 0.0:
         message = f"the bounding box of {name!r} is {given[0]:g} x {given[1]:g} x {given[2]:g} m"
-        raise ScenarioError(
-            Diagnostic(message, "give length, width and height above 0", dimensions.source, dimensions.line)
-        )
+        raise ScenarioError(Diagnostic.at(dimensions, message, "give length, width and height above 0"))
     length, width, height = (own or usual for own, usual in zip(given, usual_size, strict=True))
     lift = 0.0 if dimensions.height else height / 2
     common = ActorSpec(

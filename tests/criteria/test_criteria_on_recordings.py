@@ -10,7 +10,7 @@ import pytest
 
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import Frame, Verdict, evaluate_criteria
-from eidrive_scenario.evaluation.criteria_parser import build_criteria, parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import CriteriaContext, build_criteria, parse_criteria
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.recording import Recorder, read_recording
 
@@ -116,6 +116,6 @@ def test_criterion_has_the_known_value_and_both_verdicts(
 
 
 def _verdict(text: str, frames: list[Frame], roads: RoadNetwork) -> Verdict:
-    (criterion,) = build_criteria(parse_criteria(text, entities=known_recording.ACTORS, monitors=["Seen"]))
+    (criterion,) = build_criteria(parse_criteria(text, CriteriaContext(tuple(known_recording.ACTORS), ("Seen",))))
     (verdict,) = evaluate_criteria(frames, [criterion], roads, known_recording.LINKS)
     return verdict

@@ -262,7 +262,7 @@ class TrafficAreaAction(TrafficInstanceAction):
             try:
                 ranges += traffic.road_range(self._roads, cursors, entry.length)
             except InputError as error:
-                diagnostics = [Diagnostic(d.message, d.hint, entry.source, entry.line) for d in error.diagnostics]
+                diagnostics = [Diagnostic.at(entry, d.message, d.hint) for d in error.diagnostics]
                 raise ScenarioError(diagnostics) from error
         return ranges
 

@@ -33,11 +33,10 @@ class StoryboardElementStateCondition(Condition):
         self._observer = context.observe_element(kind, name)
         if self._observer is None:
             raise ScenarioError(
-                Diagnostic(
+                Diagnostic.at(
+                    self.element,
                     f"the storyboard has no {kind} named {name!r}",
                     suggestion(name, context.element_names(kind)),
-                    self.element.source,
-                    self.element.line,
                 )
             )
 

@@ -57,7 +57,7 @@ class TimeOfDayCondition(Condition):
         if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
             what = "TimeOfDayCondition is never fulfilled: no environment of the scenario has a TimeOfDay"
             hint = "specify one in an EnvironmentAction in Init"
-            context.warn(Diagnostic(what, hint, self.element.source, self.element.line))
+            context.warn(Diagnostic.at(self.element, what, hint))
 
     def holds(self, context: ConditionContext) -> bool:
         """Compare the clock."""

@@ -76,7 +76,7 @@ def _entry(controller: model.Controller, name: str) -> model.Property | None:
 
 def _invalid(controller: model.Controller, entry: model.Property, expected: str) -> ScenarioError:
     message = f"controller {controller.name!r}: invalid property {entry.name} (got {entry.value!r}; {expected})"
-    return ScenarioError(Diagnostic(message, "", entry.source, entry.line))
+    return ScenarioError(Diagnostic.at(entry, message))
 
 
 CLOSEST = 3.0

@@ -10,36 +10,17 @@ from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, is_immediate
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.openscenario.model import (
-    AbsoluteSpeed,
-    AbsoluteTargetSpeed,
-    Action,
-    Element,
-    Event,
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-    LongitudinalDistanceAction,
-    Polyline,
-    SpeedAction,
-    SpeedProfileAction,
-    SpeedProfileEntry,
-    SynchronizeAction,
-    TransitionDynamics,
-    Vehicle,
-)
-from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES, has_times
+from eidrive_scenario.openscenario import model
 
-_DOMAINS: Mapping[type[Element], str] = {
-    SpeedAction: "longitudinal",
-    SpeedProfileAction: "longitudinal",
-    LongitudinalDistanceAction: "longitudinal",
-    SynchronizeAction: "longitudinal",
-    LaneChangeAction: "lateral",
-    LaneOffsetAction: "lateral",
-    LateralDistanceAction: "lateral",
-    FollowTrajectoryAction: "lateral",
+_DOMAINS: Mapping[type[model.Element], str] = {
+    model.SpeedAction: "longitudinal",
+    model.SpeedProfileAction: "longitudinal",
+    model.LongitudinalDistanceAction: "longitudinal",
+    model.SynchronizeAction: "longitudinal",
+    model.LaneChangeAction: "lateral",
+    model.LaneOffsetAction: "lateral",
+    model.LateralDistanceAction: "lateral",
+    model.FollowTrajectoryAction: "lateral",
 }
 """Control domain of each action with a duration (ASAM OpenSCENARIO XML, control strategies)."""
 
@@ -47,7 +28,7 @@ _DOMAINS: Mapping[type[Element], str] = {
 def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield actions of one event that end another one, as both control the same domain of the same entities."""
     for node in context.nodes:
-        if not isinstance(node.element, Event) or not context.actors(node):
+        if not isinstance(node.element, model.Event) or not context.actors(node):
             continue
         leaves = [(action, _with_duration(action)) for action in node.element.action]
         for (first, one), (second, other) in combinations(leaves, 2):
@@ -61,22 +42,22 @@ def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
                 )
 
 
-def _with_duration(action: Action) -> Element | None:
+def _with_duration(action: model.Action) -> model.Element | None:
     """Return the specific action of a private action that has a duration."""
     if action.private_action is None:
         return None
     leaf = next((one for one in action.private_action.walk() if type(one) in _DOMAINS), None)
-    if leaf is None or any(isinstance(one, TransitionDynamics) and is_immediate(one) for one in leaf.walk()):
+    if leaf is None or any(isinstance(one, model.TransitionDynamics) and is_immediate(one) for one in leaf.walk()):
         return None
     return leaf
 
 
-def _domains(leaf: Element | None) -> set[str]:
+def _domains(leaf: model.Element | None) -> set[str]:
     """Return the control domains of a specific action with a duration."""
     if leaf is None:
         return set()
     domains = {_DOMAINS[type(leaf)]}
-    if isinstance(leaf, FollowTrajectoryAction) and leaf.time_reference.timing is not None:
+    if isinstance(leaf, model.FollowTrajectoryAction) and leaf.time_reference.timing is not None:
         domains.add("longitudinal")
     return domains
 
@@ -90,7 +71,7 @@ def speeds_above_max(context: LintContext) -> Iterator[Diagnostic]:
                 continue
             for name in actors:
                 entity = context.scenario.entities.get(name)
-                limit = entity.performance.max_speed if isinstance(entity, Vehicle) else None
+                limit = entity.performance.max_speed if isinstance(entity, model.Vehicle) else None
                 if limit is not None and abs(speed) > limit + EPSILON:
                     yield at(
                         element,
@@ -99,40 +80,40 @@ def speeds_above_max(context: LintContext) -> Iterator[Diagnostic]:
                     )
 
 
-def _speed(element: Element) -> float | None:
-    if isinstance(element, AbsoluteTargetSpeed | AbsoluteSpeed):
+def _speed(element: model.Element) -> float | None:
+    if isinstance(element, model.AbsoluteTargetSpeed | model.AbsoluteSpeed):
         return element.value
-    return element.speed if isinstance(element, SpeedProfileEntry) else None
+    return element.speed if isinstance(element, model.SpeedProfileEntry) else None
 
 
 def zero_rate_transitions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield transitions that never reach their target because their rate is 0."""
     for element in context.elements:
-        if isinstance(element, TransitionDynamics) and has_zero_rate(element):
+        if isinstance(element, model.TransitionDynamics) and has_zero_rate(element):
             yield at(element, "with a rate of 0 the action never reaches its target", "specify a rate above 0")
 
 
 def untimed_trajectories(context: LintContext) -> Iterator[Diagnostic]:
     """Yield trajectories with a Timing whose times are missing or all equal."""
     for element in context.elements:
-        if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
+        if not isinstance(element, model.FollowTrajectoryAction) or element.time_reference.timing is None:
             continue
         trajectory = context.trajectory(element)
         shape = trajectory.shape.chosen() if trajectory is not None else None
-        if isinstance(shape, Polyline):
+        if isinstance(shape, model.Polyline):
             yield from _times(shape)
-        elif shape is not None and not has_times(shape):
+        elif shape is not None and not model.has_times(shape):
             name = type(shape).__name__
             message = f"Timing has no effect: this {name} has no times, so the actor keeps its speed"
-            hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or write <None/> as the TimeReference"
+            hint = f"specify {model.TIME_ATTRIBUTES[type(shape)]}, or write <None/> as the TimeReference"
             yield at(shape, message, hint)
 
 
-def _times(shape: Polyline) -> Iterator[Diagnostic]:
+def _times(shape: model.Polyline) -> Iterator[Diagnostic]:
     for vertex in shape.vertex:
         if vertex.time is None:
             message = "Timing has no effect: this vertex has no time, so the actor keeps its speed"
-            yield at(vertex, message, f"specify {TIME_ATTRIBUTES[Polyline]}")
+            yield at(vertex, message, f"specify {model.TIME_ATTRIBUTES[model.Polyline]}")
     known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
     if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
         yield at(shape, f"all vertices have the time {known[0]:g} s", "specify when each vertex is passed")

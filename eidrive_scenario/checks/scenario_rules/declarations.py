@@ -16,14 +16,8 @@ from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.extensions.library import resolve_path
 from eidrive_scenario.files.bounded import absolute
 from eidrive_scenario.files.untrusted_xml import line_of
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
-from eidrive_scenario.openscenario.model import (
-    EntitySelection,
-    MonitorDeclaration,
-    ParameterAction,
-    ParameterCondition,
-    VariableDeclaration,
-)
 from eidrive_scenario.openscenario.values.expressions import REFERENCE
 from eidrive_scenario.simulation.commands import profile_files
 
@@ -68,9 +62,9 @@ def _used(root: etree._Element) -> set[str]:
 
 def ineffective_parameter_actions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield ParameterActions whose parameter no condition reads; `$name` is replaced when the file is read."""
-    read = {one.parameter_ref for one in context.elements if isinstance(one, ParameterCondition)}
+    read = {one.parameter_ref for one in context.elements if isinstance(one, model.ParameterCondition)}
     for element in context.elements:
-        if isinstance(element, ParameterAction) and element.parameter_ref not in read:
+        if isinstance(element, model.ParameterAction) and element.parameter_ref not in read:
             yield at(
                 element,
                 f"ParameterAction has no effect: no condition reads parameter {element.parameter_ref!r}",
@@ -82,7 +76,7 @@ def unused_variables(context: LintContext) -> Iterator[Diagnostic]:
     """Yield variables without a reference."""
     referenced = context.referenced.get("variable", set()) | context.command_words
     for element in context.elements:
-        if isinstance(element, VariableDeclaration) and element.name not in referenced:
+        if isinstance(element, model.VariableDeclaration) and element.name not in referenced:
             yield at(element, f"variable {element.name!r} is never used", "remove it")
 
 
@@ -90,7 +84,7 @@ def unused_monitors(context: LintContext) -> Iterator[Diagnostic]:
     """Yield monitors that no action sets."""
     referenced = context.referenced.get("monitor", set())
     for element in context.elements:
-        if isinstance(element, MonitorDeclaration) and element.name not in referenced:
+        if isinstance(element, model.MonitorDeclaration) and element.name not in referenced:
             yield at(element, f"monitor {element.name!r} is set by no SetMonitorAction", "set it or remove it")
 
 
@@ -102,7 +96,7 @@ def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
     referenced = context.referenced.get("entity", set()) | context.command_words
     stations = _stations_with_senders(context)
     for element in context.elements:
-        if not isinstance(element, EntitySelection) or element.name in referenced:
+        if not isinstance(element, model.EntitySelection) or element.name in referenced:
             continue
         if not stations.intersection(context.members(element.name)):
             yield at(element, f"selection {element.name!r} is never used", "remove it")

@@ -8,22 +8,11 @@ from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.outline import Node
 from eidrive_scenario.errors import Diagnostic, suggestion
-from eidrive_scenario.openscenario.model import (
-    Action,
-    ConnectTrailerAction,
-    Event,
-    LateralDistanceAction,
-    LongitudinalDistanceAction,
-    ManeuverGroup,
-    ScenarioObject,
-    SynchronizeAction,
-    TrafficAction,
-    Vehicle,
-)
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.validation.names import scenario_objects
 
 
-def _objects(context: LintContext) -> Iterator[ScenarioObject]:
+def _objects(context: LintContext) -> Iterator[model.ScenarioObject]:
     """Yield the scenario objects of the file that are not trailers of another entity."""
     entities = context.scenario.document.entities
     for one, _ in scenario_objects(entities, context.scenario.entries):
@@ -60,7 +49,7 @@ def groups_without_actors(context: LintContext) -> Iterator[Diagnostic]:
     """Yield maneuver groups with private actions and without actors."""
     for node in context.nodes:
         group = node.element
-        if not isinstance(group, ManeuverGroup) or context.actors(node):
+        if not isinstance(group, model.ManeuverGroup) or context.actors(node):
             continue
         acting = [event for event in node.walk() if _has_private_action(event)]
         if not acting:
@@ -81,8 +70,8 @@ def groups_without_actors(context: LintContext) -> Iterator[Diagnostic]:
 
 
 def _has_private_action(node: Node) -> bool:
-    actions = node.element.action if isinstance(node.element, Event) else ()
-    return any(isinstance(action, Action) and action.private_action is not None for action in actions)
+    actions = node.element.action if isinstance(node.element, model.Event) else ()
+    return any(isinstance(action, model.Action) and action.private_action is not None for action in actions)
 
 
 def _has_entity_condition(node: Node) -> bool:
@@ -94,7 +83,7 @@ def _has_entity_condition(node: Node) -> bool:
 def zero_wheelbases(context: LintContext) -> Iterator[Diagnostic]:
     """Yield vehicles without a positive wheelbase."""
     for name, entity in context.scenario.entities.items():
-        if not isinstance(entity, Vehicle):
+        if not isinstance(entity, model.Vehicle):
             continue
         front, rear = entity.axles.front_axle, entity.axles.rear_axle
         if front is not None and front.position_x <= rear.position_x:
@@ -110,9 +99,9 @@ def self_references(context: LintContext) -> Iterator[Diagnostic]:
     """Yield distance and synchronization actions that refer to their own actor."""
     for action, actors in context.performances:
         for element in action.walk():
-            if isinstance(element, LateralDistanceAction | LongitudinalDistanceAction):
+            if isinstance(element, model.LateralDistanceAction | model.LongitudinalDistanceAction):
                 other = element.entity_ref
-            elif isinstance(element, SynchronizeAction):
+            elif isinstance(element, model.SynchronizeAction):
                 other = element.master_entity_ref
             else:
                 continue
@@ -123,7 +112,7 @@ def self_references(context: LintContext) -> Iterator[Diagnostic]:
 
 def unknown_traffic(context: LintContext) -> Iterator[Diagnostic]:
     """Yield TrafficStopActions with a traffic name that no other action defines."""
-    actions = [element for element in context.elements if isinstance(element, TrafficAction)]
+    actions = [element for element in context.elements if isinstance(element, model.TrafficAction)]
     started = {one.traffic_name for one in actions if one.traffic_stop_action is None and one.traffic_name is not None}
     for one in actions:
         if one.traffic_stop_action is not None and one.traffic_name is not None and one.traffic_name not in started:
@@ -137,11 +126,11 @@ def unconnected_trailers(context: LintContext) -> Iterator[Diagnostic]:
     for action, actors in context.performances:
         trailer = action.trailer_action
         connect = None if trailer is None else trailer.connect_trailer_action
-        if not isinstance(connect, ConnectTrailerAction):
+        if not isinstance(connect, model.ConnectTrailerAction):
             continue
         for name, part in (*((actor, "TrailerHitch") for actor in actors), (connect.trailer_ref, "TrailerCoupler")):
             entity = entities.get(name)
-            has_part = isinstance(entity, Vehicle) and (
+            has_part = isinstance(entity, model.Vehicle) and (
                 entity.trailer_hitch if part == "TrailerHitch" else entity.trailer_coupler
             )
             if not has_part:

@@ -13,25 +13,7 @@ from lxml import etree
 
 from eidrive_scenario.files.bounded import MIB, read_regular_file
 from eidrive_scenario.files.yaml_text import is_inline
-from eidrive_scenario.openscenario.model import (
-    Act,
-    Action,
-    AddEntityAction,
-    CatalogReference,
-    CustomCommandAction,
-    Element,
-    EntityAction,
-    Event,
-    FollowTrajectoryAction,
-    Maneuver,
-    ManeuverGroup,
-    PrivateAction,
-    StoryboardElementType,
-    TeleportAction,
-    Trailer,
-    Trajectory,
-    Trigger,
-)
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.reading.document import VERSIONS
 from eidrive_scenario.openscenario.reading.parsing import open_document
 from eidrive_scenario.openscenario.reading.schema import rules
@@ -46,8 +28,8 @@ WORD = re.compile(r"\w+")
 class Node:
     """Element of the storyboard, with catalog references to maneuvers resolved; the root has no level."""
 
-    element: Element
-    level: StoryboardElementType | None
+    element: model.Element
+    level: model.StoryboardElementType | None
     path: tuple[str, ...]
     parent: Node | None
     children: list[Node] = field(default_factory=list)
@@ -58,15 +40,18 @@ class Node:
         return f"{self.level.value} {self.path[-1]!r}" if self.level else "the storyboard"
 
     @property
-    def start(self) -> Trigger | None:
+    def start(self) -> model.Trigger | None:
         """Return the start trigger; None if the element starts with its parent, as without condition groups."""
-        trigger = self.element.start_trigger if isinstance(self.element, Act | Event) else None
+        trigger = self.element.start_trigger if isinstance(self.element, model.Act | model.Event) else None
         return trigger if trigger is not None and trigger.condition_group else None
 
     @property
     def limit(self) -> int:
         """Return the maximum number of executions."""
-        if isinstance(self.element, Event | ManeuverGroup) and self.element.maximum_execution_count is not None:
+        if (
+            isinstance(self.element, model.Event | model.ManeuverGroup)
+            and self.element.maximum_execution_count is not None
+        ):
             return self.element.maximum_execution_count
         return 1
 
@@ -83,10 +68,10 @@ class Node:
         for child in self.children:
             yield from child.walk()
 
-    def group(self) -> ManeuverGroup | None:
+    def group(self) -> model.ManeuverGroup | None:
         """Return the maneuver group that contains this element."""
         for node in (self, *self.above()):
-            if isinstance(node.element, ManeuverGroup):
+            if isinstance(node.element, model.ManeuverGroup):
                 return node.element
         return None
 
@@ -105,16 +90,16 @@ class Outline:
         self.nodes = tuple(self.root.walk())
         self._references = ReferenceMatch((node.path, node) for node in self.nodes)
 
-    def _node(self, element: Element, parent: Node, above: tuple[str, ...]) -> Node:
+    def _node(self, element: model.Element, parent: Node, above: tuple[str, ...]) -> Node:
         path = (*above, str(getattr(element, "name", "")))
         node = Node(element, LEVELS[type(element)], path, parent)
         for child in element.children():
-            below = self.scenario.entries.get(child) if isinstance(child, CatalogReference) else child
-            if type(below) in LEVELS and (below is child or isinstance(below, Maneuver)):
+            below = self.scenario.entries.get(child) if isinstance(child, model.CatalogReference) else child
+            if type(below) in LEVELS and (below is child or isinstance(below, model.Maneuver)):
                 node.children.append(self._node(below, node, path))
         return node
 
-    def find(self, level: StoryboardElementType, reference: str) -> list[Node]:
+    def find(self, level: model.StoryboardElementType, reference: str) -> list[Node]:
         """Return the elements of a level to which a reference applies."""
         return [node for node in self._references.by(reference) if node.level is level]
 
@@ -143,22 +128,22 @@ class Outline:
         names = [name for ref in (group.actors.entity_ref if group else ()) for name in self.members(ref.entity_ref)]
         return tuple(dict.fromkeys(names))
 
-    def trajectory(self, action: FollowTrajectoryAction) -> Trajectory | None:
+    def trajectory(self, action: model.FollowTrajectoryAction) -> model.Trajectory | None:
         """Return the trajectory of an action, also from a catalog; None if the entry is of another kind."""
         holder = action.trajectory_ref or action
         if holder.trajectory is not None or holder.catalog_reference is None:
             return holder.trajectory
         entry = self.scenario.entries.get(holder.catalog_reference)
-        return entry if isinstance(entry, Trajectory) else None
+        return entry if isinstance(entry, model.Trajectory) else None
 
     @cached_property
-    def elements(self) -> tuple[Element, ...]:
+    def elements(self) -> tuple[model.Element, ...]:
         """Return all elements of the file and of the catalog entries that it uses."""
         trees = (self.scenario.document, *self.scenario.entries.values())
         return tuple(element for tree in trees for element in tree.walk())
 
     @cached_property
-    def performances(self) -> tuple[tuple[PrivateAction, tuple[str, ...]], ...]:
+    def performances(self) -> tuple[tuple[model.PrivateAction, tuple[str, ...]], ...]:
         """Return every private action and its actors; those of Init first."""
         init = [
             (action, self.members(private.entity_ref))
@@ -168,7 +153,7 @@ class Outline:
         events = [
             (node.element.private_action, self.actors(node))
             for node in self.nodes
-            if isinstance(node.element, Action) and node.element.private_action is not None
+            if isinstance(node.element, model.Action) and node.element.private_action is not None
         ]
         return (*init, *events)
 
@@ -177,7 +162,7 @@ class Outline:
         """Return entities that another one tows; they are present with it."""
         towed: set[str] = set()
         for element in self.elements:
-            if isinstance(element, Trailer):
+            if isinstance(element, model.Trailer):
                 towed |= {element.trailer.name} if element.trailer else set()
                 towed |= {element.trailer_ref.entity_ref} if element.trailer_ref else set()
         return frozenset(towed)
@@ -210,7 +195,7 @@ class Outline:
         added = {
             name
             for element in self.elements
-            if isinstance(element, EntityAction) and isinstance(element.add_entity_action, AddEntityAction)
+            if isinstance(element, model.EntityAction) and isinstance(element.add_entity_action, model.AddEntityAction)
             for name in self.members(element.entity_ref)
         }
         return self.at_start | later | added
@@ -229,7 +214,7 @@ class Outline:
     @cached_property
     def command_words(self) -> frozenset[str]:
         """Return all words in custom commands and added sources, which may use names in them."""
-        texts = [element.content for element in self.elements if isinstance(element, CustomCommandAction)]
+        texts = [element.content for element in self.elements if isinstance(element, model.CustomCommandAction)]
         texts += self.texts_of(self.added)
         return frozenset(word for text in texts for word in WORD.findall(text))
 
@@ -254,12 +239,12 @@ class Outline:
         return tuple(open_document(source).root for source in (scenario, *map(Path, catalogs)))
 
 
-def _places(action: PrivateAction) -> bool:
+def _places(action: model.PrivateAction) -> bool:
     """Whether an action places its actor; an absent actor starts a trajectory at its first point."""
-    return any(isinstance(below, TeleportAction | FollowTrajectoryAction) for below in action.walk())
+    return any(isinstance(below, model.TeleportAction | model.FollowTrajectoryAction) for below in action.walk())
 
 
-def _reference_fields(cls: type[Element]) -> tuple[tuple[str, str], ...]:
+def _reference_fields(cls: type[model.Element]) -> tuple[tuple[str, str], ...]:
     """Return the kinds to which attributes of a class refer in any version, and the names of their fields."""
     known = _REFERENCE_FIELDS.get(cls)
     if known is None:
@@ -273,4 +258,4 @@ def _reference_fields(cls: type[Element]) -> tuple[tuple[str, str], ...]:
     return known
 
 
-_REFERENCE_FIELDS: dict[type[Element], tuple[tuple[str, str], ...]] = {}
+_REFERENCE_FIELDS: dict[type[model.Element], tuple[tuple[str, str], ...]] = {}

@@ -14,37 +14,22 @@ from eidrive_scenario.checks.scenario_rules.truth_intervals import (
     TruthIntervals,
     never,
 )
-from eidrive_scenario.openscenario.model import (
-    Action,
-    Condition,
-    DynamicsDimension,
-    DynamicsShape,
-    Event,
-    LaneOffsetAction,
-    LateralDistanceAction,
-    LongitudinalDistanceAction,
-    Priority,
-    RelativeTargetSpeed,
-    StoryboardElementState,
-    StoryboardElementStateCondition,
-    StoryboardElementType,
-    TransitionDynamics,
-)
+from eidrive_scenario.openscenario import model
 
-_OVERRIDING = (Priority.OVERWRITE, Priority.OVERRIDE)
+_OVERRIDING = (model.Priority.OVERWRITE, model.Priority.OVERRIDE)
 _AFTER = (
-    StoryboardElementState.COMPLETE_STATE,
-    StoryboardElementState.END_TRANSITION,
-    StoryboardElementState.STOP_TRANSITION,
+    model.StoryboardElementState.COMPLETE_STATE,
+    model.StoryboardElementState.END_TRANSITION,
+    model.StoryboardElementState.STOP_TRANSITION,
 )
 
 
-def is_state_condition(condition: Condition) -> bool:
+def is_state_condition(condition: model.Condition) -> bool:
     """Whether a condition is a StoryboardElementStateCondition."""
     return _state_condition(condition) is not None
 
 
-def _state_condition(condition: Condition) -> StoryboardElementStateCondition | None:
+def _state_condition(condition: model.Condition) -> model.StoryboardElementStateCondition | None:
     by_value = condition.by_value_condition
     return by_value.storyboard_element_state_condition if by_value is not None else None
 
@@ -64,7 +49,7 @@ class States:
         self._stopped[node] = min(stopped, self._stopped[node])
         return lowered
 
-    def dependencies(self, condition: Condition) -> Iterator[Node]:
+    def dependencies(self, condition: model.Condition) -> Iterator[Node]:
         """Yield the elements on whose state a condition depends.
 
         For the stop of an event or action it is the maneuver, as all of its events may cause the stop.
@@ -73,12 +58,12 @@ class States:
         if leaf is None:
             return
         for node in self._outline.find(leaf.storyboard_element_type, leaf.storyboard_element_ref):
-            event = node.parent if isinstance(node.element, Action) else node
-            is_stop = leaf.state is StoryboardElementState.STOP_TRANSITION
-            of_maneuver = is_stop and event is not None and isinstance(event.element, Event)
+            event = node.parent if isinstance(node.element, model.Action) else node
+            is_stop = leaf.state is model.StoryboardElementState.STOP_TRANSITION
+            of_maneuver = is_stop and event is not None and isinstance(event.element, model.Event)
             yield event.parent if of_maneuver and event is not None and event.parent is not None else node
 
-    def truth(self, condition: Condition, owner: Node, starts: bool) -> TruthIntervals:
+    def truth(self, condition: model.Condition, owner: Node, starts: bool) -> TruthIntervals:
         """Return the intervals in which a state condition can hold, for a trigger that starts or stops its owner."""
         leaf = _state_condition(condition)
         assert leaf is not None
@@ -90,7 +75,7 @@ class States:
         if all(node in running for node in nodes):
             return _truth_of_running(nodes[0], state, owner)
         if nodes == [owner] and owner.limit == 1:
-            if state is StoryboardElementState.STANDBY_STATE:
+            if state is model.StoryboardElementState.STANDBY_STATE:
                 return TruthIntervals(steady=f"{owner.title} is in standbyState as long as it waits")
             return never(f"{owner.title} waits for itself", UNREACHABLE)
         reasons = [reason for node in nodes if (reason := self._impossible(node, state))]
@@ -101,36 +86,36 @@ class States:
             return never(self._unreached(nodes[0], state), UNREACHABLE)
         return TruthIntervals(((earliest, math.inf),))
 
-    def _impossible(self, node: Node, state: StoryboardElementState) -> str:
+    def _impossible(self, node: Node, state: model.StoryboardElementState) -> str:
         """Return why an element of this kind is never in a state; "" if it may be."""
-        if state is StoryboardElementState.SKIP_TRANSITION:
-            if not isinstance(node.element, Event):
+        if state is model.StoryboardElementState.SKIP_TRANSITION:
+            if not isinstance(node.element, model.Event):
                 return f"only events can be skipped, but not {node.title}"
-            if node.element.priority is not Priority.SKIP:
+            if node.element.priority is not model.Priority.SKIP:
                 return (
                     f"{node.title} has the priority {node.element.priority.value!r}; only 'skip' events can be skipped"
                 )
-        if state is StoryboardElementState.STOP_TRANSITION and not _can_be_stopped(node):
+        if state is model.StoryboardElementState.STOP_TRANSITION and not _can_be_stopped(node):
             return f"{node.title} cannot be stopped"
-        if state is StoryboardElementState.END_TRANSITION and isinstance(node.element, Action):
+        if state is model.StoryboardElementState.END_TRANSITION and isinstance(node.element, model.Action):
             endless = never_ends(node.element)
             return f"{node.title} does not end by itself: {endless}" if endless else ""
         return ""
 
-    def _earliest(self, node: Node, state: StoryboardElementState) -> float:
+    def _earliest(self, node: Node, state: model.StoryboardElementState) -> float:
         match state:
-            case StoryboardElementState.STANDBY_STATE:
+            case model.StoryboardElementState.STANDBY_STATE:
                 return self.start[node.parent] if node.parent else 0.0
-            case StoryboardElementState.COMPLETE_STATE:
+            case model.StoryboardElementState.COMPLETE_STATE:
                 return self._complete(node)
-            case StoryboardElementState.END_TRANSITION:
+            case model.StoryboardElementState.END_TRANSITION:
                 return self._end(node)
-            case StoryboardElementState.STOP_TRANSITION:
+            case model.StoryboardElementState.STOP_TRANSITION:
                 return self._stop(node)
         return self.start[node]
 
     def _end(self, node: Node) -> float:
-        if node.level in (StoryboardElementType.EVENT, StoryboardElementType.ACTION):
+        if node.level in (model.StoryboardElementType.EVENT, model.StoryboardElementType.ACTION):
             return self.start[node]
         if not node.children:
             return math.inf
@@ -144,10 +129,10 @@ class States:
     def _stop(self, node: Node) -> float:
         """Return the earliest stop by a trigger, by another event of the maneuver, or by another action [s]."""
         times = [self._stopped_by_trigger(node)]
-        event = node.parent if isinstance(node.element, Action) else node
-        if isinstance(node.element, Action):
+        event = node.parent if isinstance(node.element, model.Action) else node
+        if isinstance(node.element, model.Action):
             times.append(self.start[node])
-        if event is not None and isinstance(event.element, Event):
+        if event is not None and isinstance(event.element, model.Event):
             times += [max(self.start[event], self.start[other]) for other in _overriding_events(event)]
         return min(times)
 
@@ -162,24 +147,24 @@ class States:
         """
         return min(self._end(node), self._stopped_by_trigger(node))
 
-    def _unreached(self, node: Node, state: StoryboardElementState) -> str:
+    def _unreached(self, node: Node, state: model.StoryboardElementState) -> str:
         """Return why a state is never reached."""
         if self.start[node] == math.inf:
             return f"{node.title} never starts"
-        if state is StoryboardElementState.STOP_TRANSITION:
+        if state is model.StoryboardElementState.STOP_TRANSITION:
             return f"{node.title} is never stopped"
         missing = next((one for one in node.walk() if self.start[one] == math.inf), None)
         return f"{node.title} never ends, as {missing.title} never starts" if missing else f"{node.title} never ends"
 
 
-def _truth_of_running(node: Node, state: StoryboardElementState, owner: Node) -> TruthIntervals:
+def _truth_of_running(node: Node, state: model.StoryboardElementState, owner: Node) -> TruthIntervals:
     """Return the intervals for an element that runs during all evaluations of the trigger."""
     runs = f"{node.title} runs as long as {owner.title} waits" if node is not owner else f"{node.title} runs"
-    if state is StoryboardElementState.RUNNING_STATE:
+    if state is model.StoryboardElementState.RUNNING_STATE:
         return TruthIntervals(ALWAYS, steady=runs)
-    if state is StoryboardElementState.START_TRANSITION:
+    if state is model.StoryboardElementState.START_TRANSITION:
         return TruthIntervals(ALWAYS, risen=f"{node.title} has started before the first evaluation by {owner.title}")
-    if state is StoryboardElementState.STANDBY_STATE:
+    if state is model.StoryboardElementState.STANDBY_STATE:
         return never(f"{runs}, so it is not in standbyState", IMPOSSIBLE_STATE)
     if state in _AFTER:
         return never(f"{node.title} does not end before {owner.title}", UNREACHABLE)
@@ -187,42 +172,47 @@ def _truth_of_running(node: Node, state: StoryboardElementState, owner: Node) ->
 
 
 def _can_be_stopped(node: Node) -> bool:
-    if isinstance(node.element, Action):
+    if isinstance(node.element, model.Action):
         return True
-    acts = [one for one in (node, *node.above()) if one.level is StoryboardElementType.ACT]
+    acts = [one for one in (node, *node.above()) if one.level is model.StoryboardElementType.ACT]
     stopped = any(getattr(act.element, "stop_trigger", None) is not None for act in acts)
     return stopped or any(True for _ in _overriding_events(node))
 
 
 def _overriding_events(node: Node) -> Iterator[Node]:
     """Yield the other events of the maneuver that stop an event by their start."""
-    if not isinstance(node.element, Event) or node.parent is None:
+    if not isinstance(node.element, model.Event) or node.parent is None:
         return
     for one in node.parent.children:
-        if one is not node and isinstance(one.element, Event) and one.element.priority in _OVERRIDING:
+        if one is not node and isinstance(one.element, model.Event) and one.element.priority in _OVERRIDING:
             yield one
 
 
-_CONTINUOUS = (LaneOffsetAction, LateralDistanceAction, LongitudinalDistanceAction, RelativeTargetSpeed)
+_CONTINUOUS = (
+    model.LaneOffsetAction,
+    model.LateralDistanceAction,
+    model.LongitudinalDistanceAction,
+    model.RelativeTargetSpeed,
+)
 
 
-def never_ends(action: Action) -> str:
+def never_ends(action: model.Action) -> str:
     """Return why an action does not end by itself; "" if it may."""
     for element in action.walk():
         if isinstance(element, _CONTINUOUS) and element.continuous:
             return f"{type(element).__name__} is continuous"
-        if isinstance(element, TransitionDynamics) and has_zero_rate(element):
+        if isinstance(element, model.TransitionDynamics) and has_zero_rate(element):
             return f"its rate is {element.value:g}"
     return ""
 
 
-def has_zero_rate(dynamics: TransitionDynamics) -> bool:
+def has_zero_rate(dynamics: model.TransitionDynamics) -> bool:
     """Whether a transition never reaches its target because its rate is 0."""
-    by_rate = dynamics.dynamics_dimension is DynamicsDimension.RATE and dynamics.value == 0.0
-    return by_rate and dynamics.dynamics_shape is not DynamicsShape.STEP
+    by_rate = dynamics.dynamics_dimension is model.DynamicsDimension.RATE and dynamics.value == 0.0
+    return by_rate and dynamics.dynamics_shape is not model.DynamicsShape.STEP
 
 
-def is_immediate(dynamics: TransitionDynamics) -> bool:
+def is_immediate(dynamics: model.TransitionDynamics) -> bool:
     """Whether a transition ends at its start."""
-    is_zero = dynamics.dynamics_dimension is not DynamicsDimension.RATE and dynamics.value == 0.0
-    return dynamics.dynamics_shape is DynamicsShape.STEP or is_zero
+    is_zero = dynamics.dynamics_dimension is not model.DynamicsDimension.RATE and dynamics.value == 0.0
+    return dynamics.dynamics_shape is model.DynamicsShape.STEP or is_zero

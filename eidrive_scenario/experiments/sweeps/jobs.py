@@ -340,7 +340,7 @@ def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunS
     for name, place in load_distribution(scenario).varied.names.items() if is_distribution else ():
         if name in given:
             text = f"{given[name]}: the distribution varies parameter {name!r}"
-            raise SettingError(Diagnostic(text, "remove the option", place.source, place.line))
+            raise SettingError(Diagnostic.at(place, text, "remove the option"))
 
 
 def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:

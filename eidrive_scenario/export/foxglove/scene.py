@@ -9,6 +9,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.export.foxglove.schemas import (
     WORLD,
@@ -19,7 +20,7 @@ from eidrive_scenario.export.foxglove.schemas import (
     set_stamp,
     set_vector,
 )
-from eidrive_scenario.export.geometry import Line, edge_line, lane_edges, point_spacing, rotations
+from eidrive_scenario.export.geometry import Line, edge_line, lane_edges, point_spacing
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 
@@ -53,7 +54,7 @@ class ActorScene:
                 deletion = update.deletions.add(type=self._foxglove.deletion.MATCHING_ID, id=name)
                 set_stamp(deletion.timestamp, view.time)
         self._shown = dict.fromkeys(view.names)
-        arms = np.einsum("nij,nj->ni", rotations(view.yaw, view.pitch, view.roll), view.offset)
+        arms = np.einsum("nij,nj->ni", rotation_matrix(view.yaw, view.pitch, view.roll), view.offset)
         centers = (view.position + arms).tolist()
         for row, (name, category) in enumerate(zip(view.names, view.categories, strict=True)):
             entity = add_entity(update, name, view.time)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
 
+from eidrive_scenario.base.geometry import quaternion
 from eidrive_scenario.base.imports import optional_import
-from eidrive_scenario.export.geometry import quaternion
 
 WORLD = "map"
 """Name of the world frame, the root of all frames."""

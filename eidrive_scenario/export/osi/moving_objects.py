@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.export.geometry import rotations
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_vector
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation.recorded_outcome import AxleCenters
@@ -65,7 +65,7 @@ def add_moving_objects(
     axles  axles of vehicles, by name
     """
     view = frame.view
-    turns = rotations(view.yaw, view.pitch, view.roll)
+    turns = rotation_matrix(view.yaw, view.pitch, view.roll)
     arms = np.einsum("nij,nj->ni", turns, view.offset)
     centers = view.position + arms
     velocity, acceleration = center_motion(view, arms)

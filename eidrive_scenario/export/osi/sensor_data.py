@@ -10,7 +10,8 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.export.geometry import angles, rotations
+from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.export.geometry import angles
 from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type, rear_axle
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_time, set_vector
 from eidrive_scenario.recording.frame import Frame
@@ -88,7 +89,7 @@ class SensorDataBuilder:
         base.dimension.length, base.dimension.width, base.dimension.height = box[3:6].tolist()
         position = origin.turn.T @ (box[:3] - origin.position)
         set_vector(base.position, position)
-        set_orientation(base.orientation, *angles(origin.turn.T @ _upright(float(box[6]))))
+        set_orientation(base.orientation, *angles(origin.turn.T @ rotation_matrix(box[6])))
         arm = box[:3] - origin.position
         if np.isfinite(objects.velocity[row]).all():
             spin = origin.yaw_rate * np.array([-arm[1], arm[0], 0.0])
@@ -117,17 +118,11 @@ def _origin(frame: Frame, station: str) -> _Origin | None:
     step, view = frame.steps.get(station), frame.view
     estimate = step.estimate if step is not None else None
     if estimate is not None:
-        turn = rotations(*(np.array([one]) for one in (estimate.yaw, estimate.pitch, estimate.roll)))[0]
+        turn = rotation_matrix(estimate.yaw, estimate.pitch, estimate.roll)
         velocity = turn @ np.array([estimate.speed, 0.0, 0.0])
         return _Origin(estimate.position, turn, velocity, estimate.yaw_rate)
     if station not in view:
         return None
     row = view.row(station)
-    turn = rotations(view.yaw[row : row + 1], view.pitch[row : row + 1], view.roll[row : row + 1])[0]
+    turn = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
     return _Origin(view.position[row], turn, view.velocity[row], float(view.yaw_rate[row]))
-
-
-def _upright(yaw: float) -> Array:
-    """Return the rotation (3, 3) of a detected box, which stands upright in the world."""
-    found: Array = rotations(*np.array([[yaw], [0.0], [0.0]]))[0]
-    return found

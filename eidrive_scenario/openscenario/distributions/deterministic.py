@@ -12,16 +12,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    Deterministic,
-    DeterministicMultiParameterDistribution,
-    DeterministicSingleParameterDistribution,
-    DistributionRange,
-    Element,
-    Range,
-)
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
+from eidrive_scenario.openscenario.values.parameters import Assignment, format_value
 
 Assignments = Mapping[str, Assignment]
 
@@ -111,15 +104,17 @@ class SteppedRange:
         return {self.name: Assignment(format_value(float(self.lower + index * self.step)), self.origin)}
 
 
-def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
+def combinations_of(deterministic: model.Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
     """Return the product of the distributions in the order of the file; report their errors."""
-    distributions: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
+    distributions: list[
+        model.DeterministicMultiParameterDistribution | model.DeterministicSingleParameterDistribution
+    ] = [
         *deterministic.deterministic_multi_parameter_distribution,
         *deterministic.deterministic_single_parameter_distribution,
     ]
     found: list[ValueSource] = []
     for distribution in sorted(distributions, key=lambda one: one.sibling_index):
-        if isinstance(distribution, DeterministicMultiParameterDistribution):
+        if isinstance(distribution, model.DeterministicMultiParameterDistribution):
             found.append(_value_sets(distribution, collector))
         else:
             choices = _single(distribution, collector)
@@ -131,7 +126,7 @@ def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector
         count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
         message = f"the distribution expands to {count} runs"
         hint = "use larger steps in its ranges"
-        collector.error(message, hint, source=deterministic.source, line=deterministic.line)
+        collector.error(message, hint, at=deterministic)
         return CartesianProduct(())
     return CartesianProduct(tuple(found))
 
@@ -142,29 +137,26 @@ def varied_once(names: Iterable[tuple[str, Location]], collector: DiagnosticColl
     for name, origin in names:
         if name in seen:
             message = f"parameter {name!r} is also varied by another distribution"
-            collector.error(message, f"see line {seen[name].line}", source=origin.source, line=origin.line)
+            collector.error(message, f"see line {seen[name].line}", at=origin)
         seen.setdefault(name, origin)
 
 
-def _value_sets(distribution: DeterministicMultiParameterDistribution, collector: DiagnosticCollector) -> ListedValues:
+def _value_sets(
+    distribution: model.DeterministicMultiParameterDistribution, collector: DiagnosticCollector
+) -> ListedValues:
     choices = []
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
         for one in value_set.parameter_assignment:
             if one.parameter_ref in choice:
-                collector.error(
-                    f"ParameterValueSet assigns {one.parameter_ref!r} twice",
-                    "remove one",
-                    source=one.source,
-                    line=one.line,
-                )
+                collector.error(f"ParameterValueSet assigns {one.parameter_ref!r} twice", "remove one", at=one)
             choice[one.parameter_ref] = Assignment(one.value, Location.of(one))
         choices.append(choice)
     return ListedValues(tuple(choices))
 
 
 def _single(
-    distribution: DeterministicSingleParameterDistribution, collector: DiagnosticCollector
+    distribution: model.DeterministicSingleParameterDistribution, collector: DiagnosticCollector
 ) -> ValueSource | None:
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
@@ -176,17 +168,12 @@ def _single(
     return None
 
 
-def _steps(name: str, given: DistributionRange, collector: DiagnosticCollector) -> SteppedRange | None:
+def _steps(name: str, given: model.DistributionRange, collector: DiagnosticCollector) -> SteppedRange | None:
     """Return the values from the lower limit in equal steps up to the upper limit."""
     if not valid_range(given.range, collector, finite=True):
         return None
     if not (math.isfinite(given.step_width) and given.step_width > 0):
-        collector.error(
-            f"stepWidth is {format_value(given.step_width)}",
-            "specify a number above zero",
-            source=given.source,
-            line=given.line,
-        )
+        collector.error(f"stepWidth is {format_value(given.step_width)}", "specify a number above zero", at=given)
         return None
     lower, upper, step = (
         _exact(value) for value in (given.range.lower_limit, given.range.upper_limit, given.step_width)
@@ -198,25 +185,20 @@ def _exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def valid_range(given: Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:
+def valid_range(given: model.Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:
     """Whether the limits are ordered numbers; report an error otherwise."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
         message = f"the range from {format_value(lower)} to {format_value(upper)} is empty"
-        collector.error(message, "lowerLimit must be at most upperLimit", source=given.source, line=given.line)
+        collector.error(message, "lowerLimit must be at most upperLimit", at=given)
         return False
     if math.inf in (lower, -upper) or (finite and math.inf in (-lower, upper)):
         message = f"the range from {format_value(lower)} to {format_value(upper)} is infinite"
-        collector.error(message, "specify finite limits", source=given.source, line=given.line)
+        collector.error(message, "specify finite limits", at=given)
         return False
     return True
 
 
-def reject_user_defined(element: Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
+def reject_user_defined(element: model.Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
     """Report a UserDefinedDistribution, which only another tool can expand."""
-    collector.error(
-        f"UserDefinedDistribution of {name!r} is specific to another tool",
-        f"write {instead}",
-        source=element.source,
-        line=element.line,
-    )
+    collector.error(f"UserDefinedDistribution of {name!r} is specific to another tool", f"write {instead}", at=element)

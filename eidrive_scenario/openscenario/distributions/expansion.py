@@ -120,8 +120,7 @@ def _scenario_file(file: File, folder: Path, report: Callable[..., None]) -> Pat
         report(
             f"ScenarioFile: scenario {quoted(file.filepath)} does not exist",
             suggestion(path.stem, {sibling.stem for sibling in siblings}),
-            source=file.source,
-            line=file.line,
+            at=file,
         )
     return path
 

@@ -18,28 +18,15 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
 from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
     reject_user_defined,
     valid_range,
     varied_once,
 )
-from eidrive_scenario.openscenario.model import (
-    Element,
-    Histogram,
-    HistogramBin,
-    LogNormalDistribution,
-    NormalDistribution,
-    PoissonDistribution,
-    ProbabilityDistributionSet,
-    ProbabilityDistributionSetElement,
-    Range,
-    Stochastic,
-    StochasticDistribution,
-    UniformDistribution,
-)
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
+from eidrive_scenario.openscenario.values.parameters import Assignment, format_value
 
 Quantile = Callable[[float], "float | str"]
 _SMALLEST, _LARGEST = 2.0**-54, 1 - 2.0**-53
@@ -47,7 +34,7 @@ _MAX_EVENTS = 2.0**53
 """Maximum expected number of events; adjacent integers above are not distinct in floating point."""
 
 
-def quantile_of(distribution: StochasticDistribution, collector: DiagnosticCollector) -> Quantile | None:
+def quantile_of(distribution: model.StochasticDistribution, collector: DiagnosticCollector) -> Quantile | None:
     """Return the quantile function of a distribution; None if it is invalid, which is reported."""
     chosen = distribution.chosen()
     build = _BUILD.get(type(chosen))
@@ -90,14 +77,14 @@ class StochasticSampler:
         return value if isinstance(value, str) else format_value(value)
 
 
-def draws_of(stochastic: Stochastic, seed: float, collector: DiagnosticCollector) -> StochasticSampler:
+def draws_of(stochastic: model.Stochastic, seed: float, collector: DiagnosticCollector) -> StochasticSampler:
     """Return the sampler of all distributions; report their errors.
 
     seed  seed for a file without randomSeed
     """
     if stochastic.number_of_test_runs < 1:
         message = f"Stochastic has numberOfTestRuns {stochastic.number_of_test_runs}"
-        collector.error(message, "specify a number above zero", source=stochastic.source, line=stochastic.line)
+        collector.error(message, "specify a number above zero", at=stochastic)
     distributions = stochastic.stochastic_distribution
     varied_once(((one.parameter_name, Location.of(one)) for one in distributions), collector)
     found = {one.parameter_name: quantile_of(one, collector) for one in distributions}
@@ -109,7 +96,7 @@ def draws_of(stochastic: Stochastic, seed: float, collector: DiagnosticCollector
     )
 
 
-def _uniform(given: UniformDistribution, collector: DiagnosticCollector) -> Quantile:
+def _uniform(given: model.UniformDistribution, collector: DiagnosticCollector) -> Quantile:
     valid_range(given.range, collector, finite=True)
     return partial(_from_range, given.range.lower_limit, given.range.upper_limit)
 
@@ -118,13 +105,13 @@ def _from_range(lower: float, upper: float, share: float) -> float:
     return min(max(lower * (1 - share) + upper * share, lower), upper)
 
 
-def _normal(given: NormalDistribution, collector: DiagnosticCollector) -> Quantile:
+def _normal(given: model.NormalDistribution, collector: DiagnosticCollector) -> Quantile:
     lower, upper = _limits(given.range, collector)
     _check_normal(given, collector)
     return partial(_from_normal, given.expected_value, math.sqrt(max(given.variance, 0)), lower, upper)
 
 
-def _log_normal(given: LogNormalDistribution, collector: DiagnosticCollector) -> Quantile:
+def _log_normal(given: model.LogNormalDistribution, collector: DiagnosticCollector) -> Quantile:
     """Build the log-normal quantile; expected value and variance are those of the logarithm, as in the standard."""
     lower, upper = _limits(given.range, collector)
     _check_normal(given, collector)
@@ -138,7 +125,9 @@ def _log_normal(given: LogNormalDistribution, collector: DiagnosticCollector) ->
     return partial(_from_log_normal, given.expected_value, math.sqrt(max(given.variance, 0)), max(lower, 0), upper)
 
 
-def _check_normal(given: NormalDistribution | LogNormalDistribution, collector: DiagnosticCollector) -> None:
+def _check_normal(
+    given: model.NormalDistribution | model.LogNormalDistribution, collector: DiagnosticCollector
+) -> None:
     if not math.isfinite(given.expected_value):
         _report(
             given, f"has the expected value {format_value(given.expected_value)}", "specify a finite number", collector
@@ -176,7 +165,7 @@ def _standard_normal(low: float, high: float, share: float) -> float:
     return min(max(float(ndtri_exp(above + math.log(ratio + share * (1 - ratio)))), low), high)
 
 
-def _poisson(given: PoissonDistribution, collector: DiagnosticCollector) -> Quantile:
+def _poisson(given: model.PoissonDistribution, collector: DiagnosticCollector) -> Quantile:
     mean = given.expected_value
     lower, upper = _limits(given.range, collector)
     low = max(0, math.ceil(lower)) if math.isfinite(lower) else 0
@@ -227,14 +216,14 @@ def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
     return 1.0 if count is None else float(pdtr(count - 1, mean)) if count > 0 else 0.0
 
 
-def _histogram(given: Histogram, collector: DiagnosticCollector) -> Quantile:
+def _histogram(given: model.Histogram, collector: DiagnosticCollector) -> Quantile:
     if all([valid_range(one.range, collector, finite=True) for one in given.bin]):
         _check_overlap(given.bin, collector)
     limits = tuple((one.range.lower_limit, one.range.upper_limit) for one in given.bin)
     return partial(_from_histogram, limits, _accumulated(given, given.bin, collector))
 
 
-def _check_overlap(bins: tuple[HistogramBin, ...], collector: DiagnosticCollector) -> None:
+def _check_overlap(bins: tuple[model.HistogramBin, ...], collector: DiagnosticCollector) -> None:
     for before, after in pairwise(sorted(bins, key=lambda one: (one.range.lower_limit, one.range.upper_limit))):
         if after.range.lower_limit < before.range.upper_limit:
             later = max(before, after, key=lambda one: one.line or 0)
@@ -246,7 +235,7 @@ def _from_histogram(limits: tuple[tuple[float, float], ...], accumulated: tuple[
     return _from_range(*limits[index], within)
 
 
-def _value_set(given: ProbabilityDistributionSet, collector: DiagnosticCollector) -> Quantile:
+def _value_set(given: model.ProbabilityDistributionSet, collector: DiagnosticCollector) -> Quantile:
     values = tuple(one.value for one in given.element)
     return partial(_from_values, values, _accumulated(given, given.element, collector))
 
@@ -256,8 +245,8 @@ def _from_values(values: tuple[str, ...], accumulated: tuple[float, ...], share:
 
 
 def _accumulated(
-    given: Element,
-    parts: tuple[HistogramBin, ...] | tuple[ProbabilityDistributionSetElement, ...],
+    given: model.Element,
+    parts: tuple[model.HistogramBin, ...] | tuple[model.ProbabilityDistributionSetElement, ...],
     collector: DiagnosticCollector,
 ) -> tuple[float, ...]:
     """Return the cumulative weights; report invalid ones."""
@@ -278,23 +267,23 @@ def _select_part(accumulated: tuple[float, ...], share: float) -> tuple[int, flo
     return index, (reached - start) / (accumulated[index] - start)
 
 
-def _limits(given: Range | None, collector: DiagnosticCollector) -> tuple[float, float]:
+def _limits(given: model.Range | None, collector: DiagnosticCollector) -> tuple[float, float]:
     if given is None:
         return -math.inf, math.inf
     valid_range(given, collector)
     return given.lower_limit, given.upper_limit
 
 
-def _report(element: Element, what: str, hint: str, collector: DiagnosticCollector) -> None:
+def _report(element: model.Element, what: str, hint: str, collector: DiagnosticCollector) -> None:
     kind = type(element).__name__
-    collector.error(f"{kind} {what}", hint, source=element.source, line=element.line)
+    collector.error(f"{kind} {what}", hint, at=element)
 
 
-_BUILD: dict[type[Element], Callable[[Any, DiagnosticCollector], Quantile]] = {
-    Histogram: _histogram,
-    LogNormalDistribution: _log_normal,
-    NormalDistribution: _normal,
-    PoissonDistribution: _poisson,
-    ProbabilityDistributionSet: _value_set,
-    UniformDistribution: _uniform,
+_BUILD: dict[type[model.Element], Callable[[Any, DiagnosticCollector], Quantile]] = {
+    model.Histogram: _histogram,
+    model.LogNormalDistribution: _log_normal,
+    model.NormalDistribution: _normal,
+    model.PoissonDistribution: _poisson,
+    model.ProbabilityDistributionSet: _value_set,
+    model.UniformDistribution: _uniform,
 }

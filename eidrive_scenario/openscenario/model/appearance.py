@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_scenario.openscenario.model.declarations import File
-from eidrive_scenario.openscenario.model.element import CHOICE, SEQUENCE, Changed, Element, element_type
+from eidrive_scenario.openscenario.model.element import CHOICE, SEQUENCE, Changed, Element
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     ColorType,
     LightMode,
@@ -14,7 +14,6 @@ from eidrive_scenario.openscenario.model.entity_enumerations import (
 )
 
 
-@element_type
 class ColorRgb(Element):
     """RGB color, components in [0, 1]."""
 
@@ -23,7 +22,6 @@ class ColorRgb(Element):
     blue: float
 
 
-@element_type
 class ColorCmyk(Element):
     """CMYK color, components in [0, 1]."""
 
@@ -33,7 +31,6 @@ class ColorCmyk(Element):
     key: float
 
 
-@element_type
 class Color(Element, content=CHOICE):
     """Color by name and by components in [0, 1]."""
 
@@ -42,21 +39,18 @@ class Color(Element, content=CHOICE):
     color_cmyk: ColorCmyk | None = None
 
 
-@element_type
 class VehicleLight(Element):
     """Light that the standard defines."""
 
     vehicle_light_type: VehicleLightType
 
 
-@element_type
 class UserDefinedLight(Element):
     """Light that is specific to a tool."""
 
     user_defined_light_type: str
 
 
-@element_type
 class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Choice of a light."""
 
@@ -64,7 +58,6 @@ class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     user_defined_light: UserDefinedLight | None = None
 
 
-@element_type
 class LightState(Element):
     """State of a light; luminous intensity [cd], durations [s]."""
 
@@ -75,7 +68,6 @@ class LightState(Element):
     color: Color | None = None
 
 
-@element_type
 class LightStateAction(Element):
     """Action that switches a light; transition time [s]."""
 
@@ -84,21 +76,18 @@ class LightStateAction(Element):
     light_state: LightState
 
 
-@element_type
 class VehicleComponent(Element):
     """Moving part of a vehicle."""
 
     vehicle_component_type: VehicleComponentType
 
 
-@element_type
 class UserDefinedComponent(Element):
     """Moving part that is specific to a tool."""
 
     user_defined_component_type: str
 
 
-@element_type
 class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Choice of a moving part."""
 
@@ -106,14 +95,12 @@ class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     user_defined_component: UserDefinedComponent | None = None
 
 
-@element_type
 class PedestrianGesture(Element):
     """Gesture of a pedestrian."""
 
     gesture: PedestrianGestureType
 
 
-@element_type
 class PedestrianAnimation(Element):
     """Motion and gestures of a pedestrian."""
 
@@ -122,7 +109,6 @@ class PedestrianAnimation(Element):
     pedestrian_gesture: tuple[PedestrianGesture, ...] = ()
 
 
-@element_type
 class AnimationFile(Element):
     """Animation from a file; time offset [s]."""
 
@@ -130,14 +116,12 @@ class AnimationFile(Element):
     file: File
 
 
-@element_type
 class UserDefinedAnimation(Element):
     """Animation that is specific to a tool."""
 
     user_defined_animation_type: str
 
 
-@element_type
 class AnimationType(Element, content=CHOICE):
     """Choice of an animation."""
 
@@ -147,14 +131,12 @@ class AnimationType(Element, content=CHOICE):
     user_defined_animation: UserDefinedAnimation | None = None
 
 
-@element_type
 class AnimationState(Element):
     """Target state of an animation in [0, 1]."""
 
     state: float
 
 
-@element_type
 class AnimationAction(Element):
     """Action that plays an animation; duration [s]."""
 
@@ -164,7 +146,6 @@ class AnimationAction(Element):
     animation_state: AnimationState | None = None
 
 
-@element_type
 class AppearanceAction(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Action that changes the appearance of an entity."""
 

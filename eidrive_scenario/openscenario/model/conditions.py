@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model.declarations import (
     StoryboardElementName,
     VariableName,
 )
-from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child
 from eidrive_scenario.openscenario.model.entities import ByObjectType, EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     AngleType,
@@ -28,7 +28,6 @@ from eidrive_scenario.openscenario.model.global_actions import TrafficSignalCond
 from eidrive_scenario.openscenario.model.positions import Position
 
 
-@element_type
 class TriggeringEntities(Element):
     """Triggering entities, and whether any or all of them must satisfy the condition."""
 
@@ -36,14 +35,12 @@ class TriggeringEntities(Element):
     entity_ref: tuple[EntityRef, ...]
 
 
-@element_type
 class EndOfRoadCondition(Element):
     """Condition: at the end of the road for a duration [s]."""
 
     duration: float
 
 
-@element_type
 class CollisionCondition(Element, content=Choice(empty_until="1.2")):
     """Condition: collision with an entity, or with any entity of a type."""
 
@@ -51,14 +48,12 @@ class CollisionCondition(Element, content=Choice(empty_until="1.2")):
     by_type: ByObjectType | None = None
 
 
-@element_type
 class OffroadCondition(Element):
     """Condition: off the road for a duration [s]."""
 
     duration: float
 
 
-@element_type
 class TimeHeadwayCondition(Element):
     """Condition on the time headway to another entity [s]."""
 
@@ -72,7 +67,6 @@ class TimeHeadwayCondition(Element):
     routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
 
 
-@element_type
 class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a time to collision."""
 
@@ -80,7 +74,6 @@ class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2"))
     entity_ref: EntityRef | None = None
 
 
-@element_type
 class TimeToCollisionCondition(Element, content=ALL):
     """Condition on the time to collision at constant speeds [s]."""
 
@@ -94,7 +87,6 @@ class TimeToCollisionCondition(Element, content=ALL):
     time_to_collision_condition_target: TimeToCollisionConditionTarget
 
 
-@element_type
 class AccelerationCondition(Element):
     """Condition on the acceleration [m/s²]."""
 
@@ -103,14 +95,12 @@ class AccelerationCondition(Element):
     direction: DirectionalDimension | None = attribute(since="1.2")
 
 
-@element_type
 class StandStillCondition(Element):
     """Condition: at standstill for a duration [s]."""
 
     duration: float
 
 
-@element_type
 class SpeedCondition(Element):
     """Condition on the speed [m/s]."""
 
@@ -119,7 +109,6 @@ class SpeedCondition(Element):
     direction: DirectionalDimension | None = attribute(since="1.2")
 
 
-@element_type
 class RelativeSpeedCondition(Element):
     """Condition on the speed relative to another entity [m/s]."""
 
@@ -129,14 +118,12 @@ class RelativeSpeedCondition(Element):
     direction: DirectionalDimension | None = attribute(since="1.2")
 
 
-@element_type
 class TraveledDistanceCondition(Element):
     """Condition on the distance traveled since the start of the run [m]."""
 
     value: float
 
 
-@element_type
 class ReachPositionCondition(Element, content=ALL):
     """Condition: position reached within a tolerance [m]."""
 
@@ -144,7 +131,6 @@ class ReachPositionCondition(Element, content=ALL):
     position: Position
 
 
-@element_type
 class DistanceCondition(Element, content=ALL):
     """Condition on the distance to a position [m]."""
 
@@ -158,7 +144,6 @@ class DistanceCondition(Element, content=ALL):
     position: Position
 
 
-@element_type
 class RelativeDistanceCondition(Element):
     """Condition on the distance to another entity [m]."""
 
@@ -171,7 +156,6 @@ class RelativeDistanceCondition(Element):
     routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
 
 
-@element_type
 class RelativeLaneRange(Element):
     """Range of lanes relative to the lane of the entity; an omitted limit is open."""
 
@@ -179,7 +163,6 @@ class RelativeLaneRange(Element):
     to: int | None = None
 
 
-@element_type
 class RelativeClearanceCondition(Element):
     """Condition: no entity in the lanes within the distances ahead and behind [m]."""
 
@@ -191,7 +174,6 @@ class RelativeClearanceCondition(Element):
     entity_ref: tuple[EntityRef, ...] = ()
 
 
-@element_type
 class AngleCondition(Element):
     """Condition on an angle, within a tolerance [rad]."""
 
@@ -201,7 +183,6 @@ class AngleCondition(Element):
     coordinate_system: CoordinateSystem | None = None
 
 
-@element_type
 class RelativeAngleCondition(Element):
     """Condition on an angle relative to another entity, within a tolerance [rad]."""
 
@@ -212,7 +193,6 @@ class RelativeAngleCondition(Element):
     coordinate_system: CoordinateSystem | None = None
 
 
-@element_type
 class EntityCondition(Element, content=Choice(empty_until="1.2")):
     """Choice of one condition on an entity."""
 
@@ -234,7 +214,6 @@ class EntityCondition(Element, content=Choice(empty_until="1.2")):
     relative_angle_condition: RelativeAngleCondition | None = child(since="1.3")
 
 
-@element_type
 class ByEntityCondition(Element, content=ALL):
     """Condition on the state of entities."""
 
@@ -242,7 +221,6 @@ class ByEntityCondition(Element, content=ALL):
     entity_condition: EntityCondition
 
 
-@element_type
 class ParameterCondition(Element):
     """Condition on the value of a parameter."""
 
@@ -251,7 +229,6 @@ class ParameterCondition(Element):
     value: str
 
 
-@element_type
 class VariableCondition(Element):
     """Condition on the value of a variable."""
 
@@ -260,7 +237,6 @@ class VariableCondition(Element):
     value: str
 
 
-@element_type
 class TimeOfDayCondition(Element):
     """Condition on the simulated date and time."""
 
@@ -268,7 +244,6 @@ class TimeOfDayCondition(Element):
     rule: Rule
 
 
-@element_type
 class SimulationTimeCondition(Element):
     """Condition on the time since the start of the run [s]."""
 
@@ -276,7 +251,6 @@ class SimulationTimeCondition(Element):
     value: float
 
 
-@element_type
 class StoryboardElementStateCondition(Element):
     """Condition on a state or transition of a storyboard element."""
 
@@ -285,7 +259,6 @@ class StoryboardElementStateCondition(Element):
     storyboard_element_type: StoryboardElementType
 
 
-@element_type
 class UserDefinedValueCondition(Element):
     """Condition on a value from outside the engine."""
 
@@ -294,7 +267,6 @@ class UserDefinedValueCondition(Element):
     value: str
 
 
-@element_type
 class ByValueCondition(Element, content=Choice(empty_until="1.2")):
     """Choice of one condition on a value."""
 
@@ -308,7 +280,6 @@ class ByValueCondition(Element, content=Choice(empty_until="1.2")):
     variable_condition: VariableCondition | None = child(since="1.2")
 
 
-@element_type
 class Condition(Element, content=Choice(empty_until="1.2")):
     """Condition with its edge and delay [s]."""
 
@@ -319,14 +290,12 @@ class Condition(Element, content=Choice(empty_until="1.2")):
     by_value_condition: ByValueCondition | None = None
 
 
-@element_type
 class ConditionGroup(Element):
     """Conditions that must hold at the same time."""
 
     condition: tuple[Condition, ...]
 
 
-@element_type
 class Trigger(Element):
     """Trigger, which is fulfilled if one of its groups holds; without groups it never is."""
 

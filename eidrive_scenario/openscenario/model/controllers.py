@@ -8,21 +8,11 @@ from eidrive_scenario.openscenario.model.declarations import (
     ParameterDeclarations,
     Properties,
 )
-from eidrive_scenario.openscenario.model.element import (
-    ALL,
-    CHOICE,
-    Changed,
-    Choice,
-    Element,
-    attribute,
-    child,
-    element_type,
-)
+from eidrive_scenario.openscenario.model.element import ALL, CHOICE, Changed, Choice, Element, attribute, child
 from eidrive_scenario.openscenario.model.entity_enumerations import ControllerType
 from eidrive_scenario.openscenario.model.enumerations import AutomaticGearType
 
 
-@element_type
 class Controller(Element, content=ALL):
     """Controller of an entity; its properties are specific to the tool that provides it."""
 
@@ -32,7 +22,6 @@ class Controller(Element, content=ALL):
     properties: Properties | None = child(required_until="1.2")
 
 
-@element_type
 class ObjectController(Element, content=Choice(empty_until="1.2")):
     """Controller of an entity, defined in place or in a catalog."""
 
@@ -41,7 +30,6 @@ class ObjectController(Element, content=Choice(empty_until="1.2")):
     controller: Controller | None = None
 
 
-@element_type
 class ControllerDistributionEntry(Element, content=Choice(empty_until="1.2")):
     """Controller and its share."""
 
@@ -50,14 +38,12 @@ class ControllerDistributionEntry(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@element_type
 class ControllerDistribution(Element):
     """Controllers of background traffic, by shares."""
 
     controller_distribution_entry: tuple[ControllerDistributionEntry, ...]
 
 
-@element_type
 class AssignControllerAction(Element, content=Choice(minimum=0)):
     """Action that assigns a controller to an entity, and optionally activates its domains."""
 
@@ -70,7 +56,6 @@ class AssignControllerAction(Element, content=Choice(minimum=0)):
     object_controller: ObjectController | None = child(since="1.3")
 
 
-@element_type
 class ActivateControllerAction(Element):
     """Action that activates or deactivates a controller per domain; an omitted domain does not change."""
 
@@ -82,7 +67,6 @@ class ActivateControllerAction(Element):
     object_controller_ref: ControllerName | None = attribute(since="1.3")
 
 
-@element_type
 class Brake(Element):
     """Brake input: share in [0, 1] or force [N]; maximum rate [1/s, N/s]."""
 
@@ -90,21 +74,18 @@ class Brake(Element):
     max_rate: float | None = None
 
 
-@element_type
 class ManualGear(Element):
     """Gear by number; negative for reverse, 0 for neutral."""
 
     number: int
 
 
-@element_type
 class AutomaticGear(Element):
     """Lever position of an automatic transmission."""
 
     gear: AutomaticGearType
 
 
-@element_type
 class OverrideThrottleAction(Element):
     """Override of the throttle by a value in [0, 1]."""
 
@@ -113,7 +94,6 @@ class OverrideThrottleAction(Element):
     max_rate: float | None = attribute(since="1.2")
 
 
-@element_type
 class OverrideBrakeAction(Element, content=Choice(minimum=0)):
     """Override of the brake."""
 
@@ -123,7 +103,6 @@ class OverrideBrakeAction(Element, content=Choice(minimum=0)):
     brake_force: Brake | None = child(since="1.2")
 
 
-@element_type
 class OverrideClutchAction(Element):
     """Override of the clutch by a value in [0, 1]."""
 
@@ -132,7 +111,6 @@ class OverrideClutchAction(Element):
     max_rate: float | None = attribute(since="1.2")
 
 
-@element_type
 class OverrideParkingBrakeAction(Element, content=Choice(minimum=0)):
     """Override of the parking brake."""
 
@@ -142,7 +120,6 @@ class OverrideParkingBrakeAction(Element, content=Choice(minimum=0)):
     brake_force: Brake | None = child(since="1.2")
 
 
-@element_type
 class OverrideSteeringWheelAction(Element):
     """Override of the steering wheel angle [rad]; maximum rate [rad/s], torque [Nm]."""
 
@@ -152,7 +129,6 @@ class OverrideSteeringWheelAction(Element):
     max_torque: float | None = attribute(since="1.2")
 
 
-@element_type
 class OverrideGearAction(Element, content=Choice(minimum=0)):
     """Override of the gear."""
 
@@ -162,7 +138,6 @@ class OverrideGearAction(Element, content=Choice(minimum=0)):
     automatic_gear: AutomaticGear | None = child(since="1.2")
 
 
-@element_type
 class OverrideControllerValueAction(Element, content=ALL):
     """Action that overrides pedals, steering wheel or gear of the controller."""
 
@@ -174,7 +149,6 @@ class OverrideControllerValueAction(Element, content=ALL):
     gear: OverrideGearAction | None = child(required_until="1.0")
 
 
-@element_type
 class ControllerAction(Element, content=Changed(ALL, "1.3", CHOICE)):
     """Action that assigns, overrides or activates controllers; before 1.3 a combination is allowed."""
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from eidrive_scenario.openscenario.model.element import Element, children, element_type, text, visible_parameters
+from eidrive_scenario.openscenario.model.element import Element, children, text, visible_parameters
 from eidrive_scenario.openscenario.model.enumerations import ParameterType, Rule
 
 
@@ -38,7 +38,6 @@ SignalControllerName = Annotated[str, NameOf("signal controller")]
 StoryboardElementName = Annotated[str, NameOf("storyboard element")]
 
 
-@element_type
 class Property(Element):
     """Name and value of a property."""
 
@@ -47,28 +46,24 @@ class Property(Element):
     scope: Any = visible_parameters()
 
 
-@element_type
 class File(Element):
     """File by its path."""
 
     filepath: str
 
 
-@element_type
 class Directory(Element):
     """Folder by its path."""
 
     path: str
 
 
-@element_type
 class CustomContent(Element):
     """Free text for specific tools."""
 
     content: str = text()
 
 
-@element_type
 class Properties(Element):
     """Properties of an object beyond the standard."""
 
@@ -77,7 +72,6 @@ class Properties(Element):
     custom_content: tuple[CustomContent, ...] = children(since="1.2")
 
 
-@element_type
 class ValueConstraint(Element):
     """Comparison that the value of a parameter must satisfy."""
 
@@ -85,14 +79,12 @@ class ValueConstraint(Element):
     value: str
 
 
-@element_type
 class ValueConstraintGroup(Element):
     """Constraints that are combined by AND; several groups of one parameter are alternatives."""
 
     value_constraint: tuple[ValueConstraint, ...]
 
 
-@element_type
 class ParameterDeclaration(Element):
     """Parameter with its type and default."""
 
@@ -102,14 +94,12 @@ class ParameterDeclaration(Element):
     constraint_group: tuple[ValueConstraintGroup, ...] = children(since="1.1")
 
 
-@element_type
 class ParameterDeclarations(Element):
     """Parameters of a scope."""
 
     parameter_declaration: tuple[ParameterDeclaration, ...] = ()
 
 
-@element_type
 class ParameterAssignment(Element):
     """Value of one parameter of a referenced catalog entry."""
 
@@ -117,14 +107,12 @@ class ParameterAssignment(Element):
     value: str
 
 
-@element_type
 class ParameterAssignments(Element):
     """Values of the parameters of a referenced catalog entry."""
 
     parameter_assignment: tuple[ParameterAssignment, ...] = ()
 
 
-@element_type
 class VariableDeclaration(Element):
     """Variable, whose value may change during the run."""
 
@@ -133,14 +121,12 @@ class VariableDeclaration(Element):
     value: str
 
 
-@element_type
 class VariableDeclarations(Element):
     """Variables of a scenario."""
 
     variable_declaration: tuple[VariableDeclaration, ...] = ()
 
 
-@element_type
 class MonitorDeclaration(Element):
     """Boolean value for external observers of the run."""
 
@@ -148,14 +134,12 @@ class MonitorDeclaration(Element):
     value: bool
 
 
-@element_type
 class MonitorDeclarations(Element):
     """Monitors of a scenario."""
 
     monitor_declaration: tuple[MonitorDeclaration, ...] = ()
 
 
-@element_type
 class CatalogReference(Element):
     """Reference to a catalog entry, with values of its parameters."""
 

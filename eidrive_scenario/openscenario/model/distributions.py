@@ -10,14 +10,12 @@ from eidrive_scenario.openscenario.model.element import (
     Element,
     child,
     choice,
-    element_type,
     sequence,
     sibling_index,
     text,
 )
 
 
-@element_type
 class Range(Element):
     """Range from a lower to an upper limit."""
 
@@ -25,21 +23,18 @@ class Range(Element):
     upper_limit: float
 
 
-@element_type
 class DistributionSetElement(Element):
     """Value of a distribution."""
 
     value: str
 
 
-@element_type
 class DistributionSet(Element):
     """Listed values, with one run each."""
 
     element: tuple[DistributionSetElement, ...]
 
 
-@element_type
 class DistributionRange(Element, content=ALL):
     """Values from a range in equal steps."""
 
@@ -47,7 +42,6 @@ class DistributionRange(Element, content=ALL):
     range: Range
 
 
-@element_type
 class UserDefinedDistribution(Element):
     """Distribution that is specific to a tool."""
 
@@ -55,7 +49,6 @@ class UserDefinedDistribution(Element):
     content: str = text()
 
 
-@element_type
 class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     """Deterministic values of one parameter."""
 
@@ -66,21 +59,18 @@ class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     sibling_index: int = sibling_index()
 
 
-@element_type
 class ParameterValueSet(Element):
     """Values of several parameters for one run."""
 
     parameter_assignment: tuple[ParameterAssignment, ...]
 
 
-@element_type
 class ValueSetDistribution(Element):
     """Sets of values, with one run each."""
 
     parameter_value_set: tuple[ParameterValueSet, ...]
 
 
-@element_type
 class DeterministicMultiParameterDistribution(Element):
     """Deterministic values of several parameters together."""
 
@@ -88,7 +78,6 @@ class DeterministicMultiParameterDistribution(Element):
     sibling_index: int = sibling_index()
 
 
-@element_type
 class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
     """Deterministic distributions, whose combinations are the runs."""
 
@@ -96,7 +85,6 @@ class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
     deterministic_single_parameter_distribution: tuple[DeterministicSingleParameterDistribution, ...] = ()
 
 
-@element_type
 class ProbabilityDistributionSetElement(Element):
     """Value and its weight."""
 
@@ -104,14 +92,12 @@ class ProbabilityDistributionSetElement(Element):
     weight: float
 
 
-@element_type
 class ProbabilityDistributionSet(Element):
     """Values, drawn by their weights."""
 
     element: tuple[ProbabilityDistributionSetElement, ...]
 
 
-@element_type
 class NormalDistribution(Element):
     """Normal distribution, truncated at a range."""
 
@@ -120,7 +106,6 @@ class NormalDistribution(Element):
     range: Range | None = None
 
 
-@element_type
 class LogNormalDistribution(Element):
     """Log-normal distribution, truncated at a range."""
 
@@ -129,14 +114,12 @@ class LogNormalDistribution(Element):
     range: Range | None = None
 
 
-@element_type
 class UniformDistribution(Element):
     """Uniform distribution over a range."""
 
     range: Range
 
 
-@element_type
 class PoissonDistribution(Element):
     """Poisson distribution, truncated at a range."""
 
@@ -144,7 +127,6 @@ class PoissonDistribution(Element):
     range: Range | None = None
 
 
-@element_type
 class HistogramBin(Element):
     """Range and its weight."""
 
@@ -152,14 +134,12 @@ class HistogramBin(Element):
     range: Range
 
 
-@element_type
 class Histogram(Element):
     """Ranges, drawn by their weights."""
 
     bin: tuple[HistogramBin, ...]
 
 
-@element_type
 class StochasticDistribution(Element, content=CHOICE):
     """Stochastic distribution of one parameter."""
 
@@ -173,7 +153,6 @@ class StochasticDistribution(Element, content=CHOICE):
     user_defined_distribution: UserDefinedDistribution | None = None
 
 
-@element_type
 class Stochastic(Element):
     """Stochastic distributions, drawn for a number of runs."""
 
@@ -182,7 +161,6 @@ class Stochastic(Element):
     stochastic_distribution: tuple[StochasticDistribution, ...]
 
 
-@element_type
 class ParameterValueDistribution(Element, content=sequence("scenario_file", choice("deterministic", "stochastic"))):
     """Values of the parameters over which a scenario is run."""
 

@@ -15,17 +15,7 @@ from eidrive_scenario.openscenario.model.declarations import (
     VariableDeclarations,
 )
 from eidrive_scenario.openscenario.model.distributions import ParameterValueDistribution
-from eidrive_scenario.openscenario.model.element import (
-    ALL,
-    Element,
-    attribute,
-    child,
-    children,
-    choice,
-    element_type,
-    sequence,
-    text,
-)
+from eidrive_scenario.openscenario.model.element import ALL, Element, attribute, child, children, choice, sequence, text
 from eidrive_scenario.openscenario.model.entities import Entities
 from eidrive_scenario.openscenario.model.global_actions import TrafficSignals
 from eidrive_scenario.openscenario.model.positions import Position
@@ -40,14 +30,12 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.traffic import TrafficDistributionEntry
 
 
-@element_type
 class CatalogLocation(Element, content=ALL):
     """Location of the catalogs of one kind; the schema has a type of the same content for each kind."""
 
     directory: Directory
 
 
-@element_type
 class CatalogLocations(Element, content=ALL):
     """Locations of the catalogs of a scenario, by kind."""
 
@@ -63,7 +51,6 @@ class CatalogLocations(Element, content=ALL):
     traffic_distribution_entry_catalog: CatalogLocation | None = child(since="1.4")
 
 
-@element_type
 class Catalog(Element):
     """Entries that scenarios share."""
 
@@ -80,7 +67,6 @@ class Catalog(Element):
     traffic_distribution_entry: tuple[TrafficDistributionEntry, ...] = children(since="1.4")
 
 
-@element_type
 class License(Element):
     """License of the file, optionally with its text."""
 
@@ -90,7 +76,6 @@ class License(Element):
     content: str = text()
 
 
-@element_type
 class FileHeader(Element):
     """Author, date and revision of the standard of the file."""
 
@@ -103,14 +88,12 @@ class FileHeader(Element):
     properties: Properties | None = child(since="1.2")
 
 
-@element_type
 class UsedArea(Element):
     """Area of the world that the scenario uses."""
 
     position: tuple[Position, ...] = children(minimum=2)
 
 
-@element_type
 class RoadNetwork(Element):
     """Road file, scene graph file and traffic signals."""
 
@@ -120,7 +103,6 @@ class RoadNetwork(Element):
     used_area: UsedArea | None = child(since="1.1")
 
 
-@element_type
 class OpenScenario(
     Element,
     content=sequence(

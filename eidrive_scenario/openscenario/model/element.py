@@ -12,10 +12,10 @@ revMajor 1, revMinor 2.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, FrozenInstanceError, dataclass, field, fields
+from dataclasses import MISSING, Field, FrozenInstanceError, dataclass, field, fields
 from enum import Enum
 from reprlib import recursive_repr
-from typing import Any, ClassVar, TypeAlias, TypeVar, dataclass_transform
+from typing import Any, ClassVar, TypeAlias, dataclass_transform
 
 import msgspec
 
@@ -92,52 +92,18 @@ class Usage(msgspec.Struct, frozen=True):
     text: bool = False
 
 
-def attribute(
-    *,
-    since: str = "",
-    until: str = "",
-    deprecated: str = "",
-    required: bool = False,
-    required_since: str = "",
-    required_until: str = "",
-    name: str = "",
-) -> Any:
-    """Define a field that exists, is required or is deprecated in some versions only; None if the file omits it."""
-    usage = Usage(
-        since=since,
-        until=until,
-        deprecated=deprecated,
-        required=required,
-        required_since=required_since,
-        required_until=required_until,
-        name=name,
-    )
-    return field(default=None, metadata={USAGE: usage})
+def attribute(**usage: Any) -> Any:
+    """Define an optional field with the fields of its `Usage`; None if the file omits it."""
+    return field(default=None, metadata={USAGE: Usage(**usage)})
 
 
 child = attribute
 
 
-def children(
-    *,
-    minimum: int = 0,
-    since: str = "",
-    until: str = "",
-    required_until: str = "",
-    single_until: str = "",
-    name: str = "",
-) -> Any:
-    """Define a field for at least `minimum` children; () if the file has none."""
-    usage = Usage(
-        since=since,
-        until=until,
-        required=minimum > 0,
-        required_until=required_until,
-        single_until=single_until,
-        minimum=max(minimum, 1),
-        name=name,
-    )
-    return field(default=(), metadata={USAGE: usage}) if minimum == 0 else field(metadata={USAGE: usage})
+def children(*, minimum: int = 0, **usage: Any) -> Any:
+    """Define a field for at least `minimum` children with the fields of its `Usage`; () if the file has none."""
+    metadata = {USAGE: Usage(required=minimum > 0, minimum=max(minimum, 1), **usage)}
+    return field(default=() if minimum == 0 else MISSING, metadata=metadata)
 
 
 def text() -> Any:
@@ -158,34 +124,43 @@ def sibling_index() -> Any:
     return field(default=0, compare=False, repr=False)
 
 
-T = TypeVar("T", bound=type)
-
-
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
-def element_type(cls: T) -> T:
-    """Make a class a frozen dataclass with keyword arguments, whose methods are those of `Element`.
+class _FrozenRecord:
+    """Base that makes its subclasses frozen dataclasses with keyword arguments, whose methods are those of `Element`.
 
     `dataclass` compiles six methods for each class. For all classes of the standard this takes longer than a short run.
     """
-    dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
-    return cls
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    content_model: ClassVar[Content]
+    field_names: ClassVar[tuple[str, ...]]
+    """Fields with XML content: all except `ABOUT`."""
+    field_defaults: ClassVar[Mapping[str, Any]]
+    """Default of each field, MISSING for a required field."""
+    incomplete_values: ClassVar[Mapping[str, Any]]
+    """Default of each field, None for a required field."""
+    compared_fields: ClassVar[tuple[str, ...]]
+
+    def __init_subclass__(cls, content: Content = SEQUENCE) -> None:
+        dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
+        cls.content_model = content
+        cls.field_names = tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
+        cls.field_defaults = {entry.name: entry.default for entry in fields(cls)}
+        cls.incomplete_values = {
+            name: None if value is MISSING else value for name, value in cls.field_defaults.items()
+        }
+        cls.compared_fields = tuple(entry.name for entry in fields(cls) if entry.compare)
 
 
-@element_type
-class Element:
+class Element(_FrozenRecord):
     """Element of a file. Comparisons ignore its location `line` and `source`."""
 
     line: int = field(default=0, compare=False, repr=False)
     source: str = field(default="", compare=False, repr=False)
 
-    content_model: ClassVar[Content] = SEQUENCE
-
-    def __init_subclass__(cls, content: Content = SEQUENCE) -> None:
-        cls.content_model = content
-
     def __init__(self, **values: Any) -> None:
         """Set the fields. Raise TypeError for an unknown field, or if a field without a default is missing."""
-        defaults = field_defaults(type(self))
+        defaults = self.field_defaults
         if unknown := values.keys() - defaults.keys():
             raise TypeError(f"{type(self).__name__} has no field {', '.join(sorted(unknown))}")
         state = {**defaults, **values}
@@ -238,49 +213,24 @@ class Element:
         these elements instead.
         """
         values = (getattr(self, name) for name in alternatives(type(self)))
-        found = [value for value in values if isinstance(value, Element) or (isinstance(value, tuple) and value)]
-        if len(found) != 1:
+        chosen = [value for value in values if isinstance(value, Element) or (isinstance(value, tuple) and value)]
+        if len(chosen) != 1:
             location = f"{self.source}:{self.line}: {type(self).__name__}"
-            raise ValueError(f"{location}: invalid number of alternatives (got {len(found)}; expected 1)")
-        first = found[0]
+            raise ValueError(f"{location}: invalid number of alternatives (got {len(chosen)}; expected 1)")
+        first = chosen[0]
         return first[0] if isinstance(first, tuple) else first
-
-
-def field_names(cls: type[Element]) -> tuple[str, ...]:
-    """Return the fields of a class with XML content: all except `ABOUT`."""
-    known = _FIELD_NAMES.get(cls)
-    if known is None:
-        known = tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
-        _FIELD_NAMES[cls] = known
-    return known
-
-
-def field_defaults(cls: type[Element]) -> dict[str, Any]:
-    """Return the default of each field of a class, MISSING for a required field."""
-    known = _DEFAULTS.get(cls)
-    if known is None:
-        known = _DEFAULTS[cls] = {entry.name: entry.default for entry in fields(cls)}
-    return known
 
 
 def incomplete_element(cls: type[Element], values: Mapping[str, Any]) -> Element:
     """Return an element with these values and its defaults, without a check: None for missing required fields."""
-    defaults = _INCOMPLETE.get(cls)
-    if defaults is None:
-        given = field_defaults(cls)
-        defaults = _INCOMPLETE[cls] = {name: None if value is MISSING else value for name, value in given.items()}
     element = object.__new__(cls)
-    element.__dict__.update(defaults)
+    element.__dict__.update(cls.incomplete_values)
     element.__dict__.update(values)
     return element
 
 
 def _compared_values(element: Element) -> tuple[Any, ...]:
-    cls = type(element)
-    names = _COMPARED.get(cls)
-    if names is None:
-        names = _COMPARED[cls] = tuple(entry.name for entry in fields(cls) if entry.compare)
-    return tuple([getattr(element, name) for name in names])
+    return tuple([getattr(element, name) for name in element.compared_fields])
 
 
 def alternatives(cls: type[Element]) -> tuple[str, ...]:
@@ -291,13 +241,7 @@ def alternatives(cls: type[Element]) -> tuple[str, ...]:
     if isinstance(model, Sequence):
         model = next((part for part in model.parts if isinstance(part, Choice)), model)
     named = tuple(part for part in model.parts if isinstance(part, str)) if isinstance(model, Choice) else ()
-    return named or field_names(cls)
-
-
-_FIELD_NAMES: dict[type[Element], tuple[str, ...]] = {}
-_DEFAULTS: dict[type[Element], dict[str, Any]] = {}
-_INCOMPLETE: dict[type[Element], dict[str, Any]] = {}
-_COMPARED: dict[type[Element], tuple[str, ...]] = {}
+    return named or cls.field_names
 
 
 class Enumeration(Enum):

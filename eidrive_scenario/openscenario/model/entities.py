@@ -20,7 +20,6 @@ from eidrive_scenario.openscenario.model.element import (
     child,
     children,
     choice,
-    element_type,
     sequence,
 )
 from eidrive_scenario.openscenario.model.entity_enumerations import (
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.positions import RelativeObjectPosition
 
 
-@element_type
 class Center(Element):
     """Center of the box in the frame of the object [m]."""
 
@@ -46,7 +44,6 @@ class Center(Element):
     z: float
 
 
-@element_type
 class Dimensions(Element):
     """Dimensions of the box [m]."""
 
@@ -55,7 +52,6 @@ class Dimensions(Element):
     width: float
 
 
-@element_type
 class BoundingBox(Element, content=ALL):
     """Bounding box, parallel to the axes of the object frame."""
 
@@ -63,7 +59,6 @@ class BoundingBox(Element, content=ALL):
     dimensions: Dimensions
 
 
-@element_type
 class Sensor(Element):
     """Sensor and its field of view [rad]."""
 
@@ -75,7 +70,6 @@ class Sensor(Element):
     properties: Properties
 
 
-@element_type
 class SensorAttachment(Element):
     """Mounting position of a sensor on the vehicle."""
 
@@ -83,28 +77,24 @@ class SensorAttachment(Element):
     mounting_position: RelativeObjectPosition
 
 
-@element_type
 class SensorAttachments(Element):
     """Sensors of a vehicle."""
 
     sensor_attachment: tuple[SensorAttachment, ...] = ()
 
 
-@element_type
 class SensorReference(Element):
     """Reference to a sensor by its name."""
 
     name: str
 
 
-@element_type
 class SensorReferenceSet(Element):
     """References to sensors by their names."""
 
     sensor_reference: tuple[SensorReference, ...]
 
 
-@element_type
 class Axle(Element):
     """Axle: maximum steering angle [rad], position, track width and wheel diameter [m]."""
 
@@ -115,7 +105,6 @@ class Axle(Element):
     wheel_diameter: float
 
 
-@element_type
 class Axles(Element):
     """Axles of a vehicle."""
 
@@ -124,7 +113,6 @@ class Axles(Element):
     additional_axle: tuple[Axle, ...] = ()
 
 
-@element_type
 class Performance(Element):
     """Limits of a vehicle: speed [m/s], acceleration and deceleration [m/s²], their rates [m/s³]."""
 
@@ -135,7 +123,6 @@ class Performance(Element):
     max_deceleration_rate: float | None = attribute(since="1.2")
 
 
-@element_type
 class TrailerHitch(Element):
     """Position of the trailer hitch relative to the reference point [m]."""
 
@@ -143,7 +130,6 @@ class TrailerHitch(Element):
     dz: float | None = None
 
 
-@element_type
 class TrailerCoupler(Element):
     """Position of the trailer coupler relative to the reference point [m]."""
 
@@ -151,7 +137,6 @@ class TrailerCoupler(Element):
     dz: float | None = None
 
 
-@element_type
 class Trailer(Element, content=CHOICE):
     """Trailer of a vehicle."""
 
@@ -159,7 +144,6 @@ class Trailer(Element, content=CHOICE):
     trailer_ref: EntityRef | None = None
 
 
-@element_type
 class Vehicle(Element, content=ALL):
     """Vehicle with bounding box, limits and axles. Mass [kg]."""
 
@@ -180,28 +164,24 @@ class Vehicle(Element, content=ALL):
     trailer: Trailer | None = child(since="1.3")
 
 
-@element_type
 class EntityRef(Element):
     """Reference to an entity by its name."""
 
     entity_ref: EntityName
 
 
-@element_type
 class ByType(Element):
     """Selection of all entities of a type."""
 
     object_type: ObjectType
 
 
-@element_type
 class ByObjectType(Element):
     """Reference to any entity of a type."""
 
     type: ObjectType
 
 
-@element_type
 class SelectedEntities(Element, content=Choice(empty_until="1.2")):
     """Members of a selection, by name or by type."""
 
@@ -209,7 +189,6 @@ class SelectedEntities(Element, content=Choice(empty_until="1.2")):
     by_type: tuple[ByType, ...] = ()
 
 
-@element_type
 class EntitySelection(Element):
     """Named group of entities."""
 
@@ -217,14 +196,12 @@ class EntitySelection(Element):
     members: SelectedEntities
 
 
-@element_type
 class ExternalObjectReference(Element):
     """Object that the road network or another tool defines."""
 
     name: str
 
 
-@element_type
 class Pedestrian(Element, content=ALL):
     """Pedestrian, animal or wheelchair. Mass [kg]."""
 
@@ -239,7 +216,6 @@ class Pedestrian(Element, content=ALL):
     properties: Properties | None = child(required_until="1.2")
 
 
-@element_type
 class MiscObject(Element, content=ALL):
     """Miscellaneous object. Mass [kg]."""
 
@@ -252,7 +228,6 @@ class MiscObject(Element, content=ALL):
     properties: Properties | None = child(required_until="1.2")
 
 
-@element_type
 class ScenarioObject(
     Element,
     content=sequence(
@@ -280,7 +255,6 @@ class ScenarioObject(
     object_controller: tuple[ObjectController, ...] = children(single_until="1.1")
 
 
-@element_type
 class ScenarioObjectTemplate(
     Element,
     content=sequence(
@@ -298,7 +272,6 @@ class ScenarioObjectTemplate(
     object_controller: tuple[ObjectController, ...] = ()
 
 
-@element_type
 class Entities(Element):
     """All entities and selections."""
 

@@ -16,16 +16,7 @@ from eidrive_scenario.openscenario.model.declarations import (
     SignalControllerName,
     VariableName,
 )
-from eidrive_scenario.openscenario.model.element import (
-    ALL,
-    Choice,
-    Element,
-    attribute,
-    child,
-    element_type,
-    text,
-    visible_parameters,
-)
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, text, visible_parameters
 from eidrive_scenario.openscenario.model.entities import BoundingBox
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     CloudState,
@@ -38,7 +29,6 @@ from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.traffic import TrafficAction
 
 
-@element_type
 class TimeOfDay(Element):
     """Date and time, and whether the time advances."""
 
@@ -46,7 +36,6 @@ class TimeOfDay(Element):
     date_time: datetime
 
 
-@element_type
 class Sun(Element):
     """Sun with azimuth and elevation [rad] and illuminance [lx]."""
 
@@ -56,7 +45,6 @@ class Sun(Element):
     illuminance: float | None = attribute(since="1.2")
 
 
-@element_type
 class Fog(Element, content=ALL):
     """Fog with visual range [m], optionally in a bounding box."""
 
@@ -64,7 +52,6 @@ class Fog(Element, content=ALL):
     bounding_box: BoundingBox | None = None
 
 
-@element_type
 class Precipitation(Element):
     """Precipitation intensity [mm/h]."""
 
@@ -73,7 +60,6 @@ class Precipitation(Element):
     precipitation_intensity: float | None = attribute(since="1.1")
 
 
-@element_type
 class Wind(Element):
     """Wind with direction of flow [rad] and speed [m/s]."""
 
@@ -81,7 +67,6 @@ class Wind(Element):
     speed: float
 
 
-@element_type
 class DomeImage(Element):
     """Image of the sky; azimuth offset [rad]."""
 
@@ -89,7 +74,6 @@ class DomeImage(Element):
     dome_file: File
 
 
-@element_type
 class Weather(Element, content=ALL):
     """Weather; pressure [Pa], temperature [K]."""
 
@@ -104,7 +88,6 @@ class Weather(Element, content=ALL):
     dome_image: DomeImage | None = child(since="1.2")
 
 
-@element_type
 class RoadCondition(Element):
     """Friction of the road relative to the reference friction."""
 
@@ -113,7 +96,6 @@ class RoadCondition(Element):
     properties: Properties | None = None
 
 
-@element_type
 class Environment(Element, content=ALL):
     """Time of day, weather and road condition."""
 
@@ -124,7 +106,6 @@ class Environment(Element, content=ALL):
     road_condition: RoadCondition | None = child(required_until="1.0")
 
 
-@element_type
 class EnvironmentAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets the environment."""
 
@@ -132,7 +113,6 @@ class EnvironmentAction(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@element_type
 class TrafficSignalState(Element):
     """State of one signal."""
 
@@ -140,14 +120,12 @@ class TrafficSignalState(Element):
     traffic_signal_id: str
 
 
-@element_type
 class TrafficSignalGroupState(Element):
     """State of all signals of a controller."""
 
     state: str
 
 
-@element_type
 class Phase(Element):
     """Phase of a controller; duration [s]."""
 
@@ -159,7 +137,6 @@ class Phase(Element):
     traffic_signal_group_state: TrafficSignalGroupState | None = child(since="1.3")
 
 
-@element_type
 class TrafficSignalController(Element):
     """Controller of signals; delay after the referenced controller [s]."""
 
@@ -169,14 +146,12 @@ class TrafficSignalController(Element):
     phase: tuple[Phase, ...] = ()
 
 
-@element_type
 class TrafficSignals(Element):
     """Signal controllers of a scenario."""
 
     traffic_signal_controller: tuple[TrafficSignalController, ...] = ()
 
 
-@element_type
 class TrafficSignalStateAction(Element):
     """Action that sets the state of a signal."""
 
@@ -184,7 +159,6 @@ class TrafficSignalStateAction(Element):
     state: str
 
 
-@element_type
 class TrafficSignalControllerAction(Element):
     """Action that sets the phase of a controller."""
 
@@ -192,7 +166,6 @@ class TrafficSignalControllerAction(Element):
     phase: str
 
 
-@element_type
 class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets a signal or a controller."""
 
@@ -200,14 +173,12 @@ class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
     traffic_signal_state_action: TrafficSignalStateAction | None = None
 
 
-@element_type
 class InfrastructureAction(Element, content=ALL):
     """Action of the infrastructure."""
 
     traffic_signal_action: TrafficSignalAction
 
 
-@element_type
 class TrafficSignalCondition(Element):
     """Condition on the state of a signal."""
 
@@ -215,7 +186,6 @@ class TrafficSignalCondition(Element):
     state: str
 
 
-@element_type
 class TrafficSignalControllerCondition(Element):
     """Condition on the phase of a controller."""
 
@@ -223,19 +193,16 @@ class TrafficSignalControllerCondition(Element):
     phase: str
 
 
-@element_type
 class AddEntityAction(Element, content=ALL):
     """Addition of an entity at a position."""
 
     position: Position
 
 
-@element_type
 class DeleteEntityAction(Element):
     """Removal of an entity."""
 
 
-@element_type
 class EntityAction(Element, content=Choice(empty_until="1.2")):
     """Action that adds or removes an entity."""
 
@@ -244,28 +211,24 @@ class EntityAction(Element, content=Choice(empty_until="1.2")):
     delete_entity_action: DeleteEntityAction | None = None
 
 
-@element_type
 class ParameterSetAction(Element):
     """Assignment to a parameter (deprecated since 1.2: use a variable)."""
 
     value: str
 
 
-@element_type
 class ParameterAddValueRule(Element):
     """Addition to a parameter."""
 
     value: float
 
 
-@element_type
 class ParameterMultiplyByValueRule(Element):
     """Multiplication of a parameter."""
 
     value: float
 
 
-@element_type
 class ModifyRule(Element, content=Choice(empty_until="1.2")):
     """Rule for the modification of a parameter."""
 
@@ -273,14 +236,12 @@ class ModifyRule(Element, content=Choice(empty_until="1.2")):
     multiply_by_value: ParameterMultiplyByValueRule | None = None
 
 
-@element_type
 class ParameterModifyAction(Element, content=ALL):
     """Modification of a parameter (deprecated since 1.2: use a variable)."""
 
     rule: ModifyRule
 
 
-@element_type
 class ParameterAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets or modifies a parameter (deprecated since 1.2: use a variable)."""
 
@@ -289,28 +250,24 @@ class ParameterAction(Element, content=Choice(empty_until="1.2")):
     modify_action: ParameterModifyAction | None = child(deprecated="1.2")
 
 
-@element_type
 class VariableSetAction(Element):
     """Assignment to a variable."""
 
     value: str
 
 
-@element_type
 class VariableAddValueRule(Element):
     """Addition to a variable."""
 
     value: float
 
 
-@element_type
 class VariableMultiplyByValueRule(Element):
     """Multiplication of a variable."""
 
     value: float
 
 
-@element_type
 class VariableModifyRule(Element, content=Choice(empty_until="1.2")):
     """Rule for the modification of a variable."""
 
@@ -318,14 +275,12 @@ class VariableModifyRule(Element, content=Choice(empty_until="1.2")):
     multiply_by_value: VariableMultiplyByValueRule | None = None
 
 
-@element_type
 class VariableModifyAction(Element, content=ALL):
     """Modification of a variable."""
 
     rule: VariableModifyRule
 
 
-@element_type
 class VariableAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets or modifies a variable."""
 
@@ -334,7 +289,6 @@ class VariableAction(Element, content=Choice(empty_until="1.2")):
     modify_action: VariableModifyAction | None = None
 
 
-@element_type
 class SetMonitorAction(Element):
     """Action that sets a monitor."""
 
@@ -342,7 +296,6 @@ class SetMonitorAction(Element):
     value: bool
 
 
-@element_type
 class GlobalAction(Element, content=Choice(empty_until="1.2")):
     """Action that does not apply to a single entity."""
 
@@ -355,7 +308,6 @@ class GlobalAction(Element, content=Choice(empty_until="1.2")):
     variable_action: VariableAction | None = child(since="1.2")
 
 
-@element_type
 class CustomCommandAction(Element):
     """Command to the engine; its type specifies the language."""
 
@@ -364,7 +316,6 @@ class CustomCommandAction(Element):
     scope: Any = visible_parameters()
 
 
-@element_type
 class UserDefinedAction(Element):
     """Action that the standard does not define."""
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.declarations import CatalogReference, EntityName
-from eidrive_scenario.openscenario.model.element import ALL, CHOICE, Choice, Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.element import ALL, CHOICE, Choice, Element, attribute, child
 from eidrive_scenario.openscenario.model.enumerations import LaneLayerType, ReferenceContext
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.routing import Route, Trajectory
 
 
-@element_type
 class Orientation(Element):
     """Heading, pitch and roll [rad], absolute or relative to the reference of the position."""
 
@@ -22,7 +21,6 @@ class Orientation(Element):
     type: ReferenceContext | None = None
 
 
-@element_type
 class WorldPosition(Element):
     """Point [m] and orientation [rad] in the world frame."""
 
@@ -34,7 +32,6 @@ class WorldPosition(Element):
     z: float | None = None
 
 
-@element_type
 class RelativeWorldPosition(Element, content=ALL):
     """Point with an offset from an entity along the world axes [m]."""
 
@@ -45,7 +42,6 @@ class RelativeWorldPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class RelativeObjectPosition(Element, content=ALL):
     """Point with an offset from an entity along its axes [m]."""
 
@@ -56,7 +52,6 @@ class RelativeObjectPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class RoadPosition(Element, content=ALL):
     """Point in road coordinates [m]."""
 
@@ -66,7 +61,6 @@ class RoadPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class RelativeRoadPosition(Element, content=ALL):
     """Point with an offset from an entity in road coordinates [m]."""
 
@@ -76,7 +70,6 @@ class RelativeRoadPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class LanePosition(Element, content=ALL):
     """Point in a lane: s along the road, offset from the lane center [m]."""
 
@@ -88,7 +81,6 @@ class LanePosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class RelativeLanePosition(Element, content=ALL):
     """Point relative to the lane of an entity; ds along the road, dsLane along the lane center [m]."""
 
@@ -100,14 +92,12 @@ class RelativeLanePosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class PositionOfCurrentEntity(Element):
     """Point on the route at the current position of an entity."""
 
     entity_ref: EntityName
 
 
-@element_type
 class PositionInRoadCoordinates(Element):
     """Point on the route: distance along it and lateral offset [m]."""
 
@@ -115,7 +105,6 @@ class PositionInRoadCoordinates(Element):
     t: float
 
 
-@element_type
 class PositionInLaneCoordinates(Element):
     """Point on the route: distance along it, lane, offset from the lane center [m]."""
 
@@ -124,7 +113,6 @@ class PositionInLaneCoordinates(Element):
     lane_offset: float | None = None
 
 
-@element_type
 class InRoutePosition(Element, content=Choice(empty_until="1.2")):
     """Choice of coordinates of a point on a route."""
 
@@ -133,7 +121,6 @@ class InRoutePosition(Element, content=Choice(empty_until="1.2")):
     from_lane_coordinates: PositionInLaneCoordinates | None = None
 
 
-@element_type
 class RouteRef(Element, content=Choice(empty_until="1.2")):
     """Route, defined in place or in a catalog."""
 
@@ -141,7 +128,6 @@ class RouteRef(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@element_type
 class RoutePosition(Element, content=ALL):
     """Point on a route."""
 
@@ -150,7 +136,6 @@ class RoutePosition(Element, content=ALL):
     in_route_position: InRoutePosition
 
 
-@element_type
 class TrajectoryRef(Element, content=CHOICE):
     """Trajectory, defined in place or in a catalog."""
 
@@ -158,7 +143,6 @@ class TrajectoryRef(Element, content=CHOICE):
     catalog_reference: CatalogReference | None = None
 
 
-@element_type
 class TrajectoryPosition(Element, content=ALL):
     """Point relative to a trajectory: s along it, t to its left [m]."""
 
@@ -168,7 +152,6 @@ class TrajectoryPosition(Element, content=ALL):
     trajectory_ref: TrajectoryRef
 
 
-@element_type
 class GeoPosition(Element, content=ALL):
     """Geodetic point in degrees and meters; the older attributes are in radians."""
 
@@ -182,7 +165,6 @@ class GeoPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@element_type
 class Position(Element, content=Choice(empty_until="1.2")):
     """Position in one of the coordinate systems."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from eidrive_scenario.openscenario.model.appearance import AppearanceAction
 from eidrive_scenario.openscenario.model.controllers import ActivateControllerAction, ControllerAction
 from eidrive_scenario.openscenario.model.declarations import EntityName
-from eidrive_scenario.openscenario.model.element import ALL, CHOICE, Choice, Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.element import ALL, CHOICE, Choice, Element, attribute, child
 from eidrive_scenario.openscenario.model.entities import EntityRef, SensorReferenceSet
 from eidrive_scenario.openscenario.model.enumerations import (
     CoordinateSystem,
@@ -21,7 +21,6 @@ from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.routing import RoutingAction
 
 
-@element_type
 class DynamicConstraints(Element):
     """Limits of speed [m/s], acceleration and deceleration [m/s²] and their rates [m/s³]."""
 
@@ -32,7 +31,6 @@ class DynamicConstraints(Element):
     max_deceleration_rate: float | None = attribute(since="1.2")
 
 
-@element_type
 class TransitionDynamics(Element):
     """Dynamics of a transition: shape, and time [s], distance [m] or rate."""
 
@@ -42,14 +40,12 @@ class TransitionDynamics(Element):
     following_mode: FollowingMode | None = attribute(since="1.2")
 
 
-@element_type
 class AbsoluteTargetSpeed(Element):
     """Target speed [m/s]."""
 
     value: float
 
 
-@element_type
 class RelativeTargetSpeed(Element):
     """Target speed relative to an entity: difference [m/s] or factor."""
 
@@ -59,7 +55,6 @@ class RelativeTargetSpeed(Element):
     value: float
 
 
-@element_type
 class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a speed action."""
 
@@ -67,7 +62,6 @@ class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
     absolute_target_speed: AbsoluteTargetSpeed | None = None
 
 
-@element_type
 class SpeedAction(Element, content=ALL):
     """Action that changes the speed of an entity."""
 
@@ -75,7 +69,6 @@ class SpeedAction(Element, content=ALL):
     speed_action_target: SpeedActionTarget
 
 
-@element_type
 class SpeedProfileEntry(Element):
     """Speed [m/s] and duration of the transition to it [s]."""
 
@@ -83,7 +76,6 @@ class SpeedProfileEntry(Element):
     time: float | None = None
 
 
-@element_type
 class SpeedProfileAction(Element):
     """Action with a series of speeds."""
 
@@ -94,7 +86,6 @@ class SpeedProfileAction(Element):
     speed_profile_entry: tuple[SpeedProfileEntry, ...]
 
 
-@element_type
 class LongitudinalDistanceAction(Element, content=ALL):
     """Action that keeps a distance [m] or a time gap [s] to an entity."""
 
@@ -108,7 +99,6 @@ class LongitudinalDistanceAction(Element, content=ALL):
     dynamic_constraints: DynamicConstraints | None = None
 
 
-@element_type
 class LongitudinalAction(Element, content=Choice(empty_until="1.2")):
     """Longitudinal action of an entity."""
 
@@ -117,7 +107,6 @@ class LongitudinalAction(Element, content=Choice(empty_until="1.2")):
     speed_profile_action: SpeedProfileAction | None = child(since="1.2")
 
 
-@element_type
 class AbsoluteTargetLane(Element):
     """Target lane by its id."""
 
@@ -125,7 +114,6 @@ class AbsoluteTargetLane(Element):
     layer: LaneLayerType | None = attribute(since="1.4")
 
 
-@element_type
 class RelativeTargetLane(Element):
     """Target lane relative to the lane of an entity."""
 
@@ -134,7 +122,6 @@ class RelativeTargetLane(Element):
     layer: LaneLayerType | None = attribute(since="1.4")
 
 
-@element_type
 class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a lane change."""
 
@@ -142,7 +129,6 @@ class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
     absolute_target_lane: AbsoluteTargetLane | None = None
 
 
-@element_type
 class LaneChangeAction(Element, content=ALL):
     """Action that changes the lane; offset from the lane center [m]."""
 
@@ -151,14 +137,12 @@ class LaneChangeAction(Element, content=ALL):
     lane_change_target: LaneChangeTarget
 
 
-@element_type
 class AbsoluteTargetLaneOffset(Element):
     """Target offset from the lane center [m]."""
 
     value: float
 
 
-@element_type
 class RelativeTargetLaneOffset(Element):
     """Target offset relative to an entity [m]."""
 
@@ -166,7 +150,6 @@ class RelativeTargetLaneOffset(Element):
     value: float
 
 
-@element_type
 class LaneOffsetTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a lane offset."""
 
@@ -174,7 +157,6 @@ class LaneOffsetTarget(Element, content=Choice(empty_until="1.2")):
     absolute_target_lane_offset: AbsoluteTargetLaneOffset | None = None
 
 
-@element_type
 class LaneOffsetActionDynamics(Element):
     """Dynamics of a lane offset; maximum lateral acceleration [m/s²]."""
 
@@ -182,7 +164,6 @@ class LaneOffsetActionDynamics(Element):
     max_lateral_acc: float | None = None
 
 
-@element_type
 class LaneOffsetAction(Element, content=ALL):
     """Action that changes the lateral offset in the lane."""
 
@@ -191,7 +172,6 @@ class LaneOffsetAction(Element, content=ALL):
     lane_offset_target: LaneOffsetTarget
 
 
-@element_type
 class LateralDistanceAction(Element, content=ALL):
     """Action that keeps a lateral distance to an entity [m]."""
 
@@ -204,7 +184,6 @@ class LateralDistanceAction(Element, content=ALL):
     dynamic_constraints: DynamicConstraints | None = None
 
 
-@element_type
 class LateralAction(Element, content=Choice(empty_until="1.2")):
     """Lateral action of an entity."""
 
@@ -213,7 +192,6 @@ class LateralAction(Element, content=Choice(empty_until="1.2")):
     lateral_distance_action: LateralDistanceAction | None = None
 
 
-@element_type
 class VisibilityAction(Element):
     """Action that sets the visibility of an entity in graphics, for traffic and for sensors."""
 
@@ -223,7 +201,6 @@ class VisibilityAction(Element):
     sensor_reference_set: SensorReferenceSet | None = child(since="1.2")
 
 
-@element_type
 class AbsoluteSpeed(Element, content=Choice(minimum=0)):
     """Final speed [m/s]."""
 
@@ -232,7 +209,6 @@ class AbsoluteSpeed(Element, content=Choice(minimum=0)):
     target_time_steady_state: TargetTimeSteadyState | None = child(since="1.1")
 
 
-@element_type
 class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
     """Final speed relative to the master: difference [m/s] or factor."""
 
@@ -242,21 +218,18 @@ class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
     target_time_steady_state: TargetTimeSteadyState | None = child(since="1.1")
 
 
-@element_type
 class TargetDistanceSteadyState(Element):
     """Distance of the steady state at the final speed [m]."""
 
     distance: float
 
 
-@element_type
 class TargetTimeSteadyState(Element):
     """Duration of the steady state at the final speed [s]."""
 
     time: float
 
 
-@element_type
 class FinalSpeed(Element, content=Choice(empty_until="1.2")):
     """Final speed of a synchronization."""
 
@@ -264,7 +237,6 @@ class FinalSpeed(Element, content=Choice(empty_until="1.2")):
     relative_speed_to_master: RelativeSpeedToMaster | None = None
 
 
-@element_type
 class SynchronizeAction(Element, content=ALL):
     """Action that reaches a position at the arrival time of the master; tolerances [m]."""
 
@@ -276,26 +248,22 @@ class SynchronizeAction(Element, content=ALL):
     final_speed: FinalSpeed | None = None
 
 
-@element_type
 class TeleportAction(Element):
     """Action that teleports an entity to a position."""
 
     position: Position
 
 
-@element_type
 class ConnectTrailerAction(Element):
     """Connection of a trailer."""
 
     trailer_ref: EntityName
 
 
-@element_type
 class DisconnectTrailerAction(Element):
     """Disconnection of the trailer."""
 
 
-@element_type
 class TrailerAction(Element, content=CHOICE):
     """Action that connects or disconnects a trailer."""
 
@@ -303,7 +271,6 @@ class TrailerAction(Element, content=CHOICE):
     disconnect_trailer_action: DisconnectTrailerAction | None = None
 
 
-@element_type
 class PrivateAction(Element, content=Choice(empty_until="1.2")):
     """Choice of one private action."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.openscenario.model.declarations import CatalogReference, ParameterDeclarations, UnsignedInt
-from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, children, element_type
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, children
 from eidrive_scenario.openscenario.model.enumerations import (
     FollowingMode,
     LaneLayerType,
@@ -15,7 +15,6 @@ from eidrive_scenario.openscenario.model.enumerations import (
 from eidrive_scenario.openscenario.model.positions import Position, TrajectoryRef
 
 
-@element_type
 class Waypoint(Element):
     """Point of a route and the strategy of the routing to it."""
 
@@ -23,7 +22,6 @@ class Waypoint(Element):
     position: Position
 
 
-@element_type
 class Route(Element):
     """Route as ordered waypoints."""
 
@@ -33,7 +31,6 @@ class Route(Element):
     waypoint: tuple[Waypoint, ...] = children(minimum=2)
 
 
-@element_type
 class Motion(Element):
     """Motion at a point of a trajectory: speed [m/s] and acceleration [m/s²] along it."""
 
@@ -41,7 +38,6 @@ class Motion(Element):
     acceleration_longitudinal: float | None = attribute(name="acceleration_longitudinal")
 
 
-@element_type
 class Vertex(Element):
     """Vertex of a polyline; time [s]."""
 
@@ -50,12 +46,10 @@ class Vertex(Element):
     motion: Motion | None = child(since="1.4")
 
 
-@element_type
 class Interpolation(Element):
     """Interpolation between the vertices of a polyline by the tool."""
 
 
-@element_type
 class Polyline(Element):
     """Polyline between vertices."""
 
@@ -63,7 +57,6 @@ class Polyline(Element):
     interpolation: Interpolation | None = child(since="1.4")
 
 
-@element_type
 class Clothoid(Element):
     """Curve with linearly changing curvature [1/m]; length [m], times [s]."""
 
@@ -78,7 +71,6 @@ class Clothoid(Element):
     motion_end: Motion | None = child(since="1.4")
 
 
-@element_type
 class ClothoidSplineSegment(Element):
     """Segment of a clothoid spline: curvatures [1/m], length [m], heading offset [rad], time [s]."""
 
@@ -91,7 +83,6 @@ class ClothoidSplineSegment(Element):
     motion_start: Motion | None = child(since="1.4")
 
 
-@element_type
 class ClothoidSpline(Element):
     """Sequence of clothoids; end time [s]."""
 
@@ -100,7 +91,6 @@ class ClothoidSpline(Element):
     motion_end: Motion | None = child(since="1.4")
 
 
-@element_type
 class ControlPoint(Element):
     """Control point of a NURBS; time [s]."""
 
@@ -109,14 +99,12 @@ class ControlPoint(Element):
     position: Position
 
 
-@element_type
 class Knot(Element):
     """Value of the knot vector."""
 
     value: float
 
 
-@element_type
 class Nurbs(Element):
     """Non-uniform rational B-spline."""
 
@@ -125,7 +113,6 @@ class Nurbs(Element):
     knot: tuple[Knot, ...] = children(minimum=2)
 
 
-@element_type
 class Shape(Element, content=Choice(empty_until="1.2")):
     """Choice of the shape of a trajectory."""
 
@@ -135,7 +122,6 @@ class Shape(Element, content=Choice(empty_until="1.2")):
     nurbs: Nurbs | None = None
 
 
-@element_type
 class Trajectory(Element):
     """Curve in space, optionally with times."""
 
@@ -145,12 +131,10 @@ class Trajectory(Element):
     shape: Shape
 
 
-@element_type
 class None_(Element):
     """Time reference of a trajectory without timing."""
 
 
-@element_type
 class Timing(Element):
     """Timing of a trajectory: absolute or relative, with scale and offset [s]."""
 
@@ -159,7 +143,6 @@ class Timing(Element):
     scale: float
 
 
-@element_type
 class TimeReference(Element, content=Choice(empty_until="1.2")):
     """Choice whether the times of a trajectory apply."""
 
@@ -167,14 +150,12 @@ class TimeReference(Element, content=Choice(empty_until="1.2")):
     timing: Timing | None = None
 
 
-@element_type
 class TrajectoryFollowingMode(Element):
     """Mode of following: exactly, or within the limits of the vehicle."""
 
     following_mode: FollowingMode
 
 
-@element_type
 class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
     """Action that assigns a route to an entity."""
 
@@ -182,7 +163,6 @@ class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@element_type
 class FollowTrajectoryAction(Element, content=ALL):
     """Action that moves an entity along a trajectory; initial offset [m]."""
 
@@ -194,26 +174,22 @@ class FollowTrajectoryAction(Element, content=ALL):
     trajectory_ref: TrajectoryRef | None = child(since="1.1")
 
 
-@element_type
 class AcquirePositionAction(Element, content=ALL):
     """Action that routes an entity to a position."""
 
     position: Position
 
 
-@element_type
 class RandomRouteAction(Element):
     """Action that lets the engine choose the route."""
 
 
-@element_type
 class PreferredLaneLayerAction(Element):
     """Action that sets the lane layer that an entity prefers."""
 
     layer: LaneLayerType
 
 
-@element_type
 class RoutingAction(Element, content=Choice(empty_until="1.2")):
     """Routing action of an entity."""
 

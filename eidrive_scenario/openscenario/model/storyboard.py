@@ -9,14 +9,13 @@ from eidrive_scenario.openscenario.model.declarations import (
     ParameterDeclarations,
     UnsignedInt,
 )
-from eidrive_scenario.openscenario.model.element import Choice, Element, child, children, element_type
+from eidrive_scenario.openscenario.model.element import Choice, Element, child, children
 from eidrive_scenario.openscenario.model.entities import EntityRef
 from eidrive_scenario.openscenario.model.enumerations import Priority
 from eidrive_scenario.openscenario.model.global_actions import GlobalAction, UserDefinedAction
 from eidrive_scenario.openscenario.model.private_actions import PrivateAction
 
 
-@element_type
 class Action(Element, content=Choice(empty_until="1.2")):
     """Named action of an event."""
 
@@ -26,7 +25,6 @@ class Action(Element, content=Choice(empty_until="1.2")):
     private_action: PrivateAction | None = None
 
 
-@element_type
 class Event(Element):
     """Actions with a common start trigger."""
 
@@ -37,7 +35,6 @@ class Event(Element):
     start_trigger: Trigger | None = child(required_until="1.0")
 
 
-@element_type
 class Maneuver(Element):
     """Group of events."""
 
@@ -46,7 +43,6 @@ class Maneuver(Element):
     event: tuple[Event, ...]
 
 
-@element_type
 class Actors(Element):
     """Actors of a maneuver group."""
 
@@ -54,7 +50,6 @@ class Actors(Element):
     entity_ref: tuple[EntityRef, ...] = ()
 
 
-@element_type
 class ManeuverGroup(Element):
     """Maneuvers and their actors."""
 
@@ -65,7 +60,6 @@ class ManeuverGroup(Element):
     maneuver: tuple[Maneuver, ...] = ()
 
 
-@element_type
 class Act(Element):
     """Part of a story with start and stop triggers."""
 
@@ -75,7 +69,6 @@ class Act(Element):
     stop_trigger: Trigger | None = None
 
 
-@element_type
 class Story(Element):
     """Group of acts."""
 
@@ -84,7 +77,6 @@ class Story(Element):
     act: tuple[Act, ...]
 
 
-@element_type
 class Private(Element):
     """Initial actions of one entity."""
 
@@ -92,7 +84,6 @@ class Private(Element):
     private_action: tuple[PrivateAction, ...]
 
 
-@element_type
 class InitActions(Element):
     """Actions before the start of the run."""
 
@@ -101,14 +92,12 @@ class InitActions(Element):
     private: tuple[Private, ...] = ()
 
 
-@element_type
 class Init(Element):
     """Initialization of the storyboard."""
 
     actions: InitActions
 
 
-@element_type
 class Storyboard(Element):
     """Initialization, stories, and stop trigger of the run."""
 

@@ -23,7 +23,6 @@ from eidrive_scenario.openscenario.model.element import (
     child,
     children,
     choice,
-    element_type,
     sequence,
 )
 from eidrive_scenario.openscenario.model.entities import ScenarioObjectTemplate
@@ -34,14 +33,12 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.distributions import Range
 
 
-@element_type
 class CentralSwarmObject(Element):
     """Central entity of a swarm."""
 
     entity_ref: EntityName
 
 
-@element_type
 class VehicleCategoryDistributionEntry(Element):
     """Category of vehicles and its share."""
 
@@ -49,14 +46,12 @@ class VehicleCategoryDistributionEntry(Element):
     weight: float
 
 
-@element_type
 class VehicleCategoryDistribution(Element):
     """Categories of vehicles, by shares."""
 
     vehicle_category_distribution_entry: tuple[VehicleCategoryDistributionEntry, ...]
 
 
-@element_type
 class VehicleRoleDistributionEntry(Element):
     """Role of vehicles and its share."""
 
@@ -64,14 +59,12 @@ class VehicleRoleDistributionEntry(Element):
     weight: float
 
 
-@element_type
 class VehicleRoleDistribution(Element):
     """Roles of vehicles, by shares."""
 
     vehicle_role_distribution_entry: tuple[VehicleRoleDistributionEntry, ...]
 
 
-@element_type
 class TrafficDefinition(Element, content=ALL):
     """Composition of traffic (before 1.3)."""
 
@@ -81,7 +74,6 @@ class TrafficDefinition(Element, content=ALL):
     controller_distribution: ControllerDistribution
 
 
-@element_type
 class EntityDistributionEntry(Element):
     """Entity template and its share."""
 
@@ -89,14 +81,12 @@ class EntityDistributionEntry(Element):
     scenario_object_template: ScenarioObjectTemplate
 
 
-@element_type
 class EntityDistribution(Element):
     """Entity templates, by shares."""
 
     entity_distribution_entry: tuple[EntityDistributionEntry, ...]
 
 
-@element_type
 class TrafficDistributionEntry(Element):
     """Kind of traffic and its share."""
 
@@ -107,7 +97,6 @@ class TrafficDistributionEntry(Element):
     parameter_declarations: ParameterDeclarations | None = child(since="1.4")
 
 
-@element_type
 class TrafficDistribution(
     Element,
     content=Changed(
@@ -127,7 +116,6 @@ class TrafficDistribution(
     catalog_references: tuple[CatalogReference, ...] = children(since="1.4")
 
 
-@element_type
 class AreaDistribution(Element):
     """Shares of a swarm in front, behind, left and right (1.2)."""
 
@@ -137,7 +125,6 @@ class AreaDistribution(Element):
     right: float
 
 
-@element_type
 class DirectionOfTravelDistribution(Element):
     """Shares of a swarm in the same and in the opposite direction."""
 
@@ -145,7 +132,6 @@ class DirectionOfTravelDistribution(Element):
     opposite: float
 
 
-@element_type
 class TrafficSourceAction(Element, content=ALL):
     """Source of traffic at a position: radius [m], rate [1/s], speed [m/s]."""
 
@@ -158,7 +144,6 @@ class TrafficSourceAction(Element, content=ALL):
     traffic_distribution: TrafficDistribution | None = child(since="1.3")
 
 
-@element_type
 class TrafficSinkAction(Element, content=ALL):
     """Sink of traffic at a position: radius [m], rate [1/s]."""
 
@@ -168,7 +153,6 @@ class TrafficSinkAction(Element, content=ALL):
     traffic_definition: TrafficDefinition | None = child(deprecated="1.3")
 
 
-@element_type
 class TrafficSwarmAction(Element, content=ALL):
     """Swarm of traffic around an entity, between two ellipses [m]."""
 
@@ -187,14 +171,12 @@ class TrafficSwarmAction(Element, content=ALL):
     direction_of_travel_distribution: DirectionOfTravelDistribution | None = child(since="1.2")
 
 
-@element_type
 class Lane(Element):
     """Lane by its id."""
 
     id: int
 
 
-@element_type
 class RoadCursor(Element):
     """Position along a road [m], and the lanes there."""
 
@@ -203,7 +185,6 @@ class RoadCursor(Element):
     lane: tuple[Lane, ...] = ()
 
 
-@element_type
 class RoadRange(Element):
     """Road section between cursors; length [m]."""
 
@@ -211,14 +192,12 @@ class RoadRange(Element):
     road_cursor: tuple[RoadCursor, ...] = children(minimum=2)
 
 
-@element_type
 class Polygon(Element):
     """Area by the corners of a polygon."""
 
     position: tuple[Position, ...] = children(minimum=3)
 
 
-@element_type
 class TrafficArea(Element, content=CHOICE):
     """Area of traffic."""
 
@@ -226,7 +205,6 @@ class TrafficArea(Element, content=CHOICE):
     road_range: tuple[RoadRange, ...] = ()
 
 
-@element_type
 class TrafficAreaAction(Element, content=ALL):
     """Action that keeps a number of entities in an area."""
 
@@ -236,12 +214,10 @@ class TrafficAreaAction(Element, content=ALL):
     traffic_area: TrafficArea
 
 
-@element_type
 class TrafficStopAction(Element):
     """Stop of the traffic of a name."""
 
 
-@element_type
 class TrafficAction(Element, content=Choice(empty_until="1.2")):
     """Action that starts or stops background traffic."""
 

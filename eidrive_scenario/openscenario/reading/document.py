@@ -9,7 +9,7 @@ import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.reading.parsing import Document, Source, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
@@ -71,8 +71,7 @@ def version_of(document: Document, collector: DiagnosticCollector, older: Versio
             f"remove xmlns={name.namespace!r}: the standard has no namespace"
             if in_namespace
             else "check the kind of the file",
-            source=document.name,
-            line=line_of(root),
+            at=Location(document.name, line_of(root)),
         )
         return None
     header = root.find("FileHeader")
@@ -80,8 +79,7 @@ def version_of(document: Document, collector: DiagnosticCollector, older: Versio
         collector.error(
             "OpenSCENARIO lacks the element FileHeader",
             "its revMajor and revMinor specify the version of the standard",
-            source=document.name,
-            line=line_of(root),
+            at=Location(document.name, line_of(root)),
         )
         return None
     return _revision(header, document, collector, older)
@@ -96,7 +94,7 @@ def _revision(
         if text is None or not (text.strip().isascii() and text.strip().isdigit()):
             problem = f"lacks the attribute {name!r}" if text is None else f"has the {name} {text!r}"
             hint = "version 1.4 is revMajor 1 and revMinor 4"
-            collector.error(f"FileHeader {problem}", hint, source=document.name, line=line_of(header))
+            collector.error(f"FileHeader {problem}", hint, at=Location(document.name, line_of(header)))
             return None
         numbers.append(int(text.strip()[:9]))
     version = (numbers[0], numbers[1])
@@ -105,5 +103,5 @@ def _revision(
     known = "known: " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
     report = collector.warning if older and version < older else collector.error
     message = f"FileHeader has the version {version[0]}.{version[1]}"
-    report(message, known, source=document.name, line=line_of(header))
+    report(message, known, at=Location(document.name, line_of(header)))
     return older if older and version < older else None

@@ -11,28 +11,17 @@ from lxml import etree
 
 from eidrive_scenario.errors import quoted, suggestion
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    Action,
-    Catalog,
-    CatalogReference,
-    CustomCommandAction,
-    Element,
-    Enumeration,
-    ObjectController,
-    ParameterDeclaration,
-    ParameterDeclarations,
-    Property,
-)
-from eidrive_scenario.openscenario.model.element import field_defaults, incomplete_element
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
+from eidrive_scenario.openscenario.model.element import incomplete_element
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, check_children, rules
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope, declare
+from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope, declare
 from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version, availability
 
 _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
 _IGNORED = {_SCHEMA_INSTANCE + "noNamespaceSchemaLocation", _SCHEMA_INSTANCE + "schemaLocation"}
-_MAY_BE_EMPTY = (Action, ObjectController)
+_MAY_BE_EMPTY = (model.Action, model.ObjectController)
 """Classes that may be empty up to 1.2: an action without effect, an object without a controller."""
 _INFINITE = ("inf", "-inf")
 _WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
@@ -42,11 +31,11 @@ _WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
 class FoundReference(msgspec.Struct, frozen=True):
     """Catalog reference and the kinds of entries that are allowed for it."""
 
-    reference: CatalogReference
-    kinds: tuple[type[Element], ...]
+    reference: model.CatalogReference
+    kinds: tuple[type[model.Element], ...]
 
 
-ReadElement = tuple[Element, tuple[FoundReference, ...]]
+ReadElement = tuple[model.Element, tuple[FoundReference, ...]]
 """Element and the catalog references in it."""
 
 
@@ -83,10 +72,10 @@ class Reader:
     def read(
         self,
         node: etree._Element,
-        cls: type[Element],
+        cls: type[model.Element],
         assignments: Mapping[str, Assignment] | None = None,
         lent: Scope | None = None,
-    ) -> Element:
+    ) -> model.Element:
         """Read an element with its descendants.
 
         assignments  values of the parameters that it declares
@@ -100,8 +89,8 @@ class Reader:
         return element
 
     def _any_element(
-        self, node: etree._Element, cls: type[Element], scope: Scope, assignments: dict[str, Assignment]
-    ) -> Element:
+        self, node: etree._Element, cls: type[model.Element], scope: Scope, assignments: dict[str, Assignment]
+    ) -> model.Element:
         """Return the element of an earlier reading, or read it."""
         if self._read is None:
             return self._element(node, cls, scope, assignments)
@@ -117,11 +106,11 @@ class Reader:
         return element
 
     def _element(
-        self, node: etree._Element, cls: type[Element], scope: Scope, assignments: dict[str, Assignment]
-    ) -> Element:
+        self, node: etree._Element, cls: type[model.Element], scope: Scope, assignments: dict[str, Assignment]
+    ) -> model.Element:
         known = rules(cls, self.version)
         values: dict[str, Any] = {"line": line_of(node), "source": self.source}
-        if "sibling_index" in field_defaults(cls):
+        if "sibling_index" in cls.field_defaults:
             values["sibling_index"] = cast(etree._Element, node.getparent()).index(node)
         children = list(node.iterchildren(etree.Element))
         if "ParameterDeclarations" in known.children:
@@ -133,9 +122,9 @@ class Reader:
                 values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
         self._attributes(node, known, scope, values)
         self._text(node, known, values)
-        if cls is Property or cls is CustomCommandAction:
+        if cls is model.Property or cls is model.CustomCommandAction:
             self._keep_scope(node, scope, values)
-        repeated: dict[str, list[Element]] = {}
+        repeated: dict[str, list[model.Element]] = {}
         for child in children:
             self._child(node, child, known, scope, values, repeated)
         values.update((name, tuple(found)) for name, found in repeated.items())
@@ -182,7 +171,7 @@ class Reader:
                 self._error(message, str(error), node)
         if rule.deprecated:
             self._deprecated(f"the attribute {name!r} of {node.tag}", rule.deprecated, node)
-        if isinstance(value, Enumeration) and rule.scalar.is_deprecated(value):
+        if isinstance(value, model.Enumeration) and rule.scalar.is_deprecated(value):
             self._deprecated(f"{value.value!r} of {type(value).__name__}", value.usage.deprecated, node)
         return value
 
@@ -217,8 +206,7 @@ class Reader:
             self.collector.warning(
                 f"{node.tag} contains white space; the schema allows no content",
                 f"write <{node.tag} …/>",
-                source=self.source,
-                line=line_of(node),
+                at=Location(self.source, line_of(node)),
             )
 
     def _child(
@@ -228,14 +216,14 @@ class Reader:
         known: Rules,
         scope: Scope,
         values: dict[str, Any],
-        repeated: dict[str, list[Element]],
+        repeated: dict[str, list[model.Element]],
     ) -> None:
         rule = known.children.get(child.tag)
         if rule is None:
             return
         if rule.deprecated:
             self._deprecated(f"{child.tag} in {node.tag}", rule.deprecated, child)
-        if rule.cls is ParameterDeclarations:
+        if rule.cls is model.ParameterDeclarations:
             return
         element = self._any_element(child, rule.cls, scope, {})
         if rule.many:
@@ -243,15 +231,15 @@ class Reader:
         else:
             values.setdefault(rule.field, element)
 
-    def _report_empty(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
+    def _report_empty(self, node: etree._Element, cls: type[model.Element], known: Rules) -> None:
         """Report an empty choice, which the schemas up to 1.2 allow; a warning for classes that files leave empty."""
         report = self.collector.warning if cls in _MAY_BE_EMPTY else self.collector.error
         hint = "it contains one of " + ", ".join(known.choice)
-        report(f"{node.tag} is empty", hint, source=self.source, line=line_of(node))
+        report(f"{node.tag} is empty", hint, at=Location(self.source, line_of(node)))
 
-    def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
+    def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> model.Element:
         """Read declarations in their order, so that each may use those before it."""
-        known = rules(ParameterDeclarations, self.version)
+        known = rules(model.ParameterDeclarations, self.version)
         values: dict[str, Any] = {"line": line_of(node), "source": self.source}
         children = list(node.iterchildren(etree.Element))
         self._attributes(node, known, scope, values)
@@ -261,23 +249,27 @@ class Reader:
         for child in children:
             if child.tag in known.children:
                 errors_before = self._error_count
-                declaration = self._element(child, ParameterDeclaration, scope, {})
+                declaration = self._element(child, model.ParameterDeclaration, scope, {})
                 is_valid = self._error_count == errors_before
-                declared.append(self._declare(cast(ParameterDeclaration, declaration), scope, assignments, is_valid))
+                declared.append(
+                    self._declare(cast(model.ParameterDeclaration, declaration), scope, assignments, is_valid)
+                )
         values["parameter_declaration"] = tuple(declared)
         self._unknown_parameters(assignments, scope.parameters)
         assignments.clear()
-        return incomplete_element(ParameterDeclarations, values)
+        return incomplete_element(model.ParameterDeclarations, values)
 
     def _declare(
-        self, declaration: ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], is_valid: bool
-    ) -> ParameterDeclaration:
+        self, declaration: model.ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], is_valid: bool
+    ) -> model.ParameterDeclaration:
         """Add a parameter to its scope, and return the declaration with its final value."""
         name = str(declaration.name)
         assignment = assignments.pop(name, None)
         other = scope.parameters.get(name)
         if other is not None:
-            self._report_duplicate(declaration, other)
+            message = f"parameter {declaration.name!r} is declared twice"
+            report = self.collector.warning if declaration.value == other.declared else self.collector.error
+            report(message, "rename or remove one", at=Location(self.source, declaration.line))
             return replace(declaration, value=other.text)
         if not is_valid:
             scope.parameters[name] = Parameter(name, "", "", "", is_valid=False)
@@ -285,19 +277,14 @@ class Reader:
         declare(scope, declaration, assignment, self.collector)
         return replace(declaration, value=assignment.text) if assignment else declaration
 
-    def _report_duplicate(self, declaration: ParameterDeclaration, other: Parameter) -> None:
-        message = f"parameter {declaration.name!r} is declared twice"
-        report = self.collector.warning if declaration.value == other.declared else self.collector.error
-        report(message, "rename or remove one", source=self.source, line=declaration.line)
-
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
             origin = assignment.origin or Location(self.source)
             hint = suggestion(name, declared)
-            self.collector.error(f"unknown parameter {name!r}", hint, source=origin.source, line=origin.line)
+            self.collector.error(f"unknown parameter {name!r}", hint, at=origin)
 
     def _note_references(self, known: Rules, value: Any) -> None:
-        entries = {child.cls for child in rules(Catalog, self.version).children.values()}
+        entries = {child.cls for child in rules(model.Catalog, self.version).children.values()}
         kinds = tuple(child.cls for child in known.children.values() if child.cls in entries)
         references = value if isinstance(value, tuple) else (value,)
         self.references.extend(FoundReference(reference, kinds) for reference in references)
@@ -305,13 +292,13 @@ class Reader:
     def _warn_of_python(self, name: str, node: etree._Element, text: str, effect: str, hint: str) -> None:
         """Warn of a Python literal that XML does not have; scenariogeneration 0.16 writes some."""
         message = f"{name} of {node.tag} is {quoted(text)}, {effect}"
-        self.collector.warning(message, hint, source=self.source, line=line_of(node))
+        self.collector.warning(message, hint, at=Location(self.source, line_of(node)))
 
     def _deprecated(self, subject: str, since: str, node: etree._Element) -> None:
         self.collector.warning(
-            f"{subject} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
+            f"{subject} is deprecated since OpenSCENARIO {since}", at=Location(self.source, line_of(node))
         )
 
     def _error(self, message: str, hint: str, node: etree._Element) -> None:
         self._error_count += 1
-        self.collector.error(message, hint, source=self.source, line=line_of(node))
+        self.collector.error(message, hint, at=Location(self.source, line_of(node)))

@@ -13,7 +13,7 @@ import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
 from eidrive_scenario.openscenario.values.scalars import Version
 
 
@@ -44,7 +44,7 @@ def apply_workarounds(
         return root
     for node in deviating:
         workaround = by_tag[str(node.tag)]
-        collector.warning(workaround.message, workaround.hint, source=name, line=line_of(node))
+        collector.warning(workaround.message, workaround.hint, at=Location(name, line_of(node)))
     repaired = copy.deepcopy(root)
     for node in list(repaired.iter(*by_tag)):
         workaround = by_tag[str(node.tag)]

@@ -11,56 +11,31 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from eidrive_scenario.errors import suggestion
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_criterion
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    Act,
-    Action,
-    CatalogReference,
-    Condition,
-    Controller,
-    Element,
-    Entities,
-    Event,
-    Maneuver,
-    ManeuverGroup,
-    MonitorDeclaration,
-    ObjectController,
-    OpenScenario,
-    ParameterAssignment,
-    ParameterDeclaration,
-    ScenarioObject,
-    Story,
-    Storyboard,
-    StoryboardElementStateCondition,
-    StoryboardElementType,
-    TrafficSignalController,
-    Trailer,
-    VariableDeclaration,
-    Vehicle,
-)
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.values.scalars import Version
 
 
 def scenario_objects(
-    entities: Entities | None, entries: Mapping[CatalogReference, Element]
-) -> Iterator[tuple[ScenarioObject, Element | None]]:
+    entities: model.Entities | None, entries: Mapping[model.CatalogReference, model.Element]
+) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
     """Yield every scenario object and its body, trailers after their towing vehicles; None for an unknown body."""
     for one in entities.scenario_object if entities else ():
         yield from _with_trailers(one, entries)
 
 
 def _with_trailers(
-    one: ScenarioObject, entries: Mapping[CatalogReference, Element]
-) -> Iterator[tuple[ScenarioObject, Element | None]]:
-    body: Element | None = (
+    one: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
+) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
+    body: model.Element | None = (
         one.vehicle or one.pedestrian or one.misc_object or one.external_object_reference or one.sensor
     )
     if body is None and one.catalog_reference is not None:
         body = entries.get(one.catalog_reference)
     yield one, body
-    if isinstance(body, Vehicle) and body.trailer is not None and body.trailer.trailer is not None:
+    if isinstance(body, model.Vehicle) and body.trailer is not None and body.trailer.trailer is not None:
         yield from _with_trailers(body.trailer.trailer, entries)
 
 
@@ -69,13 +44,13 @@ T = TypeVar("T")
 SEPARATOR = re.compile(r"::|/")
 """Separators of names in references: `::` in the standard, a slash in many files."""
 
-LEVELS: Mapping[type[Element], StoryboardElementType] = {
-    Story: StoryboardElementType.STORY,
-    Act: StoryboardElementType.ACT,
-    ManeuverGroup: StoryboardElementType.MANEUVER_GROUP,
-    Maneuver: StoryboardElementType.MANEUVER,
-    Event: StoryboardElementType.EVENT,
-    Action: StoryboardElementType.ACTION,
+LEVELS: Mapping[type[model.Element], model.StoryboardElementType] = {
+    model.Story: model.StoryboardElementType.STORY,
+    model.Act: model.StoryboardElementType.ACT,
+    model.ManeuverGroup: model.StoryboardElementType.MANEUVER_GROUP,
+    model.Maneuver: model.StoryboardElementType.MANEUVER,
+    model.Event: model.StoryboardElementType.EVENT,
+    model.Action: model.StoryboardElementType.ACTION,
 }
 
 
@@ -83,11 +58,11 @@ LEVELS: Mapping[type[Element], StoryboardElementType] = {
 class NamedElement:
     """Element of the storyboard with its path of names from the story on."""
 
-    element: Element
+    element: model.Element
     path: tuple[str, ...]
 
     @property
-    def level(self) -> StoryboardElementType:
+    def level(self) -> model.StoryboardElementType:
         """Return the level: story, act, maneuver group, maneuver, event or action."""
         return LEVELS[type(self.element)]
 
@@ -95,25 +70,27 @@ class NamedElement:
 class StoryboardNames:
     """Named elements of a storyboard, including maneuvers from catalogs."""
 
-    def __init__(self, storyboard: Storyboard | None, entries: Mapping[CatalogReference, Element]) -> None:
+    def __init__(
+        self, storyboard: model.Storyboard | None, entries: Mapping[model.CatalogReference, model.Element]
+    ) -> None:
         self._entries = entries
         self.named = [named for story in (storyboard.story if storyboard else ()) for named in self._below(story, ())]
         self._references = ReferenceMatch((named.path, named) for named in self.named)
 
-    def _below(self, element: Element, above: tuple[str, ...]) -> Iterator[NamedElement]:
+    def _below(self, element: model.Element, above: tuple[str, ...]) -> Iterator[NamedElement]:
         path = (*above, str(getattr(element, "name", "")))
         yield NamedElement(element, path)
         for child in element.children():
-            if isinstance(child, CatalogReference):
+            if isinstance(child, model.CatalogReference):
                 entry = self._entries.get(child)
-                if isinstance(entry, Maneuver):
+                if isinstance(entry, model.Maneuver):
                     yield from self._below(entry, path)
             elif type(child) in LEVELS:
                 yield from self._below(child, path)
 
     def check_unique(self, collector: DiagnosticCollector) -> None:
         """Warn of siblings of one kind with the same name, as references to them are ambiguous."""
-        seen: dict[tuple[StoryboardElementType, tuple[str, ...]], Element] = {}
+        seen: dict[tuple[model.StoryboardElementType, tuple[str, ...]], model.Element] = {}
         for named in self.named:
             key = (named.level, named.path)
             other = seen.setdefault(key, named.element)
@@ -121,14 +98,13 @@ class StoryboardNames:
                 collector.warning(
                     f"two elements of the kind {named.level.value} are named {named.path[-1]!r}",
                     f"the other one is in line {other.line}",
-                    source=named.element.source,
-                    line=named.element.line,
+                    at=named.element,
                 )
 
-    def check_reference(self, condition: StoryboardElementStateCondition, collector: DiagnosticCollector) -> None:
+    def check_reference(self, condition: model.StoryboardElementStateCondition, collector: DiagnosticCollector) -> None:
         """Report a condition on an element that does not exist or is of another kind."""
         reference: str | None = condition.storyboard_element_ref
-        level: StoryboardElementType | None = condition.storyboard_element_type
+        level: model.StoryboardElementType | None = condition.storyboard_element_type
         if reference is None or level is None:
             return
         found = self._references.by(reference)
@@ -140,7 +116,7 @@ class StoryboardNames:
         else:
             message = f"storyboardElementRef refers to {level.value} {reference!r}, which does not exist"
             hint = suggestion(reference, {named.path[-1] for named in self.named if named.level is level})
-        collector.error(message, hint, source=condition.source, line=condition.line)
+        collector.error(message, hint, at=condition)
 
 
 class ReferenceMatch(Generic[T]):
@@ -177,27 +153,27 @@ def is_suffix(reference: str, path: tuple[str, ...]) -> bool:
     return all(name in above for name in names[:-1])
 
 
-_DECLARED_BY: Mapping[type[Element], str] = {
-    ParameterDeclaration: "parameter",
-    VariableDeclaration: "variable",
-    MonitorDeclaration: "monitor",
-    TrafficSignalController: "signal controller",
-    Controller: "controller",
-    ObjectController: "controller",
+_DECLARED_BY: Mapping[type[model.Element], str] = {
+    model.ParameterDeclaration: "parameter",
+    model.VariableDeclaration: "variable",
+    model.MonitorDeclaration: "monitor",
+    model.TrafficSignalController: "signal controller",
+    model.Controller: "controller",
+    model.ObjectController: "controller",
 }
 _UNIQUE = ("entity", "variable", "monitor", "signal controller")
 
 
 def check_names(
-    root: OpenScenario,
-    elements: Iterable[Element],
+    root: model.OpenScenario,
+    elements: Iterable[model.Element],
     version: Version,
-    entries: Mapping[CatalogReference, Element],
+    entries: Mapping[model.CatalogReference, model.Element],
     collector: DiagnosticCollector,
 ) -> None:
     """Report duplicate names and references to missing elements."""
     elements = list(elements)
-    known: dict[str, dict[str, Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
+    known: dict[str, dict[str, model.Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
     unnamed: set[str] = set()
     for kind, name, element in _definitions(root, elements, entries):
         if name is None:
@@ -207,27 +183,28 @@ def check_names(
             collector.error(
                 f"two {_plural(kind)} are named {name!r}",
                 f"the other one is in line {known[kind][name].line}; rename one",
-                source=element.source,
-                line=element.line,
+                at=element,
             )
         known[kind].setdefault(name, element)
     complete = {kind: names for kind, names in known.items() if kind not in unnamed}
     exempt = {id(parameter) for element in elements for parameter in _undeclared_parameter(element)}
     exempt |= {
-        id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _has_no_trailer(element)
+        id(element.trailer_ref)
+        for element in elements
+        if isinstance(element, model.Trailer) and _has_no_trailer(element)
     }
     storyboard = StoryboardNames(root.storyboard, entries)
     storyboard.check_unique(collector)
     for element in elements:
-        if isinstance(element, StoryboardElementStateCondition):
+        if isinstance(element, model.StoryboardElementStateCondition):
             storyboard.check_reference(element, collector)
-        elif not isinstance(element, ParameterAssignment) and id(element) not in exempt:
+        elif not isinstance(element, model.ParameterAssignment) and id(element) not in exempt:
             _check_references(element, version, complete, collector)
 
 
 def _definitions(
-    root: OpenScenario, elements: Iterable[Element], entries: Mapping[CatalogReference, Element]
-) -> Iterator[tuple[str, str | None, Element]]:
+    root: model.OpenScenario, elements: Iterable[model.Element], entries: Mapping[model.CatalogReference, model.Element]
+) -> Iterator[tuple[str, str | None, model.Element]]:
     """Yield every defined name with its kind and element; None for a name that could not be read."""
     for one, _ in scenario_objects(root.entities, entries):
         yield "entity", one.name, one
@@ -235,23 +212,26 @@ def _definitions(
         yield "entity", selection.name, selection
     for element in elements:
         kind = _DECLARED_BY.get(type(element))
-        if kind is not None and not (isinstance(element, ObjectController) and element.name is None):
+        if kind is not None and not (isinstance(element, model.ObjectController) and element.name is None):
             yield kind, getattr(element, "name", None), element
 
 
-def _undeclared_parameter(element: Element) -> Iterator[Element]:
+def _undeclared_parameter(element: model.Element) -> Iterator[model.Element]:
     """Yield the ParameterCondition of a criterion of ScenarioRunner, whose parameter need not be declared."""
-    if isinstance(element, Condition) and element.by_value_condition is not None and is_criterion(element):
+    if isinstance(element, model.Condition) and element.by_value_condition is not None and is_criterion(element):
         yield from element.by_value_condition.children()
 
 
-def _has_no_trailer(trailer: Trailer) -> bool:
+def _has_no_trailer(trailer: model.Trailer) -> bool:
     """Whether a trailer has an empty reference, the default of catalog vehicles with a trailer parameter."""
     return trailer.trailer_ref is not None and trailer.trailer_ref.entity_ref == ""
 
 
 def _check_references(
-    element: Element, version: Version, known: Mapping[str, Mapping[str, Element]], collector: DiagnosticCollector
+    element: model.Element,
+    version: Version,
+    known: Mapping[str, Mapping[str, model.Element]],
+    collector: DiagnosticCollector,
 ) -> None:
     for spelling, rule in rules(type(element), version).attributes.items():
         kind = rule.points_to
@@ -260,8 +240,7 @@ def _check_references(
             collector.error(
                 f"{spelling} of {type(element).__name__} refers to {kind} {name!r}, which does not exist",
                 suggestion(name, known[kind]),
-                source=element.source,
-                line=element.line,
+                at=element,
             )
 
 

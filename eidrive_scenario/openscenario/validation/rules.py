@@ -10,99 +10,43 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import (
-    AbsoluteTargetLane,
-    AngleCondition,
-    AnimationAction,
-    Axle,
-    CatalogReference,
-    Clothoid,
-    ClothoidSpline,
-    ClothoidSplineSegment,
-    Condition,
-    ControlPoint,
-    Dimensions,
-    DynamicConstraints,
-    DynamicsDimension,
-    Element,
-    EndOfRoadCondition,
-    Fog,
-    FollowTrajectoryAction,
-    LaneLayerType,
-    LaneOffsetActionDynamics,
-    LanePosition,
-    LightState,
-    LightStateAction,
-    LongitudinalDistanceAction,
-    Nurbs,
-    OffroadCondition,
-    OpenScenario,
-    Orientation,
-    ParameterAction,
-    ParameterDeclaration,
-    ParameterType,
-    Performance,
-    Phase,
-    Polyline,
-    Precipitation,
-    PreferredLaneLayerAction,
-    Range,
-    ReachPositionCondition,
-    RelativeAngleCondition,
-    RelativeClearanceCondition,
-    RelativeLanePosition,
-    RelativeTargetLane,
-    RoadCondition,
-    SpeedProfileEntry,
-    StandStillCondition,
-    Stochastic,
-    SynchronizeAction,
-    TargetDistanceSteadyState,
-    TargetTimeSteadyState,
-    Timing,
-    TrafficSignalController,
-    TrafficSinkAction,
-    TransitionDynamics,
-    VariableAction,
-    VariableDeclaration,
-    Wind,
-)
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.validation.names import check_names
 from eidrive_scenario.openscenario.values.parameters import TYPES, fits_type
 from eidrive_scenario.openscenario.values.scalars import Version
 
-_WITHOUT_NUMBERS = (ParameterType.BOOLEAN, ParameterType.DATE_TIME, ParameterType.STRING)
+_WITHOUT_NUMBERS = (model.ParameterType.BOOLEAN, model.ParameterType.DATE_TIME, model.ParameterType.STRING)
 _TRUTH = ("true", "false")
 """Boolean texts, which are compared case-insensitively, as Python capitalizes them."""
 
 
-def check_types(elements: Iterable[Element], collector: DiagnosticCollector) -> None:
+def check_types(elements: Iterable[model.Element], collector: DiagnosticCollector) -> None:
     """Warn of values and calculations that contradict the declared type."""
     elements = tuple(elements)
-    types: dict[tuple[str, str], set[ParameterType]] = {}
+    types: dict[tuple[str, str], set[model.ParameterType]] = {}
     for one in elements:
-        if isinstance(one, VariableDeclaration):
+        if isinstance(one, model.VariableDeclaration):
             types.setdefault(("variable", one.name), set()).add(one.variable_type)
             if _misfits(one.value, one.variable_type):
                 declared = one.variable_type.value
                 message = f"variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
-                collector.warning(message, "the value is used as a text", source=one.source, line=one.line)
-        elif isinstance(one, ParameterDeclaration):
+                collector.warning(message, "the value is used as a text", at=one)
+        elif isinstance(one, model.ParameterDeclaration):
             types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
     for one in elements:
-        if isinstance(one, VariableAction):
+        if isinstance(one, model.VariableAction):
             _check_action(one, "variable", one.variable_ref, types.get(("variable", one.variable_ref)), collector)
-        elif isinstance(one, ParameterAction):
+        elif isinstance(one, model.ParameterAction):
             _check_action(one, "parameter", one.parameter_ref, types.get(("parameter", one.parameter_ref)), collector)
 
 
 def _check_action(
-    action: VariableAction | ParameterAction,
+    action: model.VariableAction | model.ParameterAction,
     kind: str,
     name: str,
-    types: set[ParameterType] | None,
+    types: set[model.ParameterType] | None,
     collector: DiagnosticCollector,
 ) -> None:
     """Check one action; the type is unknown if a name has several declarations with different types."""
@@ -112,17 +56,17 @@ def _check_action(
     setting = action.set_action
     if setting is not None and _misfits(setting.value, declared):
         message = f"{kind} {name!r} is declared as {declared.value}, but set to {setting.value!r}"
-        collector.warning(message, "the value is used as a text", source=setting.source, line=setting.line)
+        collector.warning(message, "the value is used as a text", at=setting)
     elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
         message = f"{kind} {name!r} is declared as {declared.value}, but modified as a number"
-        collector.warning(message, "declare it as double", source=action.source, line=action.line)
+        collector.warning(message, "declare it as double", at=action)
 
 
-def _misfits(text: object, declared: ParameterType) -> bool:
+def _misfits(text: object, declared: model.ParameterType) -> bool:
     """Whether a value is not of a type; values that could not be read are already reported."""
-    if not isinstance(text, str) or not isinstance(declared, ParameterType):
+    if not isinstance(text, str) or not isinstance(declared, model.ParameterType):
         return False
-    if declared is ParameterType.BOOLEAN and text.lower() in _TRUTH:
+    if declared is model.ParameterType.BOOLEAN and text.lower() in _TRUTH:
         return False
     return not fits_type(text, TYPES[declared])
 
@@ -131,65 +75,65 @@ MAX_ABSOLUTE = 1e9
 """Maximum absolute value of coordinates [m], times [s] and speeds [m/s]."""
 MIN_POSITIVE = 1e-9
 """Minimum value of lengths and weights by which other numbers are divided, so that no quotient overflows."""
-UNLIMITED: tuple[type[Element], ...] = (
-    DynamicConstraints,
-    Fog,
-    Performance,
-    Phase,
-    Range,
-    Stochastic,
-    TrafficSinkAction,
+UNLIMITED: tuple[type[model.Element], ...] = (
+    model.DynamicConstraints,
+    model.Fog,
+    model.Performance,
+    model.Phase,
+    model.Range,
+    model.Stochastic,
+    model.TrafficSinkAction,
 )
 """Elements whose numbers are limits; an infinite number is no limit."""
-NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
-    AngleCondition: ("angle_tolerance",),
-    AnimationAction: ("animation_duration",),
-    Dimensions: ("length", "width", "height"),
-    DynamicConstraints: (
+NOT_NEGATIVE: Mapping[type[model.Element], tuple[str, ...]] = {
+    model.AngleCondition: ("angle_tolerance",),
+    model.AnimationAction: ("animation_duration",),
+    model.Dimensions: ("length", "width", "height"),
+    model.DynamicConstraints: (
         "max_speed",
         "max_acceleration",
         "max_deceleration",
         "max_acceleration_rate",
         "max_deceleration_rate",
     ),
-    EndOfRoadCondition: ("duration",),
-    FollowTrajectoryAction: ("initial_distance_offset",),
-    LaneOffsetActionDynamics: ("max_lateral_acc",),
-    LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
-    LightStateAction: ("transition_time",),
-    OffroadCondition: ("duration",),
-    Performance: (
+    model.EndOfRoadCondition: ("duration",),
+    model.FollowTrajectoryAction: ("initial_distance_offset",),
+    model.LaneOffsetActionDynamics: ("max_lateral_acc",),
+    model.LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
+    model.LightStateAction: ("transition_time",),
+    model.OffroadCondition: ("duration",),
+    model.Performance: (
         "max_speed",
         "max_acceleration",
         "max_deceleration",
         "max_acceleration_rate",
         "max_deceleration_rate",
     ),
-    Phase: ("duration",),
-    Precipitation: ("intensity", "precipitation_intensity"),
-    ReachPositionCondition: ("tolerance",),
-    RelativeAngleCondition: ("angle_tolerance",),
-    RelativeClearanceCondition: ("distance_forward", "distance_backward"),
-    RoadCondition: ("friction_scale_factor",),
-    SpeedProfileEntry: ("time",),
-    StandStillCondition: ("duration",),
-    SynchronizeAction: ("target_tolerance", "target_tolerance_master"),
-    TargetDistanceSteadyState: ("distance",),
-    TargetTimeSteadyState: ("time",),
-    TrafficSignalController: ("delay",),
-    Wind: ("speed",),
+    model.Phase: ("duration",),
+    model.Precipitation: ("intensity", "precipitation_intensity"),
+    model.ReachPositionCondition: ("tolerance",),
+    model.RelativeAngleCondition: ("angle_tolerance",),
+    model.RelativeClearanceCondition: ("distance_forward", "distance_backward"),
+    model.RoadCondition: ("friction_scale_factor",),
+    model.SpeedProfileEntry: ("time",),
+    model.StandStillCondition: ("duration",),
+    model.SynchronizeAction: ("target_tolerance", "target_tolerance_master"),
+    model.TargetDistanceSteadyState: ("distance",),
+    model.TargetTimeSteadyState: ("time",),
+    model.TrafficSignalController: ("delay",),
+    model.Wind: ("speed",),
 }
 """Attributes that must be at least 0 by the reference of the standard."""
-POSITIVE: Mapping[type[Element], tuple[str, ...]] = {
-    Axle: ("wheel_diameter",),
-    Clothoid: ("length",),
-    ClothoidSplineSegment: ("length",),
-    ControlPoint: ("weight",),
+POSITIVE: Mapping[type[model.Element], tuple[str, ...]] = {
+    model.Axle: ("wheel_diameter",),
+    model.Clothoid: ("length",),
+    model.ClothoidSplineSegment: ("length",),
+    model.ControlPoint: ("weight",),
 }
 """Attributes that must be above 0: at least MIN_POSITIVE."""
 
 
-def unusable(element: Element, version: Version) -> str:
+def unusable(element: model.Element, version: Version) -> str:
     """Return the error of the first unusable number of an element, with the expected value; "" if there is none."""
     kind = type(element)
     for name, value in vars(element).items():
@@ -213,14 +157,14 @@ def unusable(element: Element, version: Version) -> str:
     return ""
 
 
-def _may_be_immense(element: Element, name: str) -> bool:
+def _may_be_immense(element: model.Element, name: str) -> bool:
     """Whether a number may be infinite: limits, values of conditions, and the rate of a step."""
-    if isinstance(element, TransitionDynamics):
-        return element.dynamics_dimension is DynamicsDimension.RATE
+    if isinstance(element, model.TransitionDynamics):
+        return element.dynamics_dimension is model.DynamicsDimension.RATE
     if name == "delay":
         return False
     kind = type(element)
-    is_compared = kind.__name__.endswith("Condition") and kind is not RoadCondition
+    is_compared = kind.__name__.endswith("Condition") and kind is not model.RoadCondition
     return is_compared or isinstance(element, UNLIMITED) or name.startswith("max_")
 
 
@@ -232,11 +176,14 @@ def _format(value: float) -> str:
 
 MAX_NURBS_ORDER = 20
 """Maximum order of a Nurbs. The time per sample grows with its square; roads and maneuvers have orders up to 6."""
-_EMPTY_ORIENTATION = Orientation()
+_EMPTY_ORIENTATION = model.Orientation()
 
 
 def check_rules(
-    root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], collector: DiagnosticCollector
+    root: model.OpenScenario,
+    version: Version,
+    entries: Mapping[model.CatalogReference, model.Element],
+    collector: DiagnosticCollector,
 ) -> None:
     """Report violations of the rules in a scenario and in the catalog entries that it uses."""
     elements = [element for tree in (root, *entries.values()) for element in tree.walk()]
@@ -245,37 +192,39 @@ def check_rules(
     check_names(root, elements, version, entries, collector)
 
 
-def check_values(elements: Sequence[Element], version: Version, collector: DiagnosticCollector) -> None:
+def check_values(elements: Sequence[model.Element], version: Version, collector: DiagnosticCollector) -> None:
     """Report elements with contradictory values or unusable numbers."""
     reported = {(diagnostic.source, diagnostic.line) for diagnostic in collector.errors}
     for element in elements:
         check = _CHECKS.get(type(element))
         message = unusable(element, version) or (check(element) if check else "")
         if message and (element.source, element.line) not in reported:
-            collector.error(message, source=element.source, line=element.line)
-        if isinstance(element, Orientation) and element == _EMPTY_ORIENTATION:
+            collector.error(message, at=element)
+        if isinstance(element, model.Orientation) and element == _EMPTY_ORIENTATION:
             message = "Orientation is empty, which by the standard is heading 0 of the world frame"
             hint = 'omit it, or write type="relative", for the heading of the road'
-            collector.warning(message, hint, source=element.source, line=element.line)
+            collector.warning(message, hint, at=element)
 
 
-def _distance(action: LongitudinalDistanceAction) -> str:
+def _distance(action: model.LongitudinalDistanceAction) -> str:
     count = sum(value is not None for value in (action.distance, action.time_gap))
     return "" if count == 1 else "LongitudinalDistanceAction must have either distance or timeGap"
 
 
-def _lane_position(position: RelativeLanePosition) -> str:
+def _lane_position(position: model.RelativeLanePosition) -> str:
     both = position.ds is not None and position.ds_lane is not None
     return "RelativeLanePosition must have either ds or dsLane" if both else ""
 
 
-def _layer(element: AbsoluteTargetLane | LanePosition | PreferredLaneLayerAction | RelativeTargetLane) -> str:
-    if element.layer is not LaneLayerType.TEMPORARY:
+def _layer(
+    element: model.AbsoluteTargetLane | model.LanePosition | model.PreferredLaneLayerAction | model.RelativeTargetLane,
+) -> str:
+    if element.layer is not model.LaneLayerType.TEMPORARY:
         return ""
     return f"{type(element).__name__} refers to the temporary lane layer, which road networks do not have here"
 
 
-def _nurbs(curve: Nurbs) -> str:
+def _nurbs(curve: model.Nurbs) -> str:
     order: int | None = curve.order
     points, knots = len(curve.control_point or ()), [knot.value for knot in curve.knot or ()]
     if order is None or None in knots:
@@ -295,7 +244,7 @@ def _nurbs(curve: Nurbs) -> str:
     return _descending_times([point.time for point in curve.control_point])
 
 
-def _clothoid_spline(curve: ClothoidSpline) -> str:
+def _clothoid_spline(curve: model.ClothoidSpline) -> str:
     return _descending_times([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
 
 
@@ -306,31 +255,31 @@ def _descending_times(times: Sequence[float | None]) -> str:
     return ""
 
 
-def _transition(dynamics: TransitionDynamics) -> str:
+def _transition(dynamics: model.TransitionDynamics) -> str:
     """Return the error of a negative duration or distance; the sign of a rate has no effect."""
-    if dynamics.value is None or dynamics.value >= 0 or dynamics.dynamics_dimension is DynamicsDimension.RATE:
+    if dynamics.value is None or dynamics.value >= 0 or dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
         return ""
-    unit = "s" if dynamics.dynamics_dimension is DynamicsDimension.TIME else "m"
+    unit = "s" if dynamics.dynamics_dimension is model.DynamicsDimension.TIME else "m"
     return f"a transition cannot take {dynamics.value:g} {unit}"
 
 
-def _timing(timing: Timing) -> str:
+def _timing(timing: model.Timing) -> str:
     is_invalid = timing.scale is not None and timing.scale <= 0
     return f"Timing has the scale {timing.scale:g}; it must be above 0" if is_invalid else ""
 
 
-_CHECKS: Mapping[type[Element], Callable[[Any], str]] = {
-    AbsoluteTargetLane: _layer,
-    Clothoid: lambda curve: _descending_times([curve.start_time, curve.stop_time]),
-    ClothoidSpline: _clothoid_spline,
-    Condition: lambda one: "Condition has a negative delay" if one.delay is not None and one.delay < 0 else "",
-    LanePosition: _layer,
-    LongitudinalDistanceAction: _distance,
-    Nurbs: _nurbs,
-    Polyline: lambda line: _descending_times([vertex.time for vertex in line.vertex or ()]),
-    PreferredLaneLayerAction: _layer,
-    RelativeLanePosition: _lane_position,
-    RelativeTargetLane: _layer,
-    Timing: _timing,
-    TransitionDynamics: _transition,
+_CHECKS: Mapping[type[model.Element], Callable[[Any], str]] = {
+    model.AbsoluteTargetLane: _layer,
+    model.Clothoid: lambda curve: _descending_times([curve.start_time, curve.stop_time]),
+    model.ClothoidSpline: _clothoid_spline,
+    model.Condition: lambda one: "Condition has a negative delay" if one.delay is not None and one.delay < 0 else "",
+    model.LanePosition: _layer,
+    model.LongitudinalDistanceAction: _distance,
+    model.Nurbs: _nurbs,
+    model.Polyline: lambda line: _descending_times([vertex.time for vertex in line.vertex or ()]),
+    model.PreferredLaneLayerAction: _layer,
+    model.RelativeLanePosition: _lane_position,
+    model.RelativeTargetLane: _layer,
+    model.Timing: _timing,
+    model.TransitionDynamics: _transition,
 }

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened, suggestion
-from eidrive_scenario.openscenario.diagnostics import MAX_TEXT, Budget, BudgetError, DiagnosticCollector
-from eidrive_scenario.openscenario.model import Element, ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
+from eidrive_scenario.openscenario.diagnostics import MAX_TEXT, Budget, BudgetError, DiagnosticCollector, Location
+from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
 from eidrive_scenario.openscenario.model.declarations import Limits
 from eidrive_scenario.openscenario.values import expressions
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError, Value
@@ -65,18 +65,6 @@ class Parameter(msgspec.Struct, frozen=True):
         except ValueError:
             return self.text
         return int(number) if number.is_integer() and "." not in self.text else number
-
-
-class Location(NamedTuple):
-    """File and line of a value; "" and None if unknown."""
-
-    source: str = ""
-    line: int | None = None
-
-    @classmethod
-    def of(cls, element: Element) -> Location:
-        """Return the location of an element."""
-        return cls(element.source, element.line)
 
 
 @dataclass(frozen=True)
@@ -209,8 +197,7 @@ def declare(
             f"parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
             f"{quoted(declaration.value)}",
             "the value is used as a text",
-            source=declaration.source,
-            line=declaration.line,
+            at=declaration,
         )
         scalar = STRING
     try:
@@ -219,10 +206,7 @@ def declare(
         value = scalar.convert(text)
     except ValueError as error:
         collector.error(
-            f"parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
-            f"{error}{elsewhere}",
-            source=origin.source,
-            line=origin.line,
+            f"parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}", f"{error}{elsewhere}", at=origin
         )
         scope.parameters[name] = Parameter(name, text[:MAX_TEXT], text[:MAX_TEXT], declaration.value, is_valid=False)
         return
@@ -232,7 +216,7 @@ def declare(
         is_allowed = not groups or any(_holds(group, value, scalar) for group in groups)
     except ValueError as error:
         message = f"a constraint of parameter {name!r} is not {scalar.name}"
-        collector.error(message, str(error), source=declaration.source, line=declaration.line)
+        collector.error(message, str(error), at=declaration)
         return
     if not is_allowed:
         allowed = " or ".join(
@@ -241,8 +225,7 @@ def declare(
         collector.constraint_error(
             f"parameter {name!r} is {quoted(text)}, outside its constraints",
             f"expected {allowed}{elsewhere}",
-            source=origin.source,
-            line=origin.line,
+            at=origin,
         )
 
 

@@ -198,9 +198,9 @@ def cell_edges(values: Sequence[float]) -> Array:
     return np.concatenate([[2 * values[0] - inner[0]], inner, [2 * values[-1] - inner[-1]]])
 
 
-WIDTH, HEIGHT = 6.2, 4.0
+MAP_WIDTH, MAP_HEIGHT = 6.2, 4.0
 """Size of the map [in]; a page scales it to its own width."""
-LEFT, RIGHT, TOP, BOTTOM = 0.11, 0.82, 0.975, 0.13
+MAP_LEFT, MAP_RIGHT, MAP_TOP, MAP_BOTTOM = 0.11, 0.82, 0.975, 0.13
 """Edges of the axes as fractions of the size. The color bar is to the right of them."""
 COLORS = "cividis"
 """Color map from 0 (blue) to 1 (yellow), which color-blind readers can distinguish."""
@@ -227,14 +227,14 @@ def rate_map(
     for (column, row), rate in rates.items():
         shares[row, column] = rate.share
     with rc_context(PAGE_STYLE):
-        figure = Figure(figsize=(WIDTH, HEIGHT), dpi=72.0)
-        axes = figure.add_axes((LEFT, BOTTOM, RIGHT - LEFT, TOP - BOTTOM))
+        figure = Figure(figsize=(MAP_WIDTH, MAP_HEIGHT), dpi=72.0)
+        axes = figure.add_axes((MAP_LEFT, MAP_BOTTOM, MAP_RIGHT - MAP_LEFT, MAP_TOP - MAP_BOTTOM))
         mesh = heat_cells(axes, xs, ys, shares, colors=COLORS, scale=Normalize(0.0, 1.0))
         axes.set_xlabel(x_title)
         axes.set_ylabel(y_title)
         axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
         axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
-        beside = figure.add_axes((RIGHT + 0.03, BOTTOM, 0.03, TOP - BOTTOM))
+        beside = figure.add_axes((MAP_RIGHT + 0.03, MAP_BOTTOM, 0.03, MAP_TOP - MAP_BOTTOM))
         bar = figure.colorbar(mesh, cax=beside, format=PercentFormatter(1.0))
         bar.set_label("success rate")
         beside.tick_params(length=0.0)
@@ -264,7 +264,7 @@ def _tooltips(
     names: tuple[Sequence[str], Sequence[str]],
 ) -> str:
     """Return transparent rectangles above the cells, whose titles a browser shows."""
-    height = 72.0 * HEIGHT
+    height = 72.0 * MAP_HEIGHT
     across = axes.transData.transform([(edge, 0.0) for edge in cell_edges(xs)])[:, 0]
     down = height - axes.transData.transform([(0.0, edge) for edge in cell_edges(ys)])[:, 1]
     found = []

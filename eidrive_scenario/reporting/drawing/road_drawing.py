@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
-from eidrive_scenario.base.geometry import footprint
+from eidrive_scenario.base.geometry import equidistant, footprint
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
@@ -122,14 +122,14 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
         for road in roads
         for section in road.sections
         if section.length > 0.0
-        for stations in _simple_parts(road, section, _stations(section.s, section.end, spacing))
+        for stations in _simple_parts(road, section, equidistant(section.s, section.end, spacing))
     ]
     edges = [part.edges() for part in parts]
     ground = _drawn(zip(parts, edges, strict=True), window, spacing)
     raised: dict[int, list[tuple[_Part, Sequence[_Edges]]]] = {}
     strips = [part.strip(found) for part, found in zip(parts, edges, strict=True)]
     for index, start, end in bridge_spans(strips):
-        over = parts[index]._replace(stations=_stations(start, end, spacing))
+        over = parts[index]._replace(stations=equidistant(start, end, spacing))
         height = over.road.elevation.value((start + end) / 2.0)
         raised.setdefault(math.floor(height / CLEARANCE), []).append((over, over.edges()))
     return replace(ground, above=tuple(_drawn(raised[level], window, spacing) for level in sorted(raised)))
@@ -250,12 +250,6 @@ def _too_large(source: str) -> InputError:
     return InputError(Diagnostic("the road network is too large for a drawing", "", source))
 
 
-def _stations(start: float, end: float, spacing: float) -> list[float]:
-    """Return equidistant s coordinates along a road, including both ends [m]."""
-    found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
-    return found
-
-
 def _simple_parts(road: Road, section: LaneSection, stations: list[float]) -> list[list[float]]:
     """Return the s coordinates in parts whose polygons do not overlap themselves; neighbors share a station.
 
@@ -312,7 +306,7 @@ def _marks(part: _Part, lane: Lane, spacing: float) -> Iterator[tuple[str, str, 
         end = min(section.s + min(after, section.length), part.stations[-1])
         if mark.type in ("none", "curb", "grass") or end - start < 1e-6:
             continue
-        stations = _stations(start, end, spacing)
+        stations = equidistant(start, end, spacing)
         yield mark.type, mark.color, simplify_line(_edge(road, section, lane, stations, outer=True))
 
 

@@ -263,11 +263,12 @@ def legend() -> str:
     """Return the legend of colors and lines of a top view as HTML."""
     box = '<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" {}/></svg>'
     line = '<svg viewBox="0 0 26 14"><line x1="1" x2="25" y1="7" y2="7" stroke-width="2" {}/></svg>'
+    sample = 'fill="{0}" fill-opacity=".3" stroke="{0}" stroke-width="2"'
     entries = (
         (box.format(f'fill="#fff" stroke="{TRUTH}" stroke-width="1.4"'), "ground truth"),
         (box.format(f'fill="{STATION}"'), "ego"),
-        (_sample(OWN), "detected by the ego"),
-        (_sample(RECEIVED), "received from others"),
+        (box.format(sample.format(OWN)), "detected by the ego"),
+        (box.format(sample.format(RECEIVED)), "received from others"),
         (line.format(f'stroke="{LINK}"'), "message delivered"),
         (line.format(f'stroke="{LOST}" stroke-dasharray="5 4"'), "message lost"),
         (
@@ -276,10 +277,3 @@ def legend() -> str:
         ),
     )
     return "".join(f"<span>{symbol}{escape(text)}</span>" for symbol, text in entries)
-
-
-def _sample(color: str) -> str:
-    return (
-        f'<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" fill="{color}" '
-        f'fill-opacity=".3" stroke="{color}" stroke-width="2"/></svg>'
-    )

@@ -170,18 +170,15 @@ def _comparable(run: ReportedRun, axes: Sequence[str] = ()) -> dict[str, str]:
     if isinstance(settings.get("parameters"), Mapping):
         settings["parameters"] = {name: value for name, value in settings["parameters"].items() if name not in own}
     if isinstance(settings.get("files"), list):
-        settings["files"] = _files(settings["files"])
+        # The digests of files by role and name
+        files = settings["files"]
+        settings["files"] = {
+            f"{entry.get('role')} {entry.get('name')}": str(entry.get("sha256"))[:12]
+            for entry in files
+            if isinstance(entry, Mapping)
+        }
     paths = {name.replace("channel.", "channel_profile.", 1) for name in axes if name in run.axes and is_setting(name)}
     return {name: value for name, value in flatten(settings).items() if name not in paths}
-
-
-def _files(files: Sequence[Any]) -> dict[str, Any]:
-    """Return the digests of files by role and name."""
-    return {
-        f"{entry.get('role')} {entry.get('name')}": str(entry.get("sha256"))[:12]
-        for entry in files
-        if isinstance(entry, Mapping)
-    }
 
 
 def _names(value: Any) -> list[str]:

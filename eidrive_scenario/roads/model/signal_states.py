@@ -47,7 +47,9 @@ def lamps(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> tuple[tuple[st
     A state may list another number of lamps than the type of the light; the list then has priority. All lamps are off
     in an unsupported state.
     """
-    modes = _listed(state)
+    # The modes of a list of lamps, or None if the state is not such a list
+    words = [word.strip().lower() for word in re.split("[;,]", state)]
+    modes = [_MODES[word] for word in words] if all(word in _MODES for word in words) else None
     if modes is not None and (len(modes) > 1 or len(colors) == 1):
         if len(modes) != len(colors):
             colors = _COLORS.get(len(modes), (*DEFAULT_LAMPS, *[GREEN] * len(modes))[: len(modes)])
@@ -72,12 +74,6 @@ def must_stop(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> bool:
 def shows_red(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> bool:
     """Return whether a light in this state shows red, also together with yellow or flashing."""
     return dict(lamps(state, colors)).get(RED, OFF) != OFF
-
-
-def _listed(state: str) -> list[str] | None:
-    """Return the modes of a list of lamps, or None if the state is not such a list."""
-    words = [word.strip().lower() for word in re.split("[;,]", state)]
-    return [_MODES[word] for word in words] if all(word in _MODES for word in words) else None
 
 
 def _named(state: str) -> dict[str, str]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
@@ -102,13 +102,9 @@ class LaneLinks:
             return
         contact = link.contact or _nearest_end(road, side, other)
         other_side = 1 if contact == "end" else -1
-        self._join_roads(RoadEnd(road.id, side), RoadEnd(other.id, other_side))
-        section, facing = end_section(road, side), end_section(other, other_side)
-        for number, lane in section.lanes.items():
-            for target in lane.successors if side > 0 else lane.predecessors:
-                if target in facing.lanes:
-                    one, two = LaneKey(road.id, section.index, number), LaneKey(other.id, facing.index, target)
-                    self._join(LaneEnd(one, side), LaneEnd(two, other_side))
+        lanes = end_section(road, side).lanes.items()
+        pairs = [(n, m) for n, lane in lanes for m in (lane.successors if side > 0 else lane.predecessors)]
+        self._join_roads(road, side, other, other_side, pairs)
 
     def _link_connection(self, junction: Junction, connection: Connection) -> None:
         incoming, connecting = self._roads[connection.incoming_road], self._roads[connection.connecting_road]
@@ -116,17 +112,21 @@ class LaneLinks:
             return
         other_side = 1 if connection.contact == "end" else -1
         side = side_at(incoming, junction, connecting, connection.contact)
-        self._join_roads(RoadEnd(incoming.id, side), RoadEnd(connecting.id, other_side))
-        section, facing = end_section(incoming, side), end_section(connecting, other_side)
-        links = connection.lane_links or tuple((n, n) for n in section.lanes if n in facing.lanes)
-        for number, target in links:
-            if number in section.lanes and target in facing.lanes:
-                one, two = LaneKey(incoming.id, section.index, number), LaneKey(connecting.id, facing.index, target)
-                self._join(LaneEnd(one, side), LaneEnd(two, other_side))
+        pairs = connection.lane_links or [(n, n) for n in end_section(incoming, side).lanes]
+        self._join_roads(incoming, side, connecting, other_side, pairs)
 
-    def _join_roads(self, one: RoadEnd, other: RoadEnd) -> None:
-        self._ends.setdefault(one, {})[other] = None
-        self._ends.setdefault(other, {})[one] = None
+    def _join_roads(
+        self, road: Road, side: int, other: Road, other_side: int, pairs: Iterable[tuple[int, int]]
+    ) -> None:
+        """Join an end of a road to that of another one, and those of the pairs of their lanes that both have."""
+        one, two = RoadEnd(road.id, side), RoadEnd(other.id, other_side)
+        self._ends.setdefault(one, {})[two] = None
+        self._ends.setdefault(two, {})[one] = None
+        section, facing = end_section(road, side), end_section(other, other_side)
+        for n, m in pairs:
+            if n in section.lanes and m in facing.lanes:
+                lane, target = LaneKey(road.id, section.index, n), LaneKey(other.id, facing.index, m)
+                self._join(LaneEnd(lane, side), LaneEnd(target, other_side))
 
 
 def end_section(road: Road, side: int) -> LaneSection:

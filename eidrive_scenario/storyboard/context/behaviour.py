@@ -148,7 +148,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def error(self, message: str, hint: str = "") -> ScenarioError:
         """Return an error with file and line of this action."""
         where = self.action
-        return ScenarioError(Diagnostic(f"{type(where).__name__}: {message}", hint, where.source, where.line))
+        return ScenarioError(Diagnostic.at(where, f"{type(where).__name__}: {message}", hint))
 
 
 def _is_finite(value: object) -> bool:

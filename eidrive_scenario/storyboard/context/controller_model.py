@@ -86,11 +86,10 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Map
     if unmatched:
         hint += f"; no controller is named {' or '.join(map(repr, unmatched))}"
     unassigned = [
-        Diagnostic(
+        Diagnostic.at(
+            controller,
             f"actor {actor.name!r} keeps lane and speed: its controller {controller.name!r} is not executed",
             hint,
-            controller.source,
-            controller.line,
         )
         for actor in actors.values()
         for controller in actor.controllers

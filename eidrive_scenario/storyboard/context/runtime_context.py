@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
@@ -88,7 +88,8 @@ class RuntimeContext:
             )
             for name, entity in scenario.entities.items()
         }
-        self.traffic = BackgroundTrafficPort(self._build_traffic)
+        self.traffic: BackgroundTraffic | None = None
+        """Background traffic; None before its first instance starts."""
         self.completes_this_step = False
         """Whether an action reaches its goal in the current step."""
         self.pending_actions: list[PendingAction] = []
@@ -146,22 +147,6 @@ class RuntimeContext:
         row = self.view.rows.get(name)
         return self.view.states[row].speed if row is not None else self.actors[name].motion.speed_along_heading
 
-    def _build_traffic(self) -> BackgroundTraffic:
-        """Build the background traffic. Raise SimulationError without a road network."""
-        if self.roads is None:
-            raise SimulationError("background traffic: the scenario has no road network")
-        from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic
-        from eidrive_scenario.traffic.spawning.population import Population
-
-        population = Population(
-            self.roads,
-            seed=self.seed,
-            center=self._center,
-            taken=frozenset(self.actors),
-            must_stop=self.signals.must_stop,
-        )
-        return BackgroundTraffic(population)
-
     def _center(self, name: str) -> CentralObject | None:
         """Return pose and speed of an entity for the traffic around it; None while it is absent."""
         actor = self.actors.get(name)
@@ -205,17 +190,14 @@ class RuntimeContext:
         """
         if reference is None:
             message = f"{type(within).__name__}: {kind.__name__} is missing"
-            raise ScenarioError(
-                Diagnostic(message, "define it in place or by a CatalogReference", within.source, within.line)
-            )
+            raise ScenarioError(Diagnostic.at(within, message, "define it in place or by a CatalogReference"))
         entry = self.scenario.resolved(reference)
         if not isinstance(entry, kind):
             raise ScenarioError(
-                Diagnostic(
+                Diagnostic.at(
+                    reference,
                     f"CatalogReference {reference.catalog_name}/{reference.entry_name} has the wrong type",
                     f"got {type(entry).__name__}; expected {kind.__name__}",
-                    reference.source,
-                    reference.line,
                 )
             )
         return entry
@@ -223,20 +205,51 @@ class RuntimeContext:
     @property
     def traffic_names(self) -> tuple[str, ...]:
         """Names of the vehicles of background traffic."""
-        return self.traffic.names
+        return () if self.traffic is None else self.traffic.names
 
     @property
     def background_traffic(self) -> BackgroundTraffic:
-        """Background traffic of the run; requires a road network."""
-        return self.traffic.traffic
+        """Background traffic of the run, built on first access. Raise SimulationError without a road network."""
+        if self.traffic is not None:
+            return self.traffic
+        if self.roads is None:
+            raise SimulationError("background traffic: the scenario has no road network")
+        from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic
+        from eidrive_scenario.traffic.spawning.population import Population
+
+        population = Population(
+            self.roads,
+            seed=self.seed,
+            center=self._center,
+            taken=frozenset(self.actors),
+            must_stop=self.signals.must_stop,
+        )
+        self.traffic = BackgroundTraffic(population)
+        return self.traffic
 
     def start_traffic(self, instance: TrafficGenerator) -> None:
-        """Start an instance of background traffic."""
-        self.traffic.start(instance)
+        """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
+        self.background_traffic.start(instance)
 
     def stop_traffic(self, name: str | None) -> None:
         """Stop all instances of background traffic of this name; all instances without a name."""
-        self.traffic.stop(name)
+        if self.traffic is not None:
+            self.traffic.stop(name)
+
+    def step_traffic(self) -> None:
+        """Add spawns, removals and placements of background traffic in the current step to the commands."""
+        if self.traffic is None:
+            return
+        invisible = [name for name, appearance in self.appearances.items() if not appearance.visibility.traffic]
+        changes, commands = self.traffic.step(self.view.without(invisible), self.dt), self.commands
+        for name, (spec, placement) in changes.additions.items():
+            commands.spawns[name] = placement
+            commands.actor_specs[name] = spec
+        commands.removals |= changes.removals
+        commands.placements.update(changes.placements)
+        for name in changes.additions:
+            if name not in changes.placements:
+                commands.placements[name] = replace(commands.spawns[name], teleport=True)
 
     def observe_element(self, kind: str, name: str) -> ElementStateObserver | None:
         """Return an observer of a storyboard element; None if there is no element of this type and name."""
@@ -321,54 +334,3 @@ class RuntimeContext:
     def release_domains(self, holder: DomainHolder) -> None:
         """Release all domains of a behaviour."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]
-
-
-class BackgroundTrafficPort:
-    """Background traffic of one run. `build` builds it for its first instance."""
-
-    def __init__(self, build: Callable[[], BackgroundTraffic]) -> None:
-        self._build = build
-        self._traffic: BackgroundTraffic | None = None
-
-    @property
-    def traffic(self) -> BackgroundTraffic:
-        """Background traffic of the run; requires a road network."""
-        if self._traffic is None:
-            self._traffic = self._build()
-        return self._traffic
-
-    @property
-    def started(self) -> bool:
-        """Whether the background traffic exists."""
-        return self._traffic is not None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all vehicles of background traffic."""
-        return () if self._traffic is None else self._traffic.names
-
-    def start(self, instance: TrafficGenerator) -> None:
-        """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
-        self.traffic.start(instance)
-
-    def stop(self, name: str | None) -> None:
-        """Stop all instances of this name; all instances without a name."""
-        if self._traffic is not None:
-            self._traffic.stop(name)
-
-    def shortages(self) -> Iterator[Diagnostic]:
-        """Yield a warning for each instance whose road users were never complete so far."""
-        if self._traffic is not None:
-            yield from self._traffic.shortages()
-
-    def step(self, view: WorldView, dt: float, commands: Commands) -> None:
-        """Add spawns, removals and placements of the step that begins with this view to the commands."""
-        changes = self.traffic.step(view, dt)
-        for name, (spec, placement) in changes.additions.items():
-            commands.spawns[name] = placement
-            commands.actor_specs[name] = spec
-        commands.removals |= changes.removals
-        commands.placements.update(changes.placements)
-        for name in changes.additions:
-            if name not in changes.placements:
-                commands.placements[name] = replace(commands.spawns[name], teleport=True)

@@ -49,15 +49,13 @@ def build_route(
     """
     if roads is None:
         message = f"route {route.name!r}: the scenario has no road network"
-        raise ScenarioError(Diagnostic(message, "specify one in RoadNetwork/LogicFile", route.source, route.line))
+        raise ScenarioError(Diagnostic.at(route, message, "specify one in RoadNetwork/LogicFile"))
     places = []
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
         if here is None:
             raise ScenarioError(
-                Diagnostic(
-                    "Waypoint: the position is not on a road", "move it onto a lane", waypoint.source, waypoint.line
-                )
+                Diagnostic.at(waypoint, "Waypoint: the position is not on a road", "move it onto a lane")
             )
         places.append(here)
     costs = [_cost(route, number, roads, seed) for number in range(len(places))]
@@ -70,7 +68,7 @@ def build_route(
         message = f"{kind} {route.name!r} is not drivable: {cause.message}"
         reopened = ', or set closed="false"' if again and route.closed else ""
         hint = f"{cause.hint}, or " * bool(cause.rule) + f"change its waypoints{reopened}"
-        raise ScenarioError(Diagnostic(message, hint, route.source, route.line)) from error
+        raise ScenarioError(Diagnostic.at(route, message, hint)) from error
 
 
 def faces_traffic(roads: RoadNetwork, place: ResolvedPosition) -> bool:

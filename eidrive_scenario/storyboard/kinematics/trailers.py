@@ -65,7 +65,7 @@ def check_acyclic(actors: Mapping[str, Actor]) -> None:
         if name in train:
             where = actors[name].entity
             message = f"entity {name!r} is its own trailer"
-            diagnostics.append(Diagnostic(message, "remove a connection", where.source, where.line))
+            diagnostics.append(Diagnostic.at(where, message, "remove a connection"))
     if diagnostics:
         raise ScenarioError(diagnostics)
 

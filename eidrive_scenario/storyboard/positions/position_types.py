@@ -56,7 +56,7 @@ def road_origin(frame: Any, context: ConditionContext) -> LaneLocation:
 
 def position_error(frame: model.Element, message: str, hint: str = "") -> ScenarioError:
     """Return an error of a position with its file and line."""
-    return ScenarioError(Diagnostic(f"{type(frame).__name__}: {message}", hint, frame.source, frame.line))
+    return ScenarioError(Diagnostic.at(frame, f"{type(frame).__name__}: {message}", hint))
 
 
 CARLA_PREFIX = "CARLA:"
@@ -151,7 +151,7 @@ def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, context: Con
         return roads.geographic(latitude, longitude)
     except InputError as error:
         reason = error.diagnostics[0]
-        message = Diagnostic(f"GeoPosition: not resolvable: {reason.message}", reason.hint, frame.source, frame.line)
+        message = Diagnostic.at(frame, f"GeoPosition: not resolvable: {reason.message}", reason.hint)
         raise ScenarioError(message) from error
 
 
@@ -172,7 +172,7 @@ def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: f
     if not 0 <= level < len(levels):
         message = "GeoPosition: the selected road level does not exist"
         hint = f"got {level}; expected 0 to {len(levels) - 1}, counted from the lowest"
-        raise ScenarioError(Diagnostic(message, hint, frame.source, frame.line))
+        raise ScenarioError(Diagnostic.at(frame, message, hint))
     return levels[level]
 
 
@@ -195,17 +195,15 @@ def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float,
         in_degrees = abs(latitude) > math.pi / 2.0 or abs(longitude) > math.pi
         if in_degrees:
             message = f"GeoPosition: latitude {latitude:g}, longitude {longitude:g} are read as degrees, not radians"
-            context.warn(Diagnostic(message, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
+            context.warn(Diagnostic.at(frame, message, "use latitudeDeg and longitudeDeg"))
     else:
         hint = "give latitudeDeg and longitudeDeg"
-        raise ScenarioError(Diagnostic("GeoPosition: latitude or longitude is missing", hint, frame.source, frame.line))
+        raise ScenarioError(Diagnostic.at(frame, "GeoPosition: latitude or longitude is missing", hint))
     if in_degrees:
         latitude, longitude = math.radians(latitude), math.radians(longitude)
     if abs(latitude) > math.pi / 2.0 or abs(longitude) > 2.0 * math.pi:
         message = f"GeoPosition: invalid latitude {math.degrees(latitude):g}° or longitude {math.degrees(longitude):g}°"
-        raise ScenarioError(
-            Diagnostic(message, "expected latitudes within ±90°, longitudes within ±360°", frame.source, frame.line)
-        )
+        raise ScenarioError(Diagnostic.at(frame, message, "expected latitudes within ±90°, longitudes within ±360°"))
     return latitude, longitude
 
 
@@ -341,7 +339,7 @@ def _s_on_road(frame: model.RoadPosition | model.LanePosition, context: Conditio
     if abs(on_road - s) > 1e-3:
         message = f"{type(frame).__name__}: moved to the end of road {road!r}"
         hint = f"got s = {s:g}; expected 0 to {length:.2f}"
-        context.warn(Diagnostic(message, hint, frame.source, frame.line))
+        context.warn(Diagnostic.at(frame, message, hint))
     return on_road
 
 

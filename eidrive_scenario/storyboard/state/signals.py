@@ -127,7 +127,7 @@ def _group(name: str, roads: RoadNetwork | None) -> tuple[str, ...]:
 
 def _diagnostic(cycle: SignalCycle, message: str, hint: str, at: model.Element | None = None) -> Diagnostic:
     where = at or cycle.element
-    return Diagnostic(f"TrafficSignalController {cycle.name!r}: {message}", hint, where.source, where.line)
+    return Diagnostic.at(where, f"TrafficSignalController {cycle.name!r}: {message}", hint)
 
 
 SEMANTICS = {
@@ -213,7 +213,7 @@ class Signals:
             return None
         hint = suggestion(name, self._colors) if self._colors else "the road network has no signals"
         message = f"{type(element).__name__}: the road network has no signal {name!r}; its state has no effect"
-        return Diagnostic(message, hint, element.source, element.line)
+        return Diagnostic.at(element, message, hint)
 
     def check_phase(self, controller: str, phase: str, element: model.Element) -> None:
         """Raise ScenarioError if the phases of a signal controller are declared without this one."""
@@ -221,7 +221,7 @@ class Signals:
         known = [phase] if cycle is None else [one.name for one in cycle.phases]
         if phase not in known:
             message = f"{type(element).__name__}: signal controller {controller!r} has no phase {phase!r}"
-            raise ScenarioError(Diagnostic(message, suggestion(phase, known), element.source, element.line))
+            raise ScenarioError(Diagnostic.at(element, message, suggestion(phase, known)))
 
     def _phase_states(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
         """Return the states of a phase by signal. A group state holds for each signal of the group.

@@ -306,7 +306,7 @@ class Builder:
         if name in registry:
             return True
         hint = f"remove it, or install a package that registers it; {suggestion(name, registry)}"
-        self._diagnostics.append(Diagnostic(otherwise, hint, leaf.source, leaf.line))
+        self._diagnostics.append(Diagnostic.at(leaf, otherwise, hint))
         return False
 
     def _entities(self, name: str) -> list[str]:

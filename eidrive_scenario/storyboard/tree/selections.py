@@ -47,11 +47,10 @@ class Selections:
             return found[0]
         group = sorted(self._named_groups(element))[0]
         raise ScenarioError(
-            Diagnostic(
+            Diagnostic.at(
+                element,
                 f"{type(element).__name__} refers to selection {group!r}",
                 f"got a selection of {len(self.members(group))} entities; expected one entity",
-                element.source,
-                element.line,
             )
         )
 

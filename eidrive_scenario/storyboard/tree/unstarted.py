@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import Element, Maneuver
+from eidrive_scenario.openscenario.diagnostics import Location
+from eidrive_scenario.openscenario.validation.names import StoryboardNames
 from eidrive_scenario.storyboard.state.element_states import ElementTransition
 from eidrive_scenario.storyboard.tree.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.tree.events import EventElement
@@ -27,20 +28,20 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
     found = list(_find_unstarted(root))
     if not found:
         return []
-    locations = dict(_source_lines(scenario))
+    named = StoryboardNames(scenario.storyboard, scenario.entries).named
+    definitions = {entry.path: entry.element for entry in named}
     diagnostics = []
     for element in found[:_MAX_REPORTED]:
-        source, line = locations.get(element.record.path, (str(scenario.path or ""), None))
+        location = definitions.get(element.record.path, Location(str(scenario.path or "")))
         skipped = sum(transition is ElementTransition.SKIP for _, transition in element.record.transitions)
         why = "its start trigger was not fulfilled" if element.start_leaf is not None else "nothing started it"
         if skipped:
             why = f"it was skipped {skipped} times by its priority" if skipped > 1 else "it was skipped by its priority"
         diagnostics.append(
-            Diagnostic(
+            Diagnostic.at(
+                location,
                 f"{element.kind} {element.name!r} never started: {why} until the run ended at {time:.2f} s ({end})",
                 f"eidrive run --explain {element.name!r} states the unfulfilled conditions",
-                source,
-                line,
             )
         )
     if len(found) > _MAX_REPORTED:
@@ -61,19 +62,3 @@ def _find_unstarted(element: StoryElement) -> Iterator[StoryElement]:
     elif started and not isinstance(element, EventElement):
         for child in element.elements:
             yield from _find_unstarted(child)
-
-
-def _source_lines(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, int | None]]]:
-    """Yield path, file and line of each act and event."""
-    for story in scenario.storyboard.story:
-        for act in story.act:
-            yield (story.name, act.name), _source_line(act)
-            for group in act.maneuver_group:
-                entries = (scenario.entries.get(reference) for reference in group.catalog_reference)
-                for maneuver in (*group.maneuver, *(one for one in entries if isinstance(one, Maneuver))):
-                    for event in maneuver.event:
-                        yield (story.name, act.name, group.name, maneuver.name, event.name), _source_line(event)
-
-
-def _source_line(element: Element) -> tuple[str, int | None]:
-    return element.source, element.line

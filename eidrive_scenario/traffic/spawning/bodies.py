@@ -168,7 +168,7 @@ class TrafficMix:
             entity = self._scenario.resolved(entity)
         if not isinstance(entity, model.Vehicle | model.Pedestrian):
             message = f"background traffic cannot contain a {type(entity).__name__}"
-            raise ScenarioError(Diagnostic(message, "give a Vehicle or a Pedestrian", template.source, template.line))
+            raise ScenarioError(Diagnostic.at(template, message, "give a Vehicle or a Pedestrian"))
         settings = next((self._settings(one) for one in template.object_controller), DriverSettings())
         return _participant(actor_spec(entity.name, entity), settings)
 
@@ -190,7 +190,7 @@ class TrafficMix:
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             where = entries[0]
             message = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are invalid"
-            raise ScenarioError(Diagnostic(message, "give weights of at least 0, not all 0", where.source, where.line))
+            raise ScenarioError(Diagnostic.at(where, message, "give weights of at least 0, not all 0"))
         return WeightedChoice(things, weights)
 
 

@@ -66,25 +66,11 @@ class SpawnSites:
 
     def subset(self, which: Integers | Bools) -> SpawnSites:
         """Return a subset of the sites."""
-        return SpawnSites(
-            self.row[which],
-            self.progress[which],
-            self.x[which],
-            self.y[which],
-            self.heading[which],
-            self.width[which],
-        )
+        return SpawnSites(*(column[which] for column in vars(self).values()))
 
     def concatenate(self, other: SpawnSites) -> SpawnSites:
         """Return the union of the sites."""
-        return SpawnSites(
-            np.concatenate([self.row, other.row]),
-            np.concatenate([self.progress, other.progress]),
-            np.concatenate([self.x, other.x]),
-            np.concatenate([self.y, other.y]),
-            np.concatenate([self.heading, other.heading]),
-            np.concatenate([self.width, other.width]),
-        )
+        return SpawnSites(*map(np.concatenate, zip(vars(self).values(), vars(other).values(), strict=True)))
 
 
 Covers = Callable[[SpawnSites], Bools]

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import quaternion, wrap_angle
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
 from eidrive_scenario.world.physics.bullet import (
@@ -17,7 +17,6 @@ from eidrive_scenario.world.physics.bullet import (
     SCRIPTED,
     STATIC,
     bullet,
-    quaternion,
 )
 from eidrive_scenario.world.physics.dynamics import Demand, track_of
 from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from threading import Lock
@@ -77,20 +76,6 @@ def disconnect(client: int) -> None:
         _idle.append(client)
     else:
         bullet.disconnect(physicsClientId=client)
-
-
-def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
-    """Return x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    if pitch == 0.0 and roll == 0.0:
-        return 0.0, 0.0, sy, cy
-    cp, sp, cr, sr = math.cos(pitch / 2), math.sin(pitch / 2), math.cos(roll / 2), math.sin(roll / 2)
-    return (
-        cy * cp * sr - sy * sp * cr,
-        cy * sp * cr + sy * cp * sr,
-        sy * cp * cr - cy * sp * sr,
-        cy * cp * cr + sy * sp * sr,
-    )
 
 
 def create_static_body(client: int, shape: int, group: int, meets: int, visual: int = -1) -> int:

@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
-from eidrive_scenario.base.geometry import footprint_distance
+from eidrive_scenario.base.geometry import footprint_distance, quaternion
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bullet import (
@@ -25,7 +25,6 @@ from eidrive_scenario.world.physics.bullet import (
     bullet,
     create_static_body,
     create_triangle_shape,
-    quaternion,
 )
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
 
@@ -335,7 +334,7 @@ class Scenery:
                 [bullet.GEOM_BOX] * len(some),
                 halfExtents=[[extent / 2 for extent in building.size] for building in some],
                 collisionFramePositions=[building.center for building in some],
-                collisionFrameOrientations=[quaternion(building.yaw, 0.0, 0.0) for building in some],
+                collisionFrameOrientations=[quaternion(building.yaw) for building in some],
                 physicsClientId=self._client,
             )
             self._built[create_static_body(self._client, shape, STATIC, RAYS | DRIVEN)] = some

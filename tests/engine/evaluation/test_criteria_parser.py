@@ -9,6 +9,7 @@ import pytest
 from eidrive_scenario.errors import InvalidResult, SettingError
 from eidrive_scenario.evaluation import criteria_parser
 from eidrive_scenario.evaluation.criteria_parser import (
+    CriteriaContext,
     build_criteria,
     exit_verdict,
     parse_criteria,
@@ -25,12 +26,12 @@ PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 def diagnostics(text: str, **given: object) -> list[str]:
     with pytest.raises(SettingError) as caught:
-        parse_criteria(text, source="a.xosc", line=10, **given)  # type: ignore[arg-type]
+        parse_criteria(text, CriteriaContext(**given), source="a.xosc", line=10)  # type: ignore[arg-type]
     return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
 def parse(text: str, taken: list[str] | None = None, **given: object) -> list[Criterion]:
-    return build_criteria(parse_criteria(text, **given), taken or [])  # type: ignore[arg-type]
+    return build_criteria(parse_criteria(text, CriteriaContext(**given)), taken or [])  # type: ignore[arg-type]
 
 
 def test_parse_criteria_of_one_entry_returns_its_settings() -> None:
@@ -136,10 +137,10 @@ def test_criterion_of_unknown_monitor_is_reported() -> None:
     assert diagnostics("monitor: {of: CutInn}", **known) == [
         "a.xosc:10: criterion 'monitor': unknown monitor 'CutInn'; did you mean 'CutIn'?"
     ]
-    assert diagnostics("monitor: {of: CutIn}", monitors=[]) == [
+    assert diagnostics("monitor: {of: CutIn}", monitors=()) == [
         "a.xosc:10: criterion 'monitor': unknown monitor 'CutIn'; the scenario declares no monitor"
     ]
-    assert len(parse("monitor: {of: CutIn}", entities=[], monitors=["CutIn"])) == 1
+    assert len(parse("monitor: {of: CutIn}", entities=(), monitors=("CutIn",))) == 1
 
 
 @pytest.mark.parametrize(
@@ -171,7 +172,7 @@ def test_diagnostics_of_listed_criteria_have_their_own_lines() -> None:
 
 
 def test_criterion_of_unknown_entity_is_reported() -> None:
-    assert diagnostics("min_distance: {of: Ego, to: Incomming}", entities=["Ego", "Incoming"]) == [
+    assert diagnostics("min_distance: {of: Ego, to: Incomming}", entities=("Ego", "Incoming")) == [
         "a.xosc:10: criterion 'min_distance': unknown entity 'Incomming'; did you mean 'Incoming'?"
     ]
 

@@ -8,6 +8,7 @@ import pytest
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.evaluation.criteria_parser import (
+    CriteriaContext,
     build_criteria,
     parse_criteria,
     stop_trigger_declarations,
@@ -135,7 +136,7 @@ def test_class_of_scenario_runner_is_translated_or_named_with_its_replacement(na
         example = (
             hint.removeprefix("its arguments are not one number; declare ").split(" (")[0].replace("Ego", "Parked")
         )
-        (declared,) = parse_criteria(example, entities=["Parked"])
+        (declared,) = parse_criteria(example, CriteriaContext(("Parked",)))
         assert declared.build().name == TWENTY[name]
 
 

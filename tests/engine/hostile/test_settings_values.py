@@ -24,7 +24,7 @@ from trial import attempt
 
 from eidrive_scenario.driving.settings import AgentSettings, parse_station_settings
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.evaluation.criteria_parser import parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import CriteriaContext, parse_criteria
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.openscenario import load_scenario
@@ -61,7 +61,7 @@ def accepted(kind: str, name: str, data: Mapping[str, Any]) -> bool:
     try:
         parsed(kind, name, data)
         if kind == "criterion":
-            parse_criteria(as_text({name: data}), entities=["Ego", "B"])
+            parse_criteria(as_text({name: data}), CriteriaContext(("Ego", "B")))
     except InputError:
         return False
     return True

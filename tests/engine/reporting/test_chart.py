@@ -8,6 +8,7 @@ from itertools import pairwise
 import pytest
 from lxml import etree
 
+from eidrive_scenario.experiments.statistics.intervals import Proportion
 from eidrive_scenario.reporting.drawing.charts import (
     BOTTOM,
     HEIGHT,
@@ -19,6 +20,7 @@ from eidrive_scenario.reporting.drawing.charts import (
     WIDTH,
     ChartSeries,
     line_chart,
+    rate_map,
 )
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -64,6 +66,13 @@ def test_line_chart_of_full_range_spans_axes() -> None:
     assert [float(number) for number in re.findall(r"[\d.]+", path)] == pytest.approx(
         [left, bottom, right, top], abs=0.01
     )
+
+
+def test_line_charts_and_maps_have_sizes_of_their_own() -> None:
+    rates = {(0, 0): Proportion(1, 2, 0.01, 0.99, 0.95)}
+    drawn = etree.fromstring(rate_map([0.0], [0.0], rates, x_title="a", y_title="b", names=(["0"], ["0"])))
+    assert chart(ChartSeries("one", "#123456", (0.0, 8.0), (0.0, 8.0))).get("viewBox") == "0 0 792 216"
+    assert drawn.get("viewBox") == "0 0 446.4 288"
 
 
 def test_line_chart_interrupts_line_outside_range() -> None:
