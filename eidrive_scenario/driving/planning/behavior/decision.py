@@ -12,7 +12,6 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
 from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
-    FIRST_PLACES,
     ROUTE,
     Body,
     LateralProfile,
@@ -160,7 +159,7 @@ class Decider:
             self._current = None
         else:
             places = tuple(place + shift for place in current.places)
-            self._current = msgspec.structs.replace(current, places=places)
+            self._current = msgspec.structs.replace(current, places=places, waits_at=current.waits_at + shift)
 
     def decide(self, situation: Situation) -> Decision:
         """Return the best proposal."""
@@ -196,6 +195,9 @@ class Decider:
         return self._decision(situation, options, best)
 
     def _scene(self, situation: Situation, settings: BehaviorSettings) -> Surroundings:
+        if abs(situation.d) > OFF_PROFILE:
+            # A vehicle that returns behind an obstacle needs all the space.
+            settings = settings.model_copy(update={"passing_gap": 0.0})
         return surroundings(
             situation.objects,
             situation.prediction,
@@ -335,8 +337,8 @@ class Decider:
         crossing = conflicts(scene, way, situation.s)
         leads = leading(scene, way, crossing, situation.s + self._center, CRUISE)
         course = Course(situation.line.along, situation.limits, situation.wanted)
-        start, body = (situation.s, situation.speed), (self._front, self._center)
-        rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads)], course, start, body, scene)
+        here, body = (situation.s, situation.speed), (self._front, self._center)
+        rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads)], course, here, body, scene)
         beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
         verdict = self._oncoming.verify(
             profile,
@@ -352,10 +354,12 @@ class Decider:
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
             verdict = Verdict.WAIT
         if verdict is Verdict.WAIT:
-            better = with_view(profile, Start(*situation.steered, situation.speed), self._settings)
+            start = Start(*situation.steered, situation.speed)
+            sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
+            better = with_view(profile, start, self._settings, sufficient)
             if better is not None:
                 profile, place = better, self._oncoming.waiting_place(better, situation.s)
-            elif len(profile.places) <= FIRST_PLACES:
+            elif math.isinf(profile.waits_at):
                 # Nearer to the obstacle it would see less.
                 stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
                 place = min(place, situation.s + stop)
@@ -363,7 +367,14 @@ class Decider:
             eye = (s, profile.offset_at(s))
             waits = situation.speed < AT_REST and place - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene, self._body):
-                is_free = self._oncoming.yields(scene, situation.line, beside, eye, situation.now)
+                is_free = self._oncoming.yields(
+                    scene,
+                    situation.line,
+                    beside,
+                    eye,
+                    situation.now,
+                    is_last_place=math.isinf(profile.waits_at),
+                )
                 verdict = Verdict.GO if is_free else verdict
         return profile, verdict, place
 

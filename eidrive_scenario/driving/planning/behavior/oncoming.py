@@ -15,8 +15,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.proposals import (
-    AT_EDGE,
-    FIRST_PLACES,
+    AT_OFFSET,
     ONCOMING_SPEED,
     Body,
     LateralProfile,
@@ -33,6 +32,9 @@ PAUSE = 6.0
 """Time of waiting without oncoming traffic after which traffic out of view is expected to drive as fast as that in view
 did, or as the vehicle wants to, instead of at the speed limit [s]; of the order of the critical gaps of the Highway
 Capacity Manual (4.1 to 7.5 s)."""
+LONGEST_PAUSE = 20.0
+"""Time of waiting without oncoming traffic after which the vehicle relies on others to respond [s]; that after which a
+queue is passed as well."""
 SLOWEST = 0.5
 """Share of the wanted speed that traffic out of view is expected to drive at least."""
 FREE_TIME = 1.0
@@ -56,6 +58,8 @@ STOPPING_ERROR = 0.5
 """Distance by which the vehicle may stop too late [m]."""
 SLOW, OVERRUN = 1.0, 0.3
 """Speed below which the vehicle stops at the border [m/s], and distance by which it may be beyond it then [m]."""
+DELAY = 0.3
+"""Time until the vehicle brakes [s]."""
 BEHIND = 1.0
 """Gap behind an obstacle at which a maneuver that is given up ends [m]."""
 
@@ -108,6 +112,7 @@ class OncomingTraffic:
         is_oncoming &= scene.front[:, 0] > center
         if is_oncoming.any():
             self._last = now
+            self._free_to = -math.inf if math.isinf(self._free_to) else self._free_to
             self._fastest = max(self._fastest, -float(scene.speed[is_oncoming, 0].min()))
         self._usual = max(self._fastest, SLOWEST * wanted) if self._fastest else wanted
         if held_up:
@@ -122,10 +127,10 @@ class OncomingTraffic:
             return self._usual
         return max(beside.oncoming_limit, self._usual)
 
-    def _is_patient(self, now: float) -> bool:
-        """Return whether the vehicle has waited for the pause, and no oncoming traffic came into view."""
+    def _is_patient(self, now: float, pause: float = PAUSE) -> bool:
+        """Return whether the vehicle has waited for a pause [s], and no oncoming traffic came into view."""
         since = max(self._last, now if self._held_up_since is None else self._held_up_since)
-        return now - since >= PAUSE
+        return now - since >= pause
 
     def line_changed(self, shift: float | None) -> None:
         """Move what is known to be free to another line, or forget it; `shift` as for `Decider.line_changed`."""
@@ -186,6 +191,10 @@ class OncomingTraffic:
         first = int(outside.argmax())
         back, place = self._return(profile, motion, outside)
         possible, duration = self._can_give_up(profile, motion, scene, np.maximum(side * offsets - border, 0.0))
+        if first and not self._moves(profile, motion, scene):
+            # Behind a standing object there is seldom space to return: the vehicle stops before the border.
+            stop = motion.s + motion.speed**2 / (2.0 * BRAKING) + motion.speed * DELAY
+            possible &= stop <= float(motion.s[first])
         last = int(possible.argmin()) - 1 if not possible.all() else len(times) - 1
         if last < 0 and first == 0:
             return Verdict.GO
@@ -202,7 +211,7 @@ class OncomingTraffic:
         eyes = motion.s + body.center
         beside_line = profile.offset(eyes)
         here = (float(eyes[0]), float(beside_line[0]))
-        free = self._free(line, scene, beside, here, now)
+        free = self._free(line, scene, beside, here, end, now)
         if self._suffices(free, here[0], back + reserve, end, beside, now):
             return Verdict.GO
         step = min(max(last, 0), len(times) - 1)
@@ -216,13 +225,24 @@ class OncomingTraffic:
         return Verdict.GO if may_return else refused
 
     def yields(
-        self, scene: Surroundings, line: ReferenceLine, beside: LanesBeside, eye: tuple[float, float], now: float
+        self,
+        scene: Surroundings,
+        line: ReferenceLine,
+        beside: LanesBeside,
+        eye: tuple[float, float],
+        now: float,
+        *,
+        is_last_place: bool,
     ) -> bool:
         """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
-        stop before it."""
+        stop before it.
+
+        is_last_place  whether there is no other place to wait at
+        """
         place = self.first_hidden(line, scene, beside, eye)
         front = eye[0] + self._body.half_length
-        self._others_yield = self._is_patient(now) and place - approach(self._usual, math.inf) >= front
+        is_patient = self._is_patient(now, PAUSE if is_last_place else LONGEST_PAUSE)
+        self._others_yield = is_patient and place - approach(self._usual, math.inf) >= front
         return self._others_yield
 
     def _suffices(
@@ -232,27 +252,54 @@ class OncomingTraffic:
 
         After the pause, none is expected from beyond the range of the sensors at `eye`, where nothing else hides it.
         """
-        if self._is_patient(now) and hidden >= eye + float(self._ahead[-1]) - SAMPLE:
+        if self._is_patient(now) and self._is_in_view(hidden, eye):
             return hidden >= end
-        return hidden - approach(self.hidden_speed(beside, now), duration) >= end
+        speed = self.hidden_speed(beside, now)
+        return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration)) >= end
+
+    def _is_in_view(self, hidden: float, eye: float) -> bool:
+        """Return whether nothing but the range of the sensors limits the view from `eye`."""
+        return hidden >= eye + float(self._ahead[-1]) - SAMPLE
 
     def _free(
-        self, line: ReferenceLine, scene: Surroundings, beside: LanesBeside, eye: tuple[float, float], now: float
+        self,
+        line: ReferenceLine,
+        scene: Surroundings,
+        beside: LanesBeside,
+        eye: tuple[float, float],
+        end: float,
+        now: float,
     ) -> float:
         """Return the place up to which the oncoming lane is free of unseen traffic [m].
 
-        What was in view stays free until traffic can have come there.
+        What was in view stays free until traffic can have come there. Where none is expected from beyond the range of
+        the sensors, none is expected until some comes into view.
         """
         known = self._free_to - self.hidden_speed(beside, now) * (now - self._free_at)
-        self._free_to, self._free_at = max(known, self.first_hidden(line, scene, beside, eye)), now
+        hidden = self.first_hidden(line, scene, beside, eye)
+        if self._is_patient(now) and self._is_in_view(hidden, eye[0]) and hidden >= end:
+            hidden = math.inf
+        self._free_to, self._free_at = max(known, hidden), now
         return self._free_to
+
+    def place_with_view(self, profile: LateralProfile, scene: Surroundings, oncoming: float, s: float) -> float:
+        """Return the place of the front axle nearest to the passed objects from which the vehicle, at the edge of its
+        lane, sees the oncoming lane up to the range of its sensors [m].
+
+        oncoming  center of the oncoming lane [m];  s  place of the reference point [m]
+        """
+        rows = self._passed(profile, Motion(np.array([s]), np.zeros(1)), scene)
+        edge = profile.border - 2.0 * AT_OFFSET  # with the error of the lateral control
+        covered = float((profile.side * scene.d[rows, 0] + scene.half_width[rows, 0]).max(initial=edge)) - edge
+        # The line of sight past the nearer corner of an object reaches the center of the lane at the range.
+        gap = float(self._ahead[-1]) * covered / max(profile.side * oncoming - edge, AT_OFFSET)
+        return float(scene.rear[rows, 0].min(initial=math.inf)) - gap + self._body.wheelbase - self._body.center
 
     def waiting_place(self, profile: LateralProfile, s: float) -> float:
         """Return the place of the reference point at which the vehicle reaches the border of its lane [m]; `s` if it
         is beyond it already."""
-        if len(profile.places) > FIRST_PLACES:
-            # The way at the edge of the lane has room for a place of waiting with a better view.
-            return max(profile.places[-4] - self._body.wheelbase - AT_EDGE, s)
+        if math.isfinite(profile.waits_at):
+            return max(profile.waits_at - self._body.wheelbase - STOPPING_ERROR, s)
         places = np.arange(s, profile.places[-1], 0.1)
         outside: Bools = profile.side * profile.offset(places + self._body.wheelbase) > profile.border
         return max(float(places[outside.argmax()]) - STOPPING_ERROR, s) if outside.any() else math.inf

@@ -25,12 +25,9 @@ TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
 """Share of the length of a lateral motion in which most of it must be possible."""
-WALKING = 2.0
-"""Speed for which the lateral motion from a place of waiting is made [m/s]."""
-AT_EDGE = 10.0
-"""Length of the way at the edge of the lane before a place of waiting [m]: two lengths of a car."""
-FIRST_PLACES = 5
-"""Maximum number of places of a profile past an obstacle in one lateral motion."""
+ONWARD = (7.0, 2.0)
+"""Speeds for which the lateral motion from the edge of the lane is made [m/s]: the usual one in an oncoming lane, or
+walking pace if there is no space for that."""
 AT_OFFSET = 0.1
 """Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
 
@@ -71,6 +68,8 @@ class LateralProfile(msgspec.Struct, frozen=True):
     side: int = 0
     overtakes: float = 0.0
     """Speed of the fastest object that it overtakes [m/s]; 0 if it passes standing ones only."""
+    waits_at: float = math.inf
+    """Place of the front axle at which it may wait at the edge of its lane for a view [m]; inf without one."""
     border: float = math.inf
     """Distance from the line to `side` beyond which the vehicle is in a lane of the opposite direction [m]."""
 
@@ -188,25 +187,29 @@ def passing(
     return LateralProfile(name, tuple(places), (*values, value, value, 0.0), slope, side)
 
 
-def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings) -> LateralProfile | None:
+def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings, place: float) -> LateralProfile | None:
     """Return a profile past an obstacle in two lateral motions, with a way at the edge of the lane between them, where
     the vehicle has a view into the oncoming lane.
 
     The result is None if there is not enough space, or if the profile has such a way already.
+
+    place  from which the view is sufficient [m]
     """
     s, offset, slope, speed = start
     edge = profile.side * (profile.border - AT_OFFSET)
     begin, end, back = profile.places[-3:]
     value = profile.values[-2]
-    onward = begin - change_length(value - edge, WALKING, settings.lateral_acceleration)
-    length = change_length(edge - offset, max(speed, WALKING), settings.lateral_acceleration)
-    if len(profile.places) > FIRST_PLACES or s + length > onward:
+    length = change_length(edge - offset, max(speed, ONWARD[-1]), settings.lateral_acceleration)
+    starts = [begin - change_length(value - edge, faster, settings.lateral_acceleration) for faster in ONWARD]
+    onward = next((start for start in starts if s + length <= start), None)
+    if math.isfinite(profile.waits_at) or onward is None:
         return None
-    first = max(onward - length - 2.0 * AT_EDGE, s)
-    starts = ((s, offset), (first, offset)) if first - s >= 1.0 else ((s, offset),)
-    ends = ((first + length, edge), (onward, edge), (begin, value), (end, value), (back, 0.0))
-    places, values = zip(*starts, *ends, strict=True)
-    return msgspec.structs.replace(profile, places=places, values=values, slope=slope)
+    waits_at = min(place, onward)
+    first = max(waits_at - length, s)
+    before = ((s, offset), (first, offset)) if first - s >= 1.0 else ((s, offset),)
+    after = ((first + length, edge), (onward, edge), (begin, value), (end, value), (back, 0.0))
+    places, values = zip(*before, *after, strict=True)
+    return msgspec.structs.replace(profile, places=places, values=values, slope=slope, waits_at=waits_at)
 
 
 Precedence = Literal["all", "earlier", "none"]

@@ -26,6 +26,8 @@ FARTHER = 0.8
 LEAST_LACK = 0.3
 """Risk of a clearance that is just too small; it increases to 1 at a contact. A choice: a step, so that no option gains
 by a clearance that lacks a millimeter."""
+ASIDE = 0.5
+"""Offset from the route from which on the vehicle is in the way of oncoming traffic, not that in its way [m]."""
 AT_REST = 0.1
 """Speed below which the vehicle stands [m/s]."""
 COMFORTABLE = 2.0
@@ -224,8 +226,11 @@ def _overlaps(
         # Before a head-on collision the vehicle has to stand for some time, instead of a stop in the last moment.
         has_just_stopped = stands & (_recent_maximum(rolled.speed, shift) >= AT_REST) & ~stops[:, None]
         late = touching & head_on & has_just_stopped[:, None, :]
-        # A vehicle that stands still is not hit by its own fault, except on the way of traffic with the right of way.
-        touching &= ~(at_rest & (scene.speed != 0.0) & ~(crosses & scene.yields)[:, None])
+        # A vehicle that stands still is not hit by its own fault, except in the way of traffic with the right of way or
+        # of oncoming traffic that is in its own lane.
+        is_aside = (np.abs(offsets).max(axis=0) > ASIDE)[:, None, :]
+        blameless = at_rest & (scene.speed != 0.0) & ~(crosses & scene.yields)[:, None] & ~(head_on & is_aside)
+        touching &= ~blameless
     lack = np.where(counts, np.minimum(lack, 1.0), 0.0)
     return touching, lack if late is None else np.where(late, 1.0, lack)
 

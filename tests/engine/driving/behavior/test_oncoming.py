@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, Motion, OncomingTraffic, Verdict, approach
-from eidrive_scenario.driving.planning.behavior.proposals import AT_EDGE, Body, LateralProfile, Start, with_view
+from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Start, with_view
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 from eidrive_scenario.driving.planning.path import PlannedPath
 
 BESIDE = LanesBeside(oncoming=3.5, oncoming_limit=20.0)
-TIMES = np.arange(0.0, 8.01, 0.25)
+TIMES = np.arange(0.0, 12.01, 0.25)
 BODY = Body(3.8, 1.0, 2.85, 0.9)
 SETTINGS = BehaviorSettings()
 PASSING = LateralProfile("pass", (0.0, 20.0, 50.0, 70.0), (0.0, 3.0, 3.0, 0.0), side=1, border=0.75)
@@ -51,12 +51,13 @@ def traffic(view: float) -> OncomingTraffic:
 
 
 def verdict(
-    *objects: tuple[float, float, float], view: float = 300.0, now: float = 0.0, s: float = 0.0, current: bool = False
+    *objects: tuple[float, float, float], view: float = 300.0, now: float = 0.0, s: float = -30.0, current: bool = False
 ) -> Verdict:
     """Return the verdict on PASSING at 10 m/s from `s` on, past a car of 5 m that stands at 40 m, and other objects.
 
-    The front axle crosses the border where 3 blend(share) = 0.75, at a share of 0.36; the rear axle returns at 62.8 m,
-    of which 6.5 s is the next time, with the front at 68.8 m.
+    The front axle crosses the border where 3 blend(share) = 0.75, at a share of 0.36, with the rear axle at 4.4 m: up to
+    -15 m, at 1.5 s, the vehicle can stop before it. It returns at 62.8 m, of which 9.5 s is the next time, with the
+    front at 68.8 m.
     """
     motion = Motion(s + 10.0 * TIMES, np.full(len(TIMES), 10.0))
     there = scene(*(objects or ((40.0, 0.0, 0.0),)))
@@ -99,14 +100,14 @@ def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> No
     assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
 
 
-@pytest.mark.parametrize(("start", "expected"), [(155.0, Verdict.GO), (145.0, Verdict.WAIT), (-10.0, Verdict.GO)])
+@pytest.mark.parametrize(("start", "expected"), [(185.0, Verdict.GO), (175.0, Verdict.WAIT), (-40.0, Verdict.GO)])
 def test_traffic_in_view_must_not_meet_the_vehicle_before_its_return(start: float, expected: Verdict) -> None:
-    """At -10 m/s, 1.5 s after the return at 6.5 s, its front 2.5 m ahead of its center is at that of the vehicle, at
-    68.8 m, if it starts at 151.3 m; one that is behind has passed."""
+    """At -10 m/s, 1.5 s after the return at 9.5 s, its front 2.5 m ahead of its center is at that of the vehicle, at
+    68.8 m, if it starts at 181.3 m; one that is behind has passed."""
     assert verdict((40.0, 0.0, 0.0), (start, 3.5, -10.0)) is expected
 
 
-@pytest.mark.parametrize(("start", "expected"), [(140.0, Verdict.GO), (125.0, Verdict.WAIT)])
+@pytest.mark.parametrize(("start", "expected"), [(170.0, Verdict.GO), (160.0, Verdict.WAIT)])
 def test_current_maneuver_needs_no_reserve(start: float, expected: Verdict) -> None:
     assert verdict((40.0, 0.0, 0.0), (start, 3.5, -10.0), current=True) is expected
 
@@ -114,11 +115,11 @@ def test_current_maneuver_needs_no_reserve(start: float, expected: Verdict) -> N
 @pytest.mark.parametrize(
     ("view", "now", "expected"),
     [
-        (200.0, 0.0, Verdict.GO),  # traffic at 20 m/s has a way of at most 20 + 400 / 6 = 86.7 m to 68.8 m
-        (120.0, 0.0, Verdict.WAIT),
-        (120.0, PAUSE, Verdict.GO),
-        (70.0, PAUSE, Verdict.GO),  # nothing within the range hides traffic
-        (40.0, PAUSE, Verdict.WAIT),  # the range ends before the maneuver does
+        (180.0, 0.0, Verdict.GO),  # from -13.6 m on; traffic at 20 m/s needs at most 20 + 400 / 6 = 86.7 m to 68.8 m
+        (150.0, 0.0, Verdict.WAIT),
+        (150.0, PAUSE, Verdict.GO),  # traffic at 10 m/s needs 95 m, and none is expected from beyond the range
+        (100.0, PAUSE, Verdict.GO),
+        (70.0, PAUSE, Verdict.WAIT),  # the range ends before the maneuver does
     ],
 )
 def test_view_has_to_suffice_for_the_maneuver(view: float, now: float, expected: Verdict) -> None:
@@ -141,11 +142,15 @@ def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
 
 
 def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
-    profile = with_view(PASSING, Start(-60.0, 0.0, 0.0, 5.0), SETTINGS)
+    """From 0.55 m, 0.1 m inside of the edge, the line of sight over the corner at (37.5, 1) reaches the middle of the
+    lane at 3.5 m after 2.95 / 0.45 times its distance from the corner: 15.3 m for a range of 100 m."""
+    waiting = traffic(100.0)
+    sufficient = waiting.place_with_view(PASSING, scene((40.0, 0.0, 0.0)), 3.5, -60.0)
+    assert sufficient - BODY.wheelbase + BODY.center == pytest.approx(37.5 - 100.0 * 0.45 / 2.95, abs=0.3)
+    profile = with_view(PASSING, Start(-60.0, 0.0, 0.0, 5.0), SETTINGS, sufficient)
     assert profile is not None
-    place = traffic(100.0).waiting_place(profile, -60.0)
-    # The front axle stands before the border, and has room for the motion to the offset of 3 m from walking pace.
-    assert 0.6 < profile.offset_at(place + BODY.wheelbase) < PASSING.border
-    assert place + BODY.wheelbase == pytest.approx(profile.places[-4] - AT_EDGE)
-    assert profile.places[-4] == pytest.approx(20.0 - 11.0 * math.sqrt(2.35 / 3.5), abs=0.1)
-    assert with_view(PASSING, Start(12.0, 0.0, 0.0, 2.0), SETTINGS) is None, "there is not enough space"
+    assert profile.offset_at(waiting.waiting_place(profile, -60.0) + BODY.wheelbase) == pytest.approx(0.65, abs=0.01)
+    # Before that it swings out at 7 m/s; the peak of the second derivative of the quintic is 10 / √3.
+    length = 7.0 * math.sqrt(10.0 / math.sqrt(3.0) * 2.35 / SETTINGS.lateral_acceleration)
+    assert profile.waits_at == profile.places[-4] == pytest.approx(20.0 - length)
+    assert with_view(PASSING, Start(12.0, 0.0, 0.0, 2.0), SETTINGS, sufficient) is None, "there is not enough space"
