@@ -233,9 +233,8 @@ def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: Cam
     if not seen.any():
         return None
     numbers = np.arange(cover.triangle.size).reshape(view.shape)[::2, ::2][seen]
-    far = np.float32(1.0) / cover.nearness.ravel()[numbers]
-    x, y, z = (ray * far for ray in view.rays(view.x[numbers], view.y[numbers]))
-    normals = surfaces.normal[:, triangle[seen]]
+    x, y, z, _ = view.places(numbers, cover.nearness)
+    normals = surfaces.normal[triangle[seen]].T
     where = np.full(seen.shape, -1, dtype=np.int32)
     where[seen] = np.arange(len(numbers), dtype=np.int32)
     coarse = where[::_STRIDE, ::_STRIDE]
@@ -250,7 +249,7 @@ def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: Cam
             if float(np.linalg.norm(beam.position - view.place)) < _BESIDE_THE_CAMERA:
                 across[rows] += straight
     with np.errstate(divide="ignore"):
-        distance = view.length.reshape(view.shape) / cover.nearness
+        distance = view.own[2].reshape(view.shape) / cover.nearness
     received, across = (_spread(part, seen, distance).ravel() for part in (received, across))
     return Lamplight(received, across)
 
