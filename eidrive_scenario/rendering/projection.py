@@ -31,12 +31,6 @@ class CameraView:
         self.turn = np.ascontiguousarray(pose[:3, :3], dtype=np.float32)
         self.own = _own_rays(pinhole)
 
-    def rays(self, pixels: Integers) -> tuple[Floats, Floats, Floats]:
-        """Return the rays through pixels in world axes, at depth 1."""
-        x, y, _ = self.own[:, pixels]
-        rx, ry, rz = (turn[0] * x + turn[1] * y + turn[2] for turn in self.turn)
-        return rx, ry, rz
-
     def places(self, pixels: Integers, nearness: Floats) -> Floats:
         """Return x, y, z relative to the camera and distance from it (4, n) [m] of points in pixels.
 
@@ -46,11 +40,11 @@ class CameraView:
         _find_places(pixels, nearness.ravel(), self.own, self.turn, places)
         return places
 
-    def directions(self, pixels: Integers) -> tuple[Floats, Floats, Floats]:
-        """Return unit vectors through pixels in world axes."""
-        length = self.own[2, pixels]
-        rx, ry, rz = self.rays(pixels)
-        return rx / length, ry / length, rz / length
+    def directions(self, pixels: Integers) -> Floats:
+        """Return unit vectors (3, n) through pixels in world axes."""
+        directions = np.empty((3, len(pixels)), dtype=np.float32)
+        _find_directions(pixels, self.own, self.turn, directions)
+        return directions
 
 
 @kernel("void(i8[::1], f4[::1], f4[:,::1], f4[:,::1], f4[:,::1])")
@@ -58,9 +52,21 @@ def _find_places(pixels: Integers, nearness: Floats, own: Floats, turn: Floats, 
     for row, pixel in enumerate(pixels):
         depth = np.float32(1.0) / nearness[pixel]
         for axis in range(3):
-            ray = turn[axis, 0] * own[0, pixel] + turn[axis, 1] * own[1, pixel] + turn[axis, 2]
-            places[axis, row] = ray * depth
+            places[axis, row] = _ray(pixel, own, turn, axis) * depth
         places[3, row] = own[2, pixel] * depth
+
+
+@kernel("void(i8[::1], f4[:,::1], f4[:,::1], f4[:,::1])")
+def _find_directions(pixels: Integers, own: Floats, turn: Floats, directions: Floats) -> None:
+    for row, pixel in enumerate(pixels):
+        for axis in range(3):
+            directions[axis, row] = _ray(pixel, own, turn, axis) / own[2, pixel]
+
+
+@kernel("f4(i8, f4[:,::1], f4[:,::1], i8)")
+def _ray(pixel: int, own: Floats, turn: Floats, axis: int) -> np.float32:
+    """Return a coordinate of the ray through a pixel in world axes, at depth 1."""
+    return turn[axis, 0] * own[0, pixel] + turn[axis, 1] * own[1, pixel] + turn[axis, 2]  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=32)

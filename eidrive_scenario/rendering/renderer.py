@@ -15,7 +15,17 @@ from eidrive_scenario.rendering.materials import SOAKS
 from eidrive_scenario.rendering.model import MeshInstance
 from eidrive_scenario.rendering.projection import CameraView, cull_and_project
 from eidrive_scenario.rendering.rasterization import Cover, rasterize
-from eidrive_scenario.rendering.shading import Circumstances, Lit, lit_surfaces, sampled, shade, through_air, together
+from eidrive_scenario.rendering.shading import (
+    Circumstances,
+    Lit,
+    draw_pixels,
+    draw_through_air,
+    label_pixels,
+    lit_surfaces,
+    sampled,
+    shade,
+    together,
+)
 from eidrive_scenario.rendering.shadows import Shadows, dimmed, shadow_grid
 from eidrive_scenario.rendering.surfaces import add_reflections
 from eidrive_scenario.world.camera import Pinhole, Radiance
@@ -179,7 +189,7 @@ def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circums
     cover, surfaces = visible.cover, visible.lit.surfaces
     triangle = cover.triangle.ravel()
     above = np.flatnonzero(triangle < 0)
-    canvas.light[above] = sampled(at.sky, *at.view.directions(above))
+    draw_pixels(canvas.light, above, sampled(at.sky, *at.view.directions(above)))
     shown = np.flatnonzero(triangle >= 0)
     lamps = lamplight(beams, cover, surfaces, at.view) if beams else None
     is_dry = at.weather.wetness <= 0.0
@@ -191,7 +201,8 @@ def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circums
         canvas.light, on_road, cover, at.view,
         open_sky=visible.open_sky, dome=at.sky, wetness=at.weather.wetness, ground=ground,
     )  # fmt: skip
-    canvas.light[shown] = through_air(canvas.light[shown], at.view.places(shown, cover.nearness)[3], at.weather)
+    distance = at.view.places(shown, cover.nearness)[3]
+    draw_through_air(canvas.light, shown, canvas.light[shown], distance, at.weather)
 
 
 def _paint(
@@ -210,11 +221,11 @@ def _paint(
         triangle, places = cover.triangle.ravel()[part], at.view.places(part, cover.nearness)
         shone = None if lamps is None else Lamplight(lamps.received[part], lamps.across[part])
         luminance = shade(triangle, places, lit, at, visible.shadows, shone, visible.open_sky.ravel()[part])
-        canvas.light[part] = through_air(luminance, places[3], at.weather) if fog else luminance
-        depth, label = np.float32(1.0) / cover.nearness.ravel()[part], lit.surfaces.label[triangle]
-        beyond = np.flatnonzero(depth > at.view.pinhole.far)
-        depth[beyond], label[beyond] = np.inf, -1
-        canvas.depth[part], canvas.label[part] = depth, label
+        draw_through_air(canvas.light, part, luminance, places[3], at.weather if fog else None)
+    far = np.float32(at.view.pinhole.far)
+    label_pixels(
+        pixels, cover.triangle.ravel(), cover.nearness.ravel(), lit.surfaces.label, far, canvas.depth, canvas.label
+    )
 
 
 def _scenery(subjects: Subjects, at: Circumstances) -> _Kept:

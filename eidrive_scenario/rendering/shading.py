@@ -196,18 +196,44 @@ def _mix(
             luminance[row, color] = (seen - own * hidden) * share[number] + own
 
 
-def through_air(luminance: Floats, distance: Floats, weather: Weather) -> Floats:
-    """Attenuate light (n, 3) over distances (n,), add the light that the air scatters, and return it."""
-    through = np.exp(np.float32(-weather.extinction) * distance)
-    _attenuate(luminance, through, horizon(weather).astype(np.float32))
-    return luminance
+def draw_through_air(
+    image: Floats, pixels: Integers, luminance: Floats, distance: Floats, weather: Weather | None
+) -> None:
+    """Draw light (n, 3) in pixels of an image (P, 3): attenuated over distances (n,), plus the light that the air
+    scatters; unchanged without weather.
+    """
+    if weather is None:
+        draw_pixels(image, pixels, luminance)
+    else:
+        through = np.exp(np.float32(-weather.extinction) * distance)
+        _attenuate(luminance, through, _single(horizon(weather)), pixels, image)
 
 
-@kernel("void(f4[:,::1], f4[::1], f4[::1])")
-def _attenuate(luminance: Floats, through: Floats, air: Floats) -> None:
-    for row in range(len(through)):
+@kernel("void(f4[:,::1], i8[::1], f4[:,::1])")
+def draw_pixels(image: Floats, pixels: Integers, light: Floats) -> None:
+    """Write light (n, 3) into pixels (n,) of an image (P, 3)."""
+    for row, pixel in enumerate(pixels):
         for color in range(3):
-            luminance[row, color] = (luminance[row, color] - air[color]) * through[row] + air[color]
+            image[pixel, color] = light[row, color]
+
+
+@kernel("void(f4[:,::1], f4[::1], f4[::1], i8[::1], f4[:,::1])")
+def _attenuate(luminance: Floats, through: Floats, air: Floats, pixels: Integers, image: Floats) -> None:
+    for row, pixel in enumerate(pixels):
+        for color in range(3):
+            image[pixel, color] = (luminance[row, color] - air[color]) * through[row] + air[color]
+
+
+@kernel("void(i8[::1], i4[::1], f4[::1], i4[::1], f4, f4[::1], i4[::1])")
+def label_pixels(
+    pixels: Integers, triangle: NDArray[np.int32], nearness: Floats, labels: NDArray[np.int32], far: np.float32,
+    depth: Floats, label: NDArray[np.int32],
+) -> None:  # fmt: skip
+    """Write depth (P,) and label (P,) of pixels with triangles (P,) up to the distance `far`."""
+    for pixel in pixels:
+        beyond = np.float32(1.0) / nearness[pixel] > far
+        depth[pixel] = np.inf if beyond else np.float32(1.0) / nearness[pixel]
+        label[pixel] = -1 if beyond else labels[triangle[pixel]]
 
 
 def _single(color: Array) -> Floats:
