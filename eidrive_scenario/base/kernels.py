@@ -22,8 +22,8 @@ class Kernel(Generic[P, R]):
     """Function that is compiled on its first call, for one signature."""
 
     def __init__(self, function: Callable[P, R], signature: str) -> None:
-        self._function: Any = function
         self._signature = signature
+        self.__wrapped__: Any = function
         update_wrapper(self, function)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -34,13 +34,13 @@ class Kernel(Generic[P, R]):
     def compiled(self) -> Any:
         """Compiled function, loaded from the cache if it is there."""
         # numba compiles calls of its own functions only: the kernels that this one calls are replaced by theirs.
-        names = self._function.__globals__
+        names = self.__wrapped__.__globals__
         called = {
             name: names[name].compiled
-            for name in self._function.__code__.co_names
+            for name in self.__wrapped__.__code__.co_names
             if isinstance(names.get(name), Kernel)
         }
-        return _compile(FunctionType(self._function.__code__, names | called), self._signature)
+        return _compile(FunctionType(self.__wrapped__.__code__, names | called), self._signature)
 
 
 def kernel(signature: str) -> Callable[[Callable[P, R]], Kernel[P, R]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import os
 import subprocess
 import sys
@@ -63,6 +65,16 @@ def test_kernel_rejects_arguments_of_another_type() -> None:
 def test_kernels_of_all_modules_are_found() -> None:
     modules = {each.__module__ for each in find_kernels()}
     assert {"eidrive_scenario.rendering.rasterization", "eidrive_scenario.rendering.shadows"} <= modules
+
+
+def test_kernels_use_nothing_of_other_modules() -> None:
+    """numba compiles a kernel again if its own file changes: other modules are passed as arguments."""
+    for each in find_kernels():
+        function = each.__wrapped__
+        tree = ast.parse(Path(inspect.getfile(function)).read_text(encoding="utf-8"))
+        statements = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        imported = {name.asname or name.name for node in statements for name in node.names}
+        assert not imported & set(function.__code__.co_names), function
 
 
 @pytest.mark.process
