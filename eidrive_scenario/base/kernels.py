@@ -61,15 +61,15 @@ def _compile(function: FunctionType, signature: str) -> Any:
         try:
             return numba.njit(signature, error_model="numpy", cache=True)(function)
         except (RuntimeError, OSError):  # No folder for the cache is writable, or it is full
-            if not _noted:
-                _noted.append("no cache")
+            if "no cache" not in _noted:
+                _noted.add("no cache")
                 message = "kernels are compiled in each process: no folder for the cache of numba is writable"
                 warnings.warn(f"{message} (set NUMBA_CACHE_DIR)", RuntimeWarning, stacklevel=4)
             return numba.njit(signature, error_model="numpy")(function)
 
 
-_noted: list[str] = []
-"""What was printed about the compilation in this process, at most one line."""
+_noted: set[str] = set()
+"""What was printed about the compilation in this process, each once."""
 
 
 def _announcement() -> Any:
@@ -79,7 +79,7 @@ def _announcement() -> Any:
     class Announcement(Listener):
         def on_start(self, _: object) -> None:
             if not _noted:
-                _noted.append("compiling")
+                _noted.add("compiling")
                 sys.stderr.write("compiling kernels, once after installation\n")
 
         def on_end(self, _: object) -> None:
