@@ -4,7 +4,8 @@
 #     docker run --rm -v "$PWD:/work" eidrive run my_scenario.xosc --out runs
 FROM python:3.11-slim
 COPY . /src
-RUN pip install --no-cache-dir -c /src/constraints.txt "/src[onnx,export,tables]" && rm -rf /src
+RUN pip install --no-cache-dir -c /src/constraints.txt "/src[onnx,export,tables]" && rm -rf /src \
+    && python -m eidrive_scenario.cli.compile_kernels
 WORKDIR /work
 ENTRYPOINT ["eidrive"]
 CMD ["--help"]

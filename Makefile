@@ -18,6 +18,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not installed; name another with: make PYTHON=python3 …"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,learned,onnx,openvino]'
+	$(BIN)/python -m eidrive_scenario.cli.compile_kernels
 	@touch $@
 
 demo: install   ## run scenarios 1 and 2 of the paper in all arms: reports/demo.html

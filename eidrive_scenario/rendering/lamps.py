@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.rendering.model import Light, linear
 from eidrive_scenario.rendering.projection import CameraView, Surfaces
 from eidrive_scenario.rendering.rasterization import Cover
@@ -125,72 +126,6 @@ class Beam(NamedTuple):
     high: bool = False
 
 
-class Canvas(NamedTuple):
-    """Points (n,) relative to the camera [m] with the normals of their surfaces, and the index (H, W) of each pixel or
-    -1.
-
-    line, column, sample  every _STRIDE-th pixel in both directions that has a point, and the index of this point
-    """
-
-    x: Floats
-    y: Floats
-    z: Floats
-    normals: tuple[Floats, Floats, Floats]
-    where: NDArray[np.int32]
-    line: NDArray[np.intp]
-    column: NDArray[np.intp]
-    sample: NDArray[np.int32]
-
-    def at(self, rows: NDArray[np.int32]) -> tuple[Floats, Floats, Floats]:
-        """Return the coordinates of some points."""
-        return self.x[rows], self.y[rows], self.z[rows]
-
-
-def shine(beam: Beam, viewpoint: Array, canvas: Canvas) -> tuple[NDArray[np.intp], Floats, Floats] | None:
-    """Return the illuminance of points by a pair of lamps: rows of the lit points, illuminance, illuminance across the
-    beam [lx].
-
-    The camera is at `viewpoint` (3,). The extent of the light is searched in the sample first.
-    """
-    place = (beam.position - viewpoint).astype(np.float32)
-    axes = beam.axes.astype(np.float32)
-    some = _within(place, axes, *canvas.at(canvas.sample))[0]
-    if not len(some):
-        return None
-    line, column = canvas.line[some], canvas.column[some]
-    top, bottom = max(int(line.min()) - 1, 0) * _STRIDE, (int(line.max()) + 1) * _STRIDE
-    left, right = max(int(column.min()) - 1, 0) * _STRIDE, (int(column.max()) + 1) * _STRIDE
-    window = canvas.where[top:bottom, left:right].ravel()
-    window = window[window >= 0]
-    rows, dx, dy, dz, aside, above = _within(place, axes, *canvas.at(window))
-    rows = window[rows].astype(np.intp)
-    column = (aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE)).astype(np.int32)
-    line = (above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)).astype(np.int32)
-    intensity = _table(beam.high)[line * np.int32(_COLUMNS) + column] * np.float32(2.0 * beam.brightness)
-    square = dx * dx + dy * dy + dz * dz
-    across = intensity / square
-    nx, ny, nz = canvas.normals
-    cosine = -(dx * nx[rows] + dy * ny[rows] + dz * nz[rows]) / np.sqrt(square)
-    return rows, across * np.maximum(cosine, np.float32(0.0)), across
-
-
-def _within(
-    place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
-) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats]:
-    """Return the rows of the points in range of the lamps, their positions relative to the lamps in world axes, and the
-    tangents of the lateral and vertical angles to the axis.
-    """
-    (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
-    dx, dy, dz = x - place[0], y - place[1], z - place[2]
-    ahead = dx * fx + dy * fy + dz * fz
-    rows = np.flatnonzero((ahead > 0.3) & (ahead < REACH))
-    dx, dy, dz, ahead = dx[rows], dy[rows], dz[rows], ahead[rows]
-    aside = (dx * lx + dy * ly + dz * lz) / ahead
-    above = (dx * ux + dy * uy + dz * uz) / ahead
-    inside = np.flatnonzero((np.abs(aside) < _WIDTH) & (np.abs(above) < _HEIGHT))
-    return rows[inside], dx[inside], dy[inside], dz[inside], aside[inside], above[inside]
-
-
 @lru_cache(maxsize=2)
 def _table(high: bool) -> Floats:
     """Return `intensity` on a grid of the tangents, line by line."""
@@ -227,32 +162,79 @@ class Lamplight(NamedTuple):
 
 
 def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: CameraView) -> Lamplight | None:
-    """Return the light of all beams; None if the image is empty."""
+    """Return the light of all beams, computed at every second pixel in both directions; None if the image is empty."""
     triangle = cover.triangle[::2, ::2]
     seen = triangle >= 0
     if not seen.any():
         return None
-    numbers = np.arange(cover.triangle.size).reshape(view.shape)[::2, ::2][seen]
-    far = np.float32(1.0) / cover.nearness.ravel()[numbers]
-    x, y, z = (ray * far for ray in view.rays(view.x[numbers], view.y[numbers]))
-    normals = surfaces.normal[:, triangle[seen]]
-    where = np.full(seen.shape, -1, dtype=np.int32)
-    where[seen] = np.arange(len(numbers), dtype=np.int32)
-    coarse = where[::_STRIDE, ::_STRIDE]
-    line, column = np.nonzero(coarse >= 0)
-    canvas = Canvas(x, y, z, (normals[0], normals[1], normals[2]), where, line, column, coarse[line, column])
-    received, across = (np.zeros(len(numbers), dtype=np.float32) for _ in range(2))
+    places = view.places(np.arange(cover.triangle.size).reshape(view.shape)[::2, ::2][seen], cover.nearness)
+    points = np.full(seen.shape, -1)
+    points[seen] = np.arange(places.shape[1])
+    normals, light = surfaces.normal[triangle[seen]], np.zeros((2, places.shape[1]), dtype=np.float32)
     for beam in beams:
-        shone = shine(beam, view.place, canvas)
-        if shone is not None:
-            rows, onto, straight = shone
-            received[rows] += onto
-            if float(np.linalg.norm(beam.position - view.place)) < _BESIDE_THE_CAMERA:
-                across[rows] += straight
+        place = beam.position - view.place
+        is_beside = float(np.linalg.norm(place)) < _BESIDE_THE_CAMERA
+        frame = np.ascontiguousarray(np.vstack([place, beam.axes.T]), dtype=np.float32)
+        _shine(points, places, normals, frame, _table(beam.high), np.float32(2.0 * beam.brightness), is_beside, light)
     with np.errstate(divide="ignore"):
-        distance = view.length.reshape(view.shape) / cover.nearness
-    received, across = (_spread(part, seen, distance).ravel() for part in (received, across))
+        distance = view.own[2].reshape(view.shape) / cover.nearness
+    received, across = (_spread(part, seen, distance).ravel() for part in light)
     return Lamplight(received, across)
+
+
+@kernel("void(i8[:,::1], f4[:,::1], f4[:,::1], f4[:,::1], f4[::1], f4, b1, f4[:,::1])")
+def _shine(
+    points: Integers, places: Floats, normals: Floats, frame: Floats, table: Floats, scale: np.float32,
+    is_beside: bool, light: Floats,
+) -> None:  # fmt: skip
+    """Add the illuminance of points (4, n) by a pair of lamps to the light (2, n) on surfaces and across the beam [lx].
+
+    points  (h, w) of the image, -1 without one
+    frame   (4, 3) position relative to the camera, and axes forward, left, up
+    table   intensity of a lamp as by `_table`, to be scaled
+    """
+    # The lit window by every fourth point in both directions
+    height, width = points.shape
+    top, bottom, left, right = height, -1, width, -1
+    for line in range(0, height, _STRIDE):
+        for column in range(0, width, _STRIDE):
+            if points[line, column] >= 0 and _tangents(places, points[line, column], frame)[0] < _WIDTH:
+                top, bottom, left, right = min(top, line), max(bottom, line), min(left, column), max(right, column)
+    if bottom < 0:
+        return
+    for line in range(max(top - _STRIDE, 0), min(bottom + _STRIDE, height)):
+        for column in range(max(left - _STRIDE, 0), min(right + _STRIDE, width)):
+            point = points[line, column]
+            if point < 0:
+                continue
+            aside, above = _tangents(places, point, frame)
+            if aside < _WIDTH:
+                cell = int(above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)) * _COLUMNS
+                cell += int(aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE))
+                dx, dy, dz = (
+                    places[0, point] - frame[0, 0],
+                    places[1, point] - frame[0, 1],
+                    places[2, point] - frame[0, 2],
+                )
+                square = dx * dx + dy * dy + dz * dz
+                across = table[cell] * scale / square
+                facing = dx * normals[point, 0] + dy * normals[point, 1] + dz * normals[point, 2]
+                light[0, point] += across * max(-facing / np.sqrt(square), np.float32(0.0))
+                if is_beside:
+                    light[1, point] += across
+
+
+@kernel("UniTuple(f4, 2)(f4[:,::1], i8, f4[:,::1])")
+def _tangents(places: Floats, point: int, frame: Floats) -> tuple[np.float32, np.float32]:
+    """Return the tangents of the lateral and vertical angles of a point to the axis of a lamp; inf if it is not lit."""
+    dx, dy, dz = places[0, point] - frame[0, 0], places[1, point] - frame[0, 1], places[2, point] - frame[0, 2]
+    ahead = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+    if np.float32(0.3) < ahead < np.float32(REACH):
+        aside = (dx * frame[2, 0] + dy * frame[2, 1] + dz * frame[2, 2]) / ahead
+        above = (dx * frame[3, 0] + dy * frame[3, 1] + dz * frame[3, 2]) / ahead
+        if abs(aside) < np.float32(_WIDTH) and abs(above) < np.float32(_HEIGHT):
+            return aside, above
+    return np.float32(np.inf), np.float32(np.inf)
 
 
 def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats:

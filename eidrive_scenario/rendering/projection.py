@@ -9,19 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.rendering.model import MeshInstance
 from eidrive_scenario.world.camera import Pinhole
-
-Pixels = NDArray[np.intp] | slice
-"""Indices of pixels, line by line."""
 
 
 class CameraView:
     """Camera at a pose (4, 4): camera to world, x right, y down, z forward.
 
     place  (3,) position in the world [m]
-    x, y   (P,) of the rays through the pixels in the camera frame at depth 1, and their length
+    turn   (3, 3) rotation to world axes
+    own    (3, P) x and y of the rays through the pixels in the camera frame at depth 1, and their length
     """
 
     def __init__(self, pose: Array, pinhole: Pinhole) -> None:
@@ -29,38 +28,53 @@ class CameraView:
         self.pinhole = pinhole
         self.place: Array = pose[:3, 3]
         self.shape = (pinhole.height, pinhole.width)
-        self._turn = pose[:3, :3].astype(np.float32)
-        self.x, self.y, self.length = _own_rays(pinhole)
+        self.turn = np.ascontiguousarray(pose[:3, :3], dtype=np.float32)
+        self.own = _own_rays(pinhole)
 
-    def rays(self, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return rays with these x and y of the camera frame in world axes, at depth 1."""
-        turn = self._turn
-        rx, ry, rz = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] for axis in range(3))
-        return rx, ry, rz
+    def places(self, pixels: Integers, nearness: Floats) -> Floats:
+        """Return x, y, z relative to the camera and distance from it (4, n) [m] of points in pixels.
 
-    def directions(self, pixels: Pixels) -> tuple[Floats, Floats, Floats]:
-        """Return unit vectors through pixels in world axes."""
-        length = self.length[pixels]
-        rx, ry, rz = self.rays(self.x[pixels], self.y[pixels])
-        return rx / length, ry / length, rz / length
+        nearness  (H, W) 1 / depth of all pixels [1/m]
+        """
+        places = np.empty((4, len(pixels)), dtype=np.float32)
+        _find_places(pixels, nearness.ravel(), self.own, self.turn, places)
+        return places
+
+    def directions(self, pixels: Integers) -> Floats:
+        """Return unit vectors (3, n) through pixels in world axes."""
+        directions = np.empty((3, len(pixels)), dtype=np.float32)
+        _find_directions(pixels, self.own, self.turn, directions)
+        return directions
+
+
+@kernel("void(i8[::1], f4[::1], f4[:,::1], f4[:,::1], f4[:,::1])")
+def _find_places(pixels: Integers, nearness: Floats, own: Floats, turn: Floats, places: Floats) -> None:
+    for row, pixel in enumerate(pixels):
+        depth = np.float32(1.0) / nearness[pixel]
+        for axis in range(3):
+            places[axis, row] = _ray(pixel, own, turn, axis) * depth
+        places[3, row] = own[2, pixel] * depth
+
+
+@kernel("void(i8[::1], f4[:,::1], f4[:,::1], f4[:,::1])")
+def _find_directions(pixels: Integers, own: Floats, turn: Floats, directions: Floats) -> None:
+    for row, pixel in enumerate(pixels):
+        for axis in range(3):
+            directions[axis, row] = _ray(pixel, own, turn, axis) / own[2, pixel]
+
+
+@kernel("f4(i8, f4[:,::1], f4[:,::1], i8)")
+def _ray(pixel: int, own: Floats, turn: Floats, axis: int) -> np.float32:
+    """Return a coordinate of the ray through a pixel in world axes, at depth 1."""
+    return turn[axis, 0] * own[0, pixel] + turn[axis, 1] * own[1, pixel] + turn[axis, 2]  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=32)
-def _own_rays(pinhole: Pinhole) -> tuple[Floats, Floats, Floats]:
+def _own_rays(pinhole: Pinhole) -> Floats:
     columns = (np.arange(pinhole.width) + 0.5 - pinhole.center_x) / pinhole.focal
     rows = (np.arange(pinhole.height) + 0.5 - pinhole.center_y) / pinhole.focal
     x, y = (grid.ravel().astype(np.float32) for grid in np.meshgrid(columns, rows))
-    return x, y, np.sqrt(x * x + y * y + np.float32(1.0))
-
-
-def runs(pixels: NDArray[np.intp], most: int) -> list[NDArray[np.intp] | slice]:
-    """Return ascending pixel indices in parts of at most `most`. A contiguous part is a slice, which avoids copies."""
-    parts: list[NDArray[np.intp] | slice] = []
-    for start in range(0, len(pixels), most):
-        part = pixels[start : start + most]
-        first, last = int(part[0]), int(part[-1])
-        parts.append(slice(first, last + 1) if last - first + 1 == len(part) else part)
-    return parts
+    return np.stack([x, y, np.sqrt(x * x + y * y + np.float32(1.0))])
 
 
 _COARSE_PIXELS = 14.0
@@ -68,7 +82,7 @@ _COARSE_PIXELS = 14.0
 
 
 class Surfaces(NamedTuple):
-    """Properties of N triangles: normal in the world (3, N), albedo (3, N), finish (N,), label (N,), emission (3, N)
+    """Properties of N triangles: normal in the world (N, 3), albedo (N, 3), finish (N,), label (N,), emission (N, 3)
     [cd/m²].
     """
 
@@ -81,11 +95,11 @@ class Surfaces(NamedTuple):
     @classmethod
     def concatenate(cls, parts: Sequence[Surfaces]) -> Surfaces:
         """Return the triangles of all parts in sequence."""
-        return cls(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+        return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def take(self, rows: NDArray[np.int64]) -> Surfaces:
         """Return the properties of some triangles."""
-        return Surfaces._make(column.take(rows, axis=-1) for column in self)
+        return Surfaces._make(column.take(rows, axis=0) for column in self)
 
 
 class VisibleGeometry(NamedTuple):
@@ -105,7 +119,7 @@ def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pi
         for instance, pixels in _in_sight(instances, pose, pinhole, sides)
     ]
     if not parts:
-        empty = np.empty((3, 0), dtype=np.float32)
+        empty = np.empty((0, 3), dtype=np.float32)
         none = Surfaces(empty, empty, np.empty(0, dtype=np.uint8), np.empty(0, dtype=np.int32), empty)
         parts = [(np.empty((0, 3, 3), dtype=np.float32), none)]
     corners = np.concatenate([part for part, _ in parts])
@@ -160,13 +174,13 @@ def _facing(
         rows = np.flatnonzero(model.normals @ viewpoint > model.plane)
     # All corners in one table: numpy multiplies a stack of small matrices individually.
     corners = model.triangles[rows].reshape(-1, 3) @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
-    glow = np.zeros((3, len(rows)), dtype=np.float32)
+    glow = np.zeros((len(rows), 3), dtype=np.float32)
     if instance.glow:
         by_material = np.array([instance.glow.get(name, (0.0, 0.0, 0.0)) for name in model.materials], dtype=np.float32)
-        glow = by_material[model.material[rows]].T
-    normal = (model.normals[rows] @ instance.rotation.T.astype(np.float32)).T
+        glow = by_material[model.material[rows]]
+    normal = model.normals[rows] @ instance.rotation.T.astype(np.float32)
     label = np.full(len(rows), instance.label, dtype=np.int32)
-    return corners.reshape(-1, 3, 3), Surfaces(normal, model.albedo[rows].T, model.finish[rows], label, glow)
+    return corners.reshape(-1, 3, 3), Surfaces(normal, model.albedo[rows], model.finish[rows], label, glow)
 
 
 def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:

@@ -8,15 +8,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats
-from eidrive_scenario.rendering.daylight import daylight, dome, horizon
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.rendering.daylight import daylight, dome
 from eidrive_scenario.rendering.lamps import Beam, Lamplight, lamplight
 from eidrive_scenario.rendering.materials import SOAKS
 from eidrive_scenario.rendering.model import MeshInstance
-from eidrive_scenario.rendering.projection import CameraView, cull_and_project, runs
-from eidrive_scenario.rendering.rasterization import Cover, rasterize, rasterize_reference
-from eidrive_scenario.rendering.shading import Circumstances, Lit, lit_surfaces, points_at, sampled, shade, together
-from eidrive_scenario.rendering.shadows import ShadowMap, dimmed, shadow_grid
+from eidrive_scenario.rendering.projection import CameraView, cull_and_project
+from eidrive_scenario.rendering.rasterization import Cover, rasterize
+from eidrive_scenario.rendering.shading import (
+    Circumstances,
+    Lit,
+    draw_pixels,
+    draw_through_air,
+    label_pixels,
+    lit_surfaces,
+    sampled,
+    shade,
+    together,
+)
+from eidrive_scenario.rendering.shadows import Shadows, dimmed, shadow_grid
 from eidrive_scenario.rendering.surfaces import add_reflections
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.weather import Weather
@@ -63,21 +73,21 @@ class _Visible(NamedTuple):
 
     cover: Cover
     lit: Lit
-    shadows: ShadowMap | None
+    shadows: Shadows
     open_sky: Floats
 
 
 class _Canvas(NamedTuple):
-    """Light (3, P) [cd/m²], depth (P,) [m] and label (P,) of all pixels."""
+    """Light (P, 3) [cd/m²], depth (P,) [m] and label (P,) of all pixels."""
 
-    planes: Floats
+    light: Floats
     depth: Floats
     label: NDArray[np.int32]
 
     @classmethod
     def blank(cls, pixels: int) -> _Canvas:
         """Return a black canvas."""
-        empty = np.empty((3, pixels), dtype=np.float32)
+        empty = np.empty((pixels, 3), dtype=np.float32)
         return cls(empty, np.full(pixels, np.inf, dtype=np.float32), np.full(pixels, -1, dtype=np.int32))
 
 
@@ -86,14 +96,13 @@ class _Kept(NamedTuple):
 
     cover, lit  visible triangles and their light
     canvas      image without actors, in daylight on dry roads
-    heights     shadow heights of scenery, and the cells of the shadow grid of the pixels
+    heights     of the shadows of scenery, None without a sun that casts shadows
     """
 
     cover: Cover
     lit: Lit
     canvas: _Canvas
     heights: Floats | None
-    cells: NDArray[np.int32] | None
 
 
 class Renderer:
@@ -117,8 +126,6 @@ class Renderer:
 
         Scenery is cached from the second image with the same scenery on.
         """
-        import cv2
-
         subjects, beams, weather, pose, pinhole, ground = content
         light = daylight(weather)
         view = CameraView(pose, pinhole)
@@ -127,8 +134,7 @@ class Renderer:
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
         known = self._known(subjects, at) if self.MOST_KEPT > 0 else None
         canvas = _whole(subjects, felt, at, ground) if known is None else _renewed(known, subjects, felt, at, ground)
-        planes = [plane.reshape(view.shape) for plane in canvas.planes]
-        whole: Floats = np.asarray(cv2.merge(planes), dtype=np.float32)
+        whole = canvas.light.reshape(*view.shape, 3)
         if weather.lamps_on:
             whole = _with_glare(whole)
         return Radiance(whole, canvas.depth.reshape(view.shape), canvas.label.reshape(view.shape))
@@ -160,7 +166,7 @@ def _whole(subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground:
     """Return a completely drawn image."""
     cover, lit = _staged([*subjects.scenery, *subjects.actors], at)
     casters = [*subjects.standing, *subjects.actors, *subjects.unseen]
-    shadows = at.grid.drawn(casters) if at.grid is not None else None
+    shadows = Shadows.of(at.grid, at.grid.drawn(casters) if at.grid is not None else None)
     open_sky = dimmed(_dimming(subjects), cover, lit.upright, at.view)
     canvas = _Canvas.blank(cover.triangle.size)
     _draw(canvas, _Visible(cover, lit, shadows, open_sky), beams, at, ground)
@@ -181,9 +187,9 @@ def _dimming(subjects: Subjects) -> list[MeshInstance]:
 def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circumstances, ground: float) -> None:
     """Draw all pixels."""
     cover, surfaces = visible.cover, visible.lit.surfaces
-    triangle = cover.triangle.reshape(-1)
-    for part in runs(np.flatnonzero(triangle < 0), _AT_ONCE):
-        canvas.planes[:, part] = sampled(at.sky, *at.view.directions(part))
+    triangle = cover.triangle.ravel()
+    above = np.flatnonzero(triangle < 0)
+    draw_pixels(canvas.light, above, sampled(at.sky, *at.view.directions(above)))
     shown = np.flatnonzero(triangle >= 0)
     lamps = lamplight(beams, cover, surfaces, at.view) if beams else None
     is_dry = at.weather.wetness <= 0.0
@@ -192,17 +198,16 @@ def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circums
         return
     on_road = shown[SOAKS[surfaces.finish][triangle[shown]]]
     add_reflections(
-        canvas.planes, on_road, cover, at.view,
+        canvas.light, on_road, cover, at.view,
         open_sky=visible.open_sky, dome=at.sky, wetness=at.weather.wetness, ground=ground,
     )  # fmt: skip
-    for part in runs(shown, _AT_ONCE):
-        distance = at.view.length[part] * (np.float32(1.0) / cover.nearness.reshape(-1)[part])
-        canvas.planes[:, part] = _through_air(canvas.planes[:, part], distance, at.weather)
+    distance = at.view.places(shown, cover.nearness)[3]
+    draw_through_air(canvas.light, shown, canvas.light[shown], distance, at.weather)
 
 
 def _paint(
     canvas: _Canvas,
-    pixels: NDArray[np.intp],
+    pixels: Integers,
     visible: _Visible,
     lamps: Lamplight | None,
     at: Circumstances,
@@ -210,67 +215,48 @@ def _paint(
     fog: bool = True,
 ) -> None:
     """Draw pixels with a triangle, each independently."""
-    lit = visible.lit
-    for part in runs(pixels, _AT_ONCE):
-        points = points_at(part, visible.cover, at.view)
+    cover, lit = visible.cover, visible.lit
+    for start in range(0, len(pixels), _AT_ONCE):
+        part = pixels[start : start + _AT_ONCE]
+        triangle, places = cover.triangle.ravel()[part], at.view.places(part, cover.nearness)
         shone = None if lamps is None else Lamplight(lamps.received[part], lamps.across[part])
-        luminance = shade(points, lit, at, visible.shadows, shone, visible.open_sky.reshape(-1)[part])
-        canvas.planes[:, part] = _through_air(luminance, points.distance, at.weather) if fog else luminance
-        label = lit.surfaces.label.take(points.triangle)
-        beyond = np.flatnonzero(points.depth > at.view.pinhole.far)
-        points.depth[beyond], label[beyond] = np.inf, -1
-        canvas.depth[part], canvas.label[part] = points.depth, label
-
-
-def _through_air(luminance: Floats, distance: Floats, weather: Weather) -> Floats:
-    """Return light (3, n) attenuated over a distance, plus the light that the air scatters."""
-    through = np.exp(np.float32(-weather.extinction) * distance)
-    air = horizon(weather).astype(np.float32)[:, None]
-    found: Floats = luminance - air
-    found *= through
-    found += air
-    return found
+        luminance = shade(triangle, places, lit, at, visible.shadows, shone, visible.open_sky.ravel()[part])
+        draw_through_air(canvas.light, part, luminance, places[3], at.weather if fog else None)
+    far = np.float32(at.view.pinhole.far)
+    label_pixels(
+        pixels, cover.triangle.ravel(), cover.nearness.ravel(), lit.surfaces.label, far, canvas.depth, canvas.label
+    )
 
 
 def _scenery(subjects: Subjects, at: Circumstances) -> _Kept:
     """Return the image without actors, and the data that is needed to draw them."""
-    view = at.view
     cover, lit = _staged(subjects.scenery, at)
     canvas = _Canvas.blank(cover.triangle.size)
-    heights = cells = still = None
-    if at.grid is not None:
-        still = at.grid.drawn(subjects.standing)
-        heights = np.full((at.grid.height, at.grid.width), np.float32(-np.inf))
-        heights[still.window] = still.heights
-        cells = np.full(cover.triangle.size, -1, dtype=np.int32)
-        for part in runs(np.flatnonzero(cover.triangle.reshape(-1) >= 0), _AT_ONCE):
-            points = points_at(part, cover, view)
-            cells[part] = at.grid.numbers(points.x, points.y, points.z)
-    _draw(canvas, _Visible(cover, lit, still, np.ones(view.shape, dtype=np.float32)), (), at, 0.0)
-    return _Kept(cover, lit, canvas, heights, cells)
+    heights = at.grid.drawn(subjects.standing) if at.grid is not None else None
+    open_sky = np.ones(at.view.shape, dtype=np.float32)
+    _draw(canvas, _Visible(cover, lit, Shadows.of(at.grid, heights), open_sky), (), at, 0.0)
+    return _Kept(cover, lit, canvas, heights)
 
 
 def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
     """Return the image, redrawn in areas of actors and their shadows, or completely if neighbors emit light too."""
     view = at.view
     staged = cull_and_project(subjects.actors, view.pose, view.pinhole)
-    seen = rasterize_reference(staged.x, staged.y, staged.nearness, view.pinhole.width, view.pinhole.height)
     lit = together(known.lit, lit_surfaces(staged.surfaces, at.light, at.weather))
-    triangle, nearness = known.cover.triangle.copy(), known.cover.nearness.copy()
-    before = (seen.triangle >= 0) & (seen.nearness >= nearness[seen.window])
-    np.copyto(triangle[seen.window], seen.triangle + np.int32(len(known.lit.surfaces.finish)), where=before)
-    np.copyto(nearness[seen.window], seen.nearness, where=before)
-    cover = Cover(triangle, nearness)
+    cover, first = Cover(known.cover.triangle.copy(), known.cover.nearness.copy()), len(known.lit.surfaces.finish)
+    cover.draw(staged.x, staged.y, staged.nearness, first)
     open_sky = dimmed(_dimming(subjects), cover, lit.upright, view)
-    changed = open_sky < 1.0
-    changed[seen.window] |= before
-    shadows = None
-    if at.grid is not None and known.heights is not None and known.cells is not None:
-        shadows, cells = at.grid.drawn([*subjects.actors, *subjects.unseen]).over(known.heights)
-        changed |= cells[known.cells].reshape(view.shape)
+    changed = ((open_sky < 1.0) | (cover.triangle >= first)).ravel()
+    heights = None
+    if at.grid is not None and known.heights is not None:
+        heights = at.grid.drawn([*subjects.actors, *subjects.unseen], known.heights)
+    shadows = Shadows.of(at.grid, heights)
+    if known.heights is not None:
+        unchanged = np.flatnonzero(~changed & (known.cover.triangle.ravel() >= 0))
+        shadows.mark_new(known.heights, view.places(unchanged, known.cover.nearness), unchanged, changed)
     visible = _Visible(cover, lit, shadows, open_sky)
     if beams or at.weather.wetness > 0.0:
-        canvas = _Canvas.blank(triangle.size)
+        canvas = _Canvas.blank(changed.size)
         _draw(canvas, visible, beams, at, ground)
         return canvas
     canvas = _Canvas._make(values.copy() for values in known.canvas)

@@ -8,20 +8,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats
-from eidrive_scenario.rendering.daylight import GROUND_ALBEDO, Daylight, sample
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.kernels import kernel
+from eidrive_scenario.rendering.daylight import GROUND_ALBEDO, Daylight, horizon, sample
 from eidrive_scenario.rendering.lamps import LAMP_COLOR, Lamplight
 from eidrive_scenario.rendering.materials import GRAIN, MIRROR, RETURNS, SOAKS
-from eidrive_scenario.rendering.projection import CameraView, Pixels, Surfaces
-from eidrive_scenario.rendering.rasterization import Cover
-from eidrive_scenario.rendering.shadows import ShadowGrid, ShadowMap
-from eidrive_scenario.rendering.surfaces import DARKENING, variation
+from eidrive_scenario.rendering.projection import CameraView, Surfaces
+from eidrive_scenario.rendering.shadows import ShadowGrid, Shadows
+from eidrive_scenario.rendering.surfaces import DARKENING, grit, patches
 from eidrive_scenario.world.weather import Weather
 
 _STREET_LAMP = np.array([1.08, 1.0, 0.78])
 """Color of street lamps, linear sRGB."""
 _GLINT = 350.0
 """Exponent of the reflection of the sun in car paint: a spot of some four degrees."""
+_DULL = 0.93
+"""Cosine of the angle to the reflected sun beyond which it adds less than 1e-11 of its peak."""
 
 
 class Circumstances(NamedTuple):
@@ -34,170 +36,208 @@ class Circumstances(NamedTuple):
     grid: ShadowGrid | None
 
 
-class Points(NamedTuple):
-    """Points in pixels (n,): triangles, depth [m], positions relative to the camera [m] and distance from it [m]."""
-
-    triangle: NDArray[np.int32]
-    depth: Floats
-    x: Floats
-    y: Floats
-    z: Floats
-    distance: Floats
-
-
-def points_at(pixels: Pixels, cover: Cover, view: CameraView) -> Points:
-    """Return the points of pixels with a triangle."""
-    far = np.float32(1.0) / cover.nearness.reshape(-1)[pixels]
-    rx, ry, rz = view.rays(view.x[pixels], view.y[pixels])
-    triangle = cover.triangle.reshape(-1)[pixels]
-    return Points(triangle, far, rx * far, ry * far, rz * far, view.length[pixels] * far)
-
-
 class Lit(NamedTuple):
-    """Illumination of N triangles: luminance (3, N) by sky and street lamps, additional luminance by the sun (None: no
-    sun), and sum of both.
-    """
+    """Illumination of N triangles: luminance (N, 3) by sky and street lamps, and additional luminance by the sun."""
 
     surfaces: Surfaces
     steady: Floats
-    sunny: Floats | None
-    whole: Floats
+    sunny: Floats
 
     @property
     def upright(self) -> NDArray[np.bool_]:
         """Whether the triangles face upwards (N,)."""
-        upwards: NDArray[np.bool_] = self.surfaces.normal[2] > 0.9
+        upwards: NDArray[np.bool_] = self.surfaces.normal[:, 2] > 0.9
         return upwards
 
 
 def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
     """Return the illumination of whole triangles."""
-    nx, ny, nz = surfaces.normal
+    nx, ny, nz = (part[:, None] for part in surfaces.normal.T)
     reflected = surfaces.albedo * np.float32(1.0 / math.pi)
     up = np.float32(0.5) + np.float32(0.5) * nz
-    incoming = up * _column(light.sky) + (np.float32(1.0) - up) * _column(GROUND_ALBEDO * light.ground)
+    incoming = up * _single(light.sky) + (np.float32(1.0) - up) * _single(GROUND_ALBEDO * light.ground)
     if weather.street_lighting > 0.0 and weather.lamps_on:
         level = np.float32(0.35) + np.float32(0.65) * np.maximum(nz, np.float32(0.0))
-        incoming += level * _column(weather.street_lighting * _STREET_LAMP)
-    steady: Floats = reflected * incoming + surfaces.glow
-    sunny = None
-    if light.sun.any():
-        sx, sy, sz = light.towards.astype(np.float32)
-        facing = np.maximum(sx * nx + sy * ny + sz * nz, np.float32(0.0))
-        sunny = reflected * facing * _column(light.sun)
-    return Lit(surfaces, steady, sunny, steady if sunny is None else steady + sunny)
+        incoming += level * _single(weather.street_lighting * _STREET_LAMP)
+    sx, sy, sz = light.towards.astype(np.float32)
+    facing = np.maximum(sx * nx + sy * ny + sz * nz, np.float32(0.0))
+    return Lit(surfaces, reflected * incoming + surfaces.glow, reflected * facing * _single(light.sun))
 
 
 def together(first: Lit, second: Lit) -> Lit:
     """Return the triangles of both, those of the second after those of the first."""
-    sunny = None
-    if first.sunny is not None and second.sunny is not None:
-        sunny = np.concatenate([first.sunny, second.sunny], axis=1)
-    steady, whole = np.hstack([first.steady, second.steady]), np.hstack([first.whole, second.whole])
-    return Lit(Surfaces.concatenate([first.surfaces, second.surfaces]), steady, sunny, whole)
+    steady, sunny = np.concatenate([first.steady, second.steady]), np.concatenate([first.sunny, second.sunny])
+    return Lit(Surfaces.concatenate([first.surfaces, second.surfaces]), steady, sunny)
 
 
 def shade(
-    points: Points,
+    triangle: NDArray[np.int32],
+    places: Floats,
     among: Lit,
     at: Circumstances,
-    shadows: ShadowMap | None,
-    lamplight: Lamplight | None,
+    shadows: Shadows,
+    lamps: Lamplight | None,
     open_sky: Floats,
 ) -> Floats:
-    """Return the luminance (3, n) of points at close distance [cd/m²]: sun and sky, lamps, and emission.
+    """Return the luminance (n, 3) of points at close distance [cd/m²]: sun and sky, lamps, and emission.
 
-    lamplight and open_sky (n,) are those of the points; open_sky is the share of sky light that nearby bodies leave.
+    triangle  (n,) index in `among`
+    places    (4, n) as by `CameraView.places`
+    lamps     light of headlamps on the points
+    open_sky  (n,) share of sky light that nearby bodies leave
     """
-    triangle = points.triangle
     finish = among.surfaces.finish[triangle]
-    lit = None if shadows is None or among.sunny is None else shadows.lit(points.x, points.y, points.z)
-    luminance: Floats
-    if lit is None and (open_sky == 1.0).all():
-        luminance = among.whole.take(triangle, axis=1)
-    else:
-        luminance = among.steady.take(triangle, axis=1)
-        luminance *= open_sky
-        if among.sunny is not None:
-            sunny: Floats = among.sunny.take(triangle, axis=1)
-            if lit is not None:
-                sunny *= lit
-            luminance += sunny
-    if lamplight is not None:
-        shone = lamplight.received * np.float32(1.0 / math.pi) + lamplight.across * RETURNS[finish]
+    sun = shadows.sun_share(places)
+    luminance = np.empty((len(triangle), 3), dtype=np.float32)
+    _illuminate(triangle, among.steady, among.sunny, open_sky, sun, luminance)
+    if lamps is not None:
+        shone = lamps.received * np.float32(1.0 / math.pi) + lamps.across * RETURNS[finish]
         lamp_lit = np.flatnonzero(shone)
-        albedo = among.surfaces.albedo.take(triangle[lamp_lit], axis=1)
-        luminance[:, lamp_lit] += albedo * shone[lamp_lit] * LAMP_COLOR[:, None]
-    _add_grain(luminance, points, finish, at)
-    _add_mirrors(luminance, points, among.surfaces, at, lit)
+        albedo = among.surfaces.albedo[triangle[lamp_lit]]
+        luminance[lamp_lit] += albedo * shone[lamp_lit, None] * LAMP_COLOR
+    wet = np.float32(1.0 - DARKENING * min(2.0 * at.weather.wetness, 1.0))
+    place = (at.view.place[:2] % 4096.0).astype(np.float32)
+    factors = np.where(SOAKS, wet, np.float32(1.0))
+    _add_grain(luminance, places, finish, GRAIN, factors, place, patches(), grit())
+    _add_mirrors(luminance, triangle, places, among.surfaces, at, sun)
     return luminance
 
 
-def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], at: Circumstances) -> None:
-    """Add spatial variation of road and soil, and darken wet parts."""
-    grain = GRAIN[finish]
-    grained = np.flatnonzero(grain)
-    if not len(grained):
-        return
-    x = points.x[grained] + np.float32(at.view.place[0] % 4096.0)
-    y = points.y[grained] + np.float32(at.view.place[1] % 4096.0)
-    factor = np.float32(1.0) + grain[grained] * variation(x, y, points.distance[grained])
-    if at.weather.wetness > 0.0:
-        soaked = SOAKS[finish[grained]]
-        wet = np.float32(1.0 - DARKENING * min(2.0 * at.weather.wetness, 1.0))
-        factor *= np.where(soaked, wet, np.float32(1.0))
-    whole = np.ones(len(grain), dtype=np.float32)
-    whole[grained] = np.maximum(factor, np.float32(0.2))
-    luminance *= whole
+@kernel("void(i4[::1], f4[:,::1], f4[:,::1], f4[::1], f4[::1], f4[:,::1])")
+def _illuminate(
+    triangle: NDArray[np.int32], steady: Floats, sunny: Floats, open_sky: Floats, sun: Floats, luminance: Floats
+) -> None:
+    """Compute the luminance (n, 3) of triangles by the shares (n,) of sky and sun."""
+    for row, number in enumerate(triangle):
+        for color in range(3):
+            luminance[row, color] = steady[number, color] * open_sky[row] + sunny[number, color] * sun[row]
 
 
-def _add_mirrors(luminance: Floats, points: Points, surfaces: Surfaces, at: Circumstances, lit: Floats | None) -> None:
-    """Add reflections of sky and sun in paint, glass and metal; `lit` is the share of the sun (n,), None for all."""
-    mirror, light = MIRROR[surfaces.finish[points.triangle]], at.light
+@kernel("void(f4[:,::1], f4[:,::1], u1[::1], f4[::1], f4[::1], f4[::1], f4[:,::1], f4[:,::1])")
+def _add_grain(
+    luminance: Floats, places: Floats, finish: NDArray[np.uint8], grain: Floats, factors: Floats, place: Floats,
+    patches: Floats, grit: Floats,
+) -> None:  # fmt: skip
+    """Add spatial variation of road and soil: grit near the camera, patches everywhere; darken wet parts by factors.
+
+    place (2,) is that of the camera; patches and grit are periodic tables with 4 and 24 values per meter.
+    """
+    mask = len(patches) - 1
+    for row, kind in enumerate(finish):
+        if grain[kind] == 0.0:
+            continue
+        x, y = places[0, row] + place[0], places[1, row] + place[1]
+        wide = patches[int(y * np.float32(4.0)) & mask, int(x * np.float32(4.0)) & mask] * np.float32(0.35)
+        fine = grit[int(y * np.float32(24.0)) & mask, int(x * np.float32(24.0)) & mask]
+        fine *= np.float32(4.0) / (np.float32(6.0) + places[3, row])
+        factor = max((np.float32(1.0) + grain[kind] * (wide + fine)) * factors[kind], np.float32(0.2))
+        for color in range(3):
+            luminance[row, color] *= factor
+
+
+def _add_mirrors(
+    luminance: Floats, triangle: NDArray[np.int32], places: Floats, surfaces: Surfaces, at: Circumstances, sun: Floats
+) -> None:
+    """Add reflections of sky and sun in paint, glass and metal; `sun` is the share of the sun (n,)."""
+    mirror, light = MIRROR[surfaces.finish[triangle]], at.light
     rows = np.flatnonzero(mirror)
     if not len(rows):
         return
-    nx, ny, nz = surfaces.normal.take(points.triangle[rows], axis=1)
-    distance = points.distance[rows]
-    dx, dy, dz = (part[rows] / distance for part in (points.x, points.y, points.z))
-    inwards = np.minimum(dx * nx + dy * ny + dz * nz, np.float32(-1e-3))
-    twice = np.float32(2.0) * inwards
-    rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
-    base = mirror[rows]
-    # Schlick's approximation of Fresnel's law
-    left = np.float32(1.0) + inwards
-    square = left * left
-    share = base + (np.float32(1.0) - base) * (square * square * left)
-    below = _column(GROUND_ALBEDO / math.pi * light.ground)
-    upwards = np.clip(rz * np.float32(8.0) + np.float32(0.5), np.float32(0.0), np.float32(1.0))
-    seen = sampled(at.sky, rx, ry, rz)
-    seen -= below
-    seen *= upwards
-    seen += below
+    rays, share = np.empty((4, len(rows)), dtype=np.float32), np.empty(len(rows), dtype=np.float32)
+    towards = light.towards.astype(np.float32)
+    _reflect(rows, places, triangle, surfaces.normal, mirror, towards, rays, share)
+    lobe = np.zeros(len(rows), dtype=np.float32)
     if light.sun.any():
-        sx, sy, sz = light.towards.astype(np.float32)
-        towards = rx * sx + ry * sy + rz * sz
-        glinting = np.flatnonzero(towards > _DULL)
-        if len(glinting):
-            lobe = towards[glinting] ** np.float32(_GLINT)
-            lobe *= np.float32((_GLINT + 2.0) / (2.0 * math.pi))
-            if lit is not None:
-                lobe *= lit[rows[glinting]]
-            seen[:, glinting] += lobe * _column(light.sun)
-    # A specular surface shows less of its color, as reflected light does not enter it.
-    own = luminance[:, rows]
-    seen -= own * np.minimum(base, np.float32(0.5))
-    seen *= share
-    seen += own
-    luminance[:, rows] = seen
+        glinting = np.flatnonzero(rays[3] > _DULL)
+        lobe[glinting] = rays[3, glinting] ** np.float32(_GLINT) * np.float32((_GLINT + 2.0) / (2.0 * math.pi))
+        lobe *= sun[rows]
+    below = (GROUND_ALBEDO / math.pi * light.ground).astype(np.float32)
+    seen = sampled(at.sky, *rays[:3])
+    _mix(rows, luminance, mirror, share, rays[2], below, seen, lobe, light.sun.astype(np.float32))
 
 
-_DULL = 0.93
-"""Cosine of the angle to the reflected sun beyond which it adds less than 1e-11 of its peak."""
+@kernel("void(i8[::1], f4[:,::1], i4[::1], f4[:,::1], f4[::1], f4[::1], f4[:,::1], f4[::1])")
+def _reflect(
+    rows: Integers, places: Floats, triangle: NDArray[np.int32], normal: Floats, mirror: Floats, sun: Floats,
+    rays: Floats, share: Floats,
+) -> None:  # fmt: skip
+    """Compute reflected rays with the cosines of their angles to the sun (4, m), and shares of reflected light (m,)."""
+    for number, row in enumerate(rows):
+        facet = triangle[row]
+        nx, ny, nz = normal[facet, 0], normal[facet, 1], normal[facet, 2]
+        distance = places[3, row]
+        dx, dy, dz = places[0, row] / distance, places[1, row] / distance, places[2, row] / distance
+        inwards = min(dx * nx + dy * ny + dz * nz, np.float32(-1e-3))
+        twice = np.float32(2.0) * inwards
+        rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
+        rays[0, number], rays[1, number], rays[2, number] = rx, ry, rz
+        rays[3, number] = rx * sun[0] + ry * sun[1] + rz * sun[2]
+        # Schlick's approximation of Fresnel's law
+        left = np.float32(1.0) + inwards
+        square = left * left
+        share[number] = mirror[row] + (np.float32(1.0) - mirror[row]) * (square * square * left)
 
 
-def _column(color: Array) -> Floats:
-    found: Floats = color.astype(np.float32)[:, None]
+@kernel("void(i8[::1], f4[:,::1], f4[::1], f4[::1], f4[::1], f4[::1], f4[:,::1], f4[::1], f4[::1])")
+def _mix(
+    rows: Integers, luminance: Floats, mirror: Floats, share: Floats, upwards: Floats, below: Floats, sky: Floats,
+    lobe: Floats, sun: Floats,
+) -> None:  # fmt: skip
+    """Mix the luminance of points with that of the sky (m, 3) or the ground below in their reflected rays, and the sun.
+
+    A specular surface shows less of its color, as reflected light does not enter it.
+    """
+    for number, row in enumerate(rows):
+        rise = min(max(upwards[number] * np.float32(8.0) + np.float32(0.5), np.float32(0.0)), np.float32(1.0))
+        hidden = min(mirror[row], np.float32(0.5))
+        for color in range(3):
+            seen = (sky[number, color] - below[color]) * rise + below[color] + lobe[number] * sun[color]
+            own = luminance[row, color]
+            luminance[row, color] = (seen - own * hidden) * share[number] + own
+
+
+def draw_through_air(
+    image: Floats, pixels: Integers, luminance: Floats, distance: Floats, weather: Weather | None
+) -> None:
+    """Draw light (n, 3) in pixels of an image (P, 3): attenuated over distances (n,), plus the light that the air
+    scatters; unchanged without weather.
+    """
+    if weather is None:
+        draw_pixels(image, pixels, luminance)
+    else:
+        through = np.exp(np.float32(-weather.extinction) * distance)
+        _attenuate(luminance, through, _single(horizon(weather)), pixels, image)
+
+
+@kernel("void(f4[:,::1], i8[::1], f4[:,::1])")
+def draw_pixels(image: Floats, pixels: Integers, light: Floats) -> None:
+    """Write light (n, 3) into pixels (n,) of an image (P, 3)."""
+    for row, pixel in enumerate(pixels):
+        for color in range(3):
+            image[pixel, color] = light[row, color]
+
+
+@kernel("void(f4[:,::1], f4[::1], f4[::1], i8[::1], f4[:,::1])")
+def _attenuate(luminance: Floats, through: Floats, air: Floats, pixels: Integers, image: Floats) -> None:
+    for row, pixel in enumerate(pixels):
+        for color in range(3):
+            image[pixel, color] = (luminance[row, color] - air[color]) * through[row] + air[color]
+
+
+@kernel("void(i8[::1], i4[::1], f4[::1], i4[::1], f4, f4[::1], i4[::1])")
+def label_pixels(
+    pixels: Integers, triangle: NDArray[np.int32], nearness: Floats, labels: NDArray[np.int32], far: np.float32,
+    depth: Floats, label: NDArray[np.int32],
+) -> None:  # fmt: skip
+    """Write depth (P,) and label (P,) of pixels with triangles (P,) up to the distance `far`."""
+    for pixel in pixels:
+        beyond = np.float32(1.0) / nearness[pixel] > far
+        depth[pixel] = np.inf if beyond else np.float32(1.0) / nearness[pixel]
+        label[pixel] = -1 if beyond else labels[triangle[pixel]]
+
+
+def _single(color: Array) -> Floats:
+    found: Floats = color.astype(np.float32)
     return found
 
 
@@ -205,12 +245,7 @@ _ROW = 256
 
 
 def sampled(sky: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """Return the sky (3, n) in directions (n,), which OpenCV requires as an image."""
-    count = len(x)
-    shape = (-(-count // _ROW), _ROW)
-    grids = []
-    for part in (x, y, z):
-        grid = np.zeros(shape, dtype=np.float32)
-        grid.ravel()[:count] = part
-        grids.append(grid)
-    return np.ascontiguousarray(sample(sky, *grids).reshape(-1, 3)[:count].T)
+    """Return the sky (n, 3) in directions (n,), which OpenCV requires as an image."""
+    grids = np.zeros((3, len(x) // _ROW + 1, _ROW), dtype=np.float32)
+    grids.reshape(3, -1)[:, : len(x)] = x, y, z
+    return sample(sky, *grids).reshape(-1, 3)[: len(x)]

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.rendering.model import MeshInstance
 from eidrive_scenario.rendering.projection import CameraView
-from eidrive_scenario.rendering.rasterization import Cover, greatest
+from eidrive_scenario.rendering.rasterization import Cover
 
 REACH = 80.0
 """Maximum distance of shadows from the camera [m]."""
@@ -45,113 +46,100 @@ class ShadowGrid:
     base: float
     origin: Array
 
-    def cells(self, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
-        """Return column and row of points relative to the camera, counted from the center of the first cell."""
-        (ax, ay, az), (bx, by, bz) = self.axes.astype(np.float32)
-        start, scale = self.low.astype(np.float32), np.float32(self.scale)
-        column = (ax * x + ay * y + az * z - start[0]) * scale - np.float32(0.5)
-        row = (bx * x + by * y + bz * z - start[1]) * scale - np.float32(0.5)
-        return column, row
+    def drawn(self, casters: Sequence[MeshInstance], onto: Floats | None = None) -> Floats:
+        """Return the heights (height, width) along the rays of the sun of the first surface of bodies, -inf without.
 
-    def numbers(self, x: Floats, y: Floats, z: Floats) -> NDArray[np.int32]:
-        """Return the cells (n,) of points, counted between cell centers line by line; -1 outside the grid."""
-        column, row = (np.floor(part) for part in self.cells(x, y, z))
-        within = (column >= 0) & (column < self.width - 1) & (row >= 0) & (row < self.height - 1)
-        found: NDArray[np.int32] = np.where(within, row * np.float32(self.width) + column, -1.0).astype(np.int32)
-        return found
-
-    def drawn(self, casters: Sequence[MeshInstance]) -> ShadowMap:
-        """Return the shadow map of bodies.
-
-        It contains the sides that face away from the sun: the sides that face it are above and do not shade themselves.
+        They are drawn onto the heights of other bodies. They are those of the sides that face away from the sun: the
+        sides that face it are above and do not shade themselves.
         """
-        found = [corners for caster in casters if (corners := _away(caster, self)) is not None]
-        if not found:
-            return ShadowMap(self, np.empty((0, 0), dtype=np.float32), 0, 0)
-        corners = np.concatenate(found)
-        across, up, level = (
-            np.ascontiguousarray((corners @ axis).reshape(-1, 3).T) for axis in (*self.axes, self.towards)
-        )
-        across, up = (across - self.low[0]) * self.scale, (up - self.low[1]) * self.scale
-        found_heights, line, column = greatest(across, up, level - self.base, self.width, self.height)
-        # An empty margin of one cell is included, as points are interpolated between four cells.
-        rows, columns = found_heights.shape
-        top, left = max(line - 1, 0), max(column - 1, 0)
-        bottom, right = min(line + rows + 1, self.height), min(column + columns + 1, self.width)
-        heights = np.full((bottom - top, right - left), np.float32(-np.inf))
-        inner = heights[line - top : line - top + rows, column - left : column - left + columns]
-        np.copyto(inner, found_heights, where=found_heights > 0.0)
-        return ShadowMap(self, heights, top, left)
+        nothing = np.full((self.height, self.width), np.float32(-np.inf))
+        heights = nothing if onto is None else onto.copy()
+        away = [corners for caster in casters if (corners := _away(caster, self)) is not None]
+        if away:
+            corners = np.concatenate(away)
+            across, up, level = ((corners @ axis).reshape(-1, 3).T for axis in (*self.axes, self.towards))
+            across, up = (across - self.low[0]) * self.scale, (up - self.low[1]) * self.scale
+            Cover(np.empty(heights.shape, dtype=np.int32), heights).draw(across, up, level - self.base)
+        return heights
 
 
-@dataclass(frozen=True)
-class ShadowMap:
-    """Heights (h, w) along the rays of the sun of the first surface in a window of the grid; outside there is none."""
+class Shadows(NamedTuple):
+    """Shadows of the sun.
 
-    grid: ShadowGrid
+    heights  (height, width) along the rays of the sun of the first surface in a grid, -inf without
+    rows     (4, 4) columns, lines and heights of points relative to the camera: factors of x, y, z, and the constant;
+             in the last row the scale of columns and lines
+    """
+
     heights: Floats
-    top: int
-    left: int
+    rows: Floats
 
-    @property
-    def window(self) -> tuple[slice, slice]:
-        """Lines and columns in the grid."""
-        height, width = self.heights.shape
-        return slice(self.top, self.top + height), slice(self.left, self.left + width)
+    @classmethod
+    def of(cls, grid: ShadowGrid | None, heights: Floats | None) -> Shadows:
+        """Return the shadows of these heights in a grid; none without a grid."""
+        if grid is None or heights is None:
+            return cls(np.empty((0, 0), dtype=np.float32), np.zeros((4, 4), dtype=np.float32))
+        margin = _SLACK + 0.35 / grid.scale - grid.base
+        rows = np.column_stack([np.vstack([grid.axes, grid.towards]), [-grid.low[0], -grid.low[1], margin]])
+        return cls(heights, np.vstack([rows, np.full(4, grid.scale)]).astype(np.float32))
 
-    def lit(self, x: Floats, y: Floats, z: Floats) -> Floats | None:
-        """Return the share of the sun (n,) at points relative to the camera [m], 1 outside the grid; None if all are
-        fully lit.
-        """
-        height, width = self.heights.shape
-        column, row = self.grid.cells(x, y, z)
-        left, top = np.floor(column), np.floor(row)
-        within = (
-            (left >= self.left) & (left < self.left + width - 1) & (top >= self.top) & (top < self.top + height - 1)
-        )
-        some = np.flatnonzero(within)
-        if not len(some):
-            return None
-        sx, sy, sz = self.grid.towards.astype(np.float32)
-        margin = np.float32(_SLACK + 0.35 / self.grid.scale - self.grid.base)
-        at = (top[some].astype(np.int32) - np.int32(self.top)) * np.int32(width)
-        at += left[some].astype(np.int32) - np.int32(self.left)
-        level = sx * x[some] + sy * y[some] + sz * z[some] + margin
-        below = np.flatnonzero(self._highest.take(at) > level)
-        if not len(below):
-            return None
-        some, at, level = some[below], at[below], level[below]
-        right, down = column[some] - left[some], row[some] - top[some]
-        heights = self.heights.ravel()
-        upper = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
-        at += np.int32(width)
-        lower = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
-        found = np.ones(len(x), dtype=np.float32)
-        found[some] = np.float32(1.0) - (upper + (lower - upper) * down)
-        return found
+    def sun_share(self, places: Floats) -> Floats:
+        """Return the share of the sun (n,) at points (3 or more, n) relative to the camera [m], 1 outside the grid."""
+        share = np.empty(places.shape[1], dtype=np.float32)
+        _share_of_sun(places, self.heights, self.rows, share)
+        return share
 
-    @cached_property
-    def _highest(self) -> Floats:
-        """Maximum of the four cells around a point (h · w,); -inf in the last line and column."""
-        heights = self.heights
-        found = np.full_like(heights, -np.inf)
-        pairs = np.maximum(heights[:-1], heights[1:])
-        np.maximum(pairs[:, :-1], pairs[:, 1:], out=found[:-1, :-1])
-        return found.ravel()
+    def mark_new(self, before: Floats, places: Floats, pixels: Integers, changed: NDArray[np.bool_]) -> None:
+        """Mark pixels (n,) with points at these places whose shadows may differ from those of lower heights."""
+        _mark_new(places, self.heights, before, self.rows, pixels, changed)
 
-    def over(self, still: Floats) -> tuple[ShadowMap, NDArray[np.bool_]]:
-        """Return this map combined with the heights (height, width) of static objects, and the cells that change
-        points.
 
-        The cells (height · width + 1,) extend between cell centers. The last one represents points outside the grid.
-        """
-        heights = still.copy()
-        window = self.window
-        np.maximum(heights[window], self.heights, out=heights[window])
-        changed = np.zeros((still.shape[0] + 1, still.shape[1] + 1), dtype=bool)
-        changed[:-1, :-1][window] = heights[window] > still[window]
-        around = changed[:-1, :-1] | changed[:-1, 1:] | changed[1:, :-1] | changed[1:, 1:]
-        return ShadowMap(self.grid, heights, 0, 0), np.append(around.ravel(), False)
+@kernel("f4(f4, f4, f4, f4[:,::1], i8)")
+def _coordinate(x: np.float32, y: np.float32, z: np.float32, rows: Floats, axis: int) -> np.float32:
+    """Return the column (axis 0) or line (axis 1) of a point, counted from the center of the first cell."""
+    along = rows[axis, 0] * x + rows[axis, 1] * y + rows[axis, 2] * z + rows[axis, 3]
+    return along * rows[3, 0] - np.float32(0.5)  # type: ignore[no-any-return]
+
+
+@kernel("void(f4[:,::1], f4[:,::1], f4[:,::1], f4[::1])")
+def _share_of_sun(places: Floats, heights: Floats, rows: Floats, share: Floats) -> None:
+    """Compute the share of the sun of points: interpolated between the four cells around each, lit or not."""
+    one = np.float32(1.0)
+    height, width = heights.shape
+    for point in range(len(share)):
+        share[point] = one
+        x, y, z = places[0, point], places[1, point], places[2, point]
+        column, line = _coordinate(x, y, z, rows, 0), _coordinate(x, y, z, rows, 1)
+        if not (0.0 <= column < width - 1 and 0.0 <= line < height - 1):
+            continue
+        left, top = int(column), int(line)
+        level = rows[2, 0] * x + rows[2, 1] * y + rows[2, 2] * z + rows[2, 3]
+        right, down = column - np.float32(left), line - np.float32(top)
+        upper, lower = np.float32(0.0), np.float32(0.0)
+        if heights[top, left] > level:
+            upper += one - right
+        if heights[top, left + 1] > level:
+            upper += right
+        if heights[top + 1, left] > level:
+            lower += one - right
+        if heights[top + 1, left + 1] > level:
+            lower += right
+        share[point] = one - (upper + (lower - upper) * down)
+
+
+@kernel("void(f4[:,::1], f4[:,::1], f4[:,::1], f4[:,::1], i8[::1], b1[::1])")
+def _mark_new(
+    places: Floats, heights: Floats, before: Floats, rows: Floats, pixels: Integers, changed: NDArray[np.bool_]
+) -> None:
+    height, width = heights.shape
+    for point, pixel in enumerate(pixels):
+        x, y, z = places[0, point], places[1, point], places[2, point]
+        column, line = _coordinate(x, y, z, rows, 0), _coordinate(x, y, z, rows, 1)
+        if 0.0 <= column < width - 1 and 0.0 <= line < height - 1:
+            left, top = int(column), int(line)
+            for row in (top, top + 1):
+                changed[pixel] |= heights[row, left] > before[row, left]
+                changed[pixel] |= heights[row, left + 1] > before[row, left + 1]
 
 
 def shadow_grid(towards: Array, view: CameraView) -> ShadowGrid | None:
@@ -243,41 +231,38 @@ def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.boo
             continue
         window = _window(middle, body, half, view)
         if window is not None:
-            _dim(share[window], window, middle, body, cover, upright, view)
+            _dim(share, window, middle, body, cover, upright, view)
     return share
 
 
 def _dim(
-    share: Floats,
-    window: _Window,
-    middle: Array,
-    body: MeshInstance,
-    cover: Cover,
-    upright: NDArray[np.bool_],
+    share: Floats, window: _Window, middle: Array, body: MeshInstance, cover: Cover, upright: NDArray[np.bool_],
     view: CameraView,
-) -> None:
-    """Multiply the share of sky light of one body in its window of the image."""
+) -> None:  # fmt: skip
+    """Multiply the share (H, W) of sky light of one body in its window of the image."""
     triangle = cover.triangle[window]
-    rows = np.flatnonzero(upright[triangle] & (triangle >= 0))
-    if not len(rows):
-        return
-    far = np.float32(1.0) / cover.nearness[window].ravel()[rows]
-    own_x, own_y = (part.reshape(view.shape)[window].ravel()[rows] for part in (view.x, view.y))
-    x, y, z = (ray * far for ray in view.rays(own_x, own_y))
-    level = np.flatnonzero(np.abs(z - np.float32(middle[2])) < _NEAR_GROUND)
-    rows, dx, dy = rows[level], x[level] - np.float32(middle[0]), y[level] - np.float32(middle[1])
-    half = body.model.half
-    cos, sin = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
-    # Distance from the rectangle below the body, negative inside
-    ahead = np.abs(cos * dx + sin * dy) - np.float32(half[0])
-    aside = np.abs(cos * dy - sin * dx) - np.float32(half[1])
-    inwards = np.minimum(np.maximum(ahead, aside), np.float32(0.0))
-    ahead, aside = np.maximum(ahead, np.float32(0.0)), np.maximum(aside, np.float32(0.0))
-    outside = np.sqrt(ahead * ahead + aside * aside) + inwards
-    rise = np.clip((outside + np.float32(_INSET)) / np.float32(_INSET + _REACH), np.float32(0.0), np.float32(1.0))
-    rise *= np.float32(2.0) - rise
-    lines, columns = np.divmod(rows, share.shape[1])
-    share[lines, columns] = np.minimum(share[lines, columns], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
+    pixels = np.arange(share.size).reshape(share.shape)[window][upright[triangle] & (triangle >= 0)]
+    forward = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
+    base = np.array([*middle, *body.model.half[:2], *forward], dtype=np.float32)
+    _darken(pixels, view.places(pixels, cover.nearness), base, share.ravel())
+
+
+@kernel("void(i8[::1], f4[:,::1], f4[::1], f4[::1])")
+def _darken(pixels: Integers, places: Floats, base: Floats, share: Floats) -> None:
+    """Darken the ground around the rectangle below a body: x, y, z of its center, half extents, and its direction."""
+    zero, one, two = np.float32(0.0), np.float32(1.0), np.float32(2.0)
+    cos, sin = base[5], base[6]
+    for point, pixel in enumerate(pixels):
+        if abs(places[2, point] - base[2]) < np.float32(_NEAR_GROUND):
+            dx, dy = places[0, point] - base[0], places[1, point] - base[1]
+            # Distance from the rectangle, negative inside
+            ahead, aside = abs(cos * dx + sin * dy) - base[3], abs(cos * dy - sin * dx) - base[4]
+            inwards = min(max(ahead, aside), zero)
+            ahead, aside = max(ahead, zero), max(aside, zero)
+            outside = np.sqrt(ahead * ahead + aside * aside) + inwards
+            rise = min(max((outside + np.float32(_INSET)) / np.float32(_INSET + _REACH), zero), one)
+            rise *= two - rise
+            share[pixel] = min(share[pixel], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
 
 
 def _window(middle: Array, body: MeshInstance, half: Array, view: CameraView) -> _Window | None:

@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.rendering.daylight import sample
 from eidrive_scenario.rendering.projection import CameraView
@@ -61,28 +62,6 @@ def hollows() -> Floats:
     return _layered("hollows", ((8.0, 0.35), (22.0, 1.0)))
 
 
-def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
-    """Return the relative variation of a surface at world positions [m], about ±1: grit near the camera, patches
-    everywhere.
-    """
-    found: Floats = _looked_up(patches(), x, y, 4.0)
-    found *= np.float32(0.35)
-    fine = _looked_up(grit(), x, y, 24.0)
-    fine *= np.float32(4.0) / (np.float32(6.0) + distance)
-    found += fine
-    return found
-
-
-def _looked_up(table: Floats, x: Floats, y: Floats, per_meter: float) -> Floats:
-    """Return the values of a periodic table at positions [m]."""
-    mask = np.int32(SIZE - 1)
-    at = (y * np.float32(per_meter)).astype(np.int32)
-    at &= mask
-    at *= np.int32(SIZE)
-    at += (x * np.float32(per_meter)).astype(np.int32) & mask
-    return table.ravel().take(at)
-
-
 WATER = 0.02
 """Share of light that water reflects at normal incidence (Fresnel, index 1.33)."""
 DARKENING = 0.45
@@ -92,10 +71,10 @@ _HEIGHT = 0.15
 
 
 def add_reflections(
-    planes: Floats, on_road: NDArray[np.intp], cover: Cover, view: CameraView, *,
+    light: Floats, on_road: Integers, cover: Cover, view: CameraView, *,
     open_sky: Floats, dome: Floats, wetness: float, ground: float,
 ) -> None:  # fmt: skip
-    """Add reflections of a wet road to the luminance (3, P) of pixels, from an image of half the resolution.
+    """Add reflections of a wet road to the luminance (P, 3) of pixels, from an image of half the resolution.
 
     `ground` is the height of the road below the camera [m].
     """
@@ -104,57 +83,55 @@ def add_reflections(
 
     if not len(on_road):
         return
-    numbers = np.arange(planes.shape[1]).reshape(view.shape)[::2, ::2]
+    numbers = np.arange(len(light)).reshape(view.shape)[::2, ::2]
     small = replace(view.pinhole.finer(0.5), width=numbers.shape[1], height=numbers.shape[0])
     x, y, z = (part.reshape(numbers.shape) for part in view.directions(numbers.ravel()))
     sky = sample(dome, x, y, np.abs(z))
     some = numbers[cover.triangle[::2, ::2] >= 0]
-    far = np.float32(1.0) / cover.nearness.ravel()[some]
-    rx, ry, rz = view.rays(view.x[some], view.y[some])
-    places = (rx * far, ry * far, rz * far)
-    image = mirrored(planes[:, some], places, sky, ground - float(view.place[2]), view.pose, small)
+    image = mirrored(
+        light[some], view.places(some, cover.nearness), sky, ground - float(view.place[2]), view.pose, small
+    )
     image = np.asarray(cv2.resize(blurred(image), view.shape[::-1], interpolation=cv2.INTER_LINEAR))
-    rx, ry, rz = view.rays(view.x[on_road], view.y[on_road])
-    far = np.float32(1.0) / cover.nearness.ravel()[on_road]
-    share = reflectance(np.abs(rz / view.length[on_road]))
+    share = reflectance(np.abs(view.directions(on_road)[2]))
     place = (view.place % 4096.0).astype(np.float32)
-    share *= puddles(rx * far + place[0], ry * far + place[1], wetness, hollows())
-    dim = open_sky.ravel()[on_road]
-    for own, plane in zip(planes, cv2.split(image), strict=True):
-        before = own[on_road]
-        own[on_road] = before + share * (np.ravel(plane)[on_road] * dim - before)
+    x, y, _, _ = view.places(on_road, cover.nearness)
+    share *= puddles(x + place[0], y + place[1], wetness, hollows())
+    before, dim = light[on_road], open_sky.ravel()[on_road, None]
+    light[on_road] = before + share[:, None] * (image.reshape(-1, 3)[on_road] * dim - before)
 
 
-def mirrored(
-    light: Floats, places: tuple[Floats, Floats, Floats], sky: Floats, ground: float, pose: Array, pinhole: Pinhole
-) -> Floats:
+def mirrored(light: Floats, places: Floats, sky: Floats, ground: float, pose: Array, pinhole: Pinhole) -> Floats:
     """Return the image (H, W, 3) of a mirror in the plane z = ground [m, relative to the camera].
 
-    light (3, n) of the visible points at positions x, y, z (n,) relative to the camera. sky (H, W, 3) is used for
-    pixels without a reflected point. Only visible points are reflected.
+    light (n, 3) of the visible points at places (3 or more, n) relative to the camera. sky (H, W, 3) is used for
+    pixels without a reflected point. Only visible points are reflected, and the nearest one of each pixel is seen.
     """
-    standing = np.flatnonzero(places[2] > ground + _HEIGHT)
-    if not len(standing):
-        return sky
-    x, y, z = (part[standing] for part in places)
-    z = np.float32(2.0 * ground) - z
-    right, down, forward = (pose[:3, k].astype(np.float32) for k in range(3))
-    depth = np.maximum(x * forward[0] + y * forward[1] + z * forward[2], np.float32(1e-3))
-    scale = np.float32(pinhole.focal) / depth
-    u = (x * right[0] + y * right[1] + z * right[2]) * scale + np.float32(pinhole.center_x)
-    v = (x * down[0] + y * down[1] + z * down[2]) * scale + np.float32(pinhole.center_y)
-    inside = np.flatnonzero((u >= 0) & (u < pinhole.width) & (v >= 0) & (v < pinhole.height) & (depth > 0.3))
-    target = v[inside].astype(np.int64) * pinhole.width + u[inside].astype(np.int64)
-    # The nearest point of each pixel wins: nearness above the index in one key, as in `rasterization`.
-    key = (np.float32(1.0) / depth[inside]).view(np.uint32).astype(np.uint64) << np.uint64(32)
-    key |= (inside + 1).astype(np.uint64)
-    held = np.zeros(pinhole.width * pinhole.height, dtype=np.uint64)
-    np.maximum.at(held, target, key)
-    source = (held & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
-    found = np.flatnonzero(source >= 0)
-    image = sky.reshape(-1, 3).copy()
-    image[found] = light[:, standing[source[found]]].T
-    return image.reshape(sky.shape)
+    image, nearness = sky.copy(), np.zeros(sky.shape[:2], dtype=np.float32)
+    lens = np.array([pinhole.focal, pinhole.center_x, pinhole.center_y, ground + _HEIGHT, 2.0 * ground])
+    turn = np.ascontiguousarray(pose[:3, :3], dtype=np.float32)
+    _mirror(light, places, lens.astype(np.float32), turn, nearness, image)
+    return image
+
+
+@kernel("void(f4[:,::1], f4[:,::1], f4[::1], f4[:,::1], f4[:,::1], f4[:,:,::1])")
+def _mirror(light: Floats, places: Floats, lens: Floats, turn: Floats, nearness: Floats, image: Floats) -> None:
+    """Draw mirrored points; lens: focal length, center, minimum height of points, and twice that of the mirror."""
+    height, width = nearness.shape
+    for row in range(len(light)):
+        x, y, z = places[0, row], places[1, row], places[2, row]
+        if not z > lens[3]:
+            continue
+        z = lens[4] - z
+        depth = max(x * turn[0, 2] + y * turn[1, 2] + z * turn[2, 2], np.float32(1e-3))
+        scale = lens[0] / depth
+        u = (x * turn[0, 0] + y * turn[1, 0] + z * turn[2, 0]) * scale + lens[1]
+        v = (x * turn[0, 1] + y * turn[1, 1] + z * turn[2, 1]) * scale + lens[2]
+        if depth > np.float32(0.3) and 0.0 <= u < width and 0.0 <= v < height:
+            line, column, near = int(v), int(u), np.float32(1.0) / depth
+            if near >= nearness[line, column]:
+                nearness[line, column] = near
+                for color in range(3):
+                    image[line, column, color] = light[row, color]
 
 
 def blurred(image: Floats) -> Floats:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.world.camera import CameraImage, Radiance
 
 LUMA: Array = np.array([0.2126, 0.7152, 0.0722])
@@ -41,16 +43,44 @@ def _luma(luminance: Floats) -> Floats:
     return found
 
 
-def tone_map(signal: Floats) -> NDArray[np.uint8]:
-    """Return the pixel values of an image given as shares of white; higher values are clipped."""
-    steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0))
-    steps *= np.float32(_STEPS - 1)
-    return _TONES.take(steps.astype(np.uint16))
+class PixelNoise(NamedTuple):
+    """Noise of a signal s in shares of white: the variance is variance[0] + variance[1] s.
+
+    numbers  random numbers, one for each value of the image
+    normal   value of the standard normal distribution for each random number
+    """
+
+    variance: Floats
+    numbers: NDArray[np.uint16]
+    normal: Floats
+
+
+_NO_NOISE = PixelNoise(np.zeros(2, np.float32), np.empty(0, np.uint16), np.empty(0, np.float32))
+
+
+def tone_map(luminance: Floats, white: float, noise: PixelNoise = _NO_NOISE) -> NDArray[np.uint8]:
+    """Return the pixel values of an image (H, W, 3) whose white has this luminance; higher values are clipped."""
+    light, image = np.ascontiguousarray(luminance), np.empty(luminance.shape, dtype=np.uint8)
+    _tone_map(light.reshape(-1), np.float32(1.0 / white), *noise, _TONES, image.reshape(-1))
+    return image
+
+
+@kernel("void(f4[::1], f4, f4[::1], u2[::1], f4[::1], u1[::1], u1[::1])")
+def _tone_map(
+    light: Floats, scale: np.float32, variance: Floats, numbers: NDArray[np.uint16], normal: Floats,
+    tones: NDArray[np.uint8], image: NDArray[np.uint8],
+) -> None:  # fmt: skip
+    zero, one, steps = np.float32(0.0), np.float32(1.0), np.float32(len(tones) - 1)
+    for place in range(len(light)):
+        signal = light[place] * scale
+        if len(numbers):
+            signal += np.sqrt(max(zero, signal) * variance[1] + variance[0]) * normal[numbers[place]]
+        image[place] = tones[int(min(max(zero, signal), one) * steps)]
 
 
 def ideal_image(seen: Radiance) -> CameraImage:
     """Return the image of an ideal camera that receives this light: automatic exposure, no noise."""
-    rgb = tone_map(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
+    rgb = tone_map(seen.luminance, white_level(seen.luminance))
     return CameraImage(rgb, seen.depth, seen.segmentation)
 
 

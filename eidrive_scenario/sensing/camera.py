@@ -15,7 +15,7 @@ from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.base.content_digest import content_digest
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.rendering.tone_mapping import tone_map, white_level
+from eidrive_scenario.rendering.tone_mapping import PixelNoise, tone_map, white_level
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading, DeferredImage
 from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
@@ -113,8 +113,6 @@ SATURATION = 78.0
 """H_sat = 78 / S: exposure that saturates a sensor of speed S [lx s] (ISO 12232)."""
 BASE_SPEED = 100.0
 """Speed of the sensor at a gain of 0 dB."""
-_BLOCK_SIZE = 49_152
-"""Number of values per block, which fit into the processor cache; a multiple of four."""
 
 
 @dataclass(frozen=True)
@@ -150,28 +148,15 @@ def develop(
     Noise is the linear model of EMVA 1288 (release 4.0): for a mean of n electrons, the variance is n + read noise²;
     gain reduces the electrons of full scale. Electrons are drawn from a normal distribution, one value per channel.
     """
-    image = np.empty(luminance.shape, dtype=np.uint8)
-    light, values = luminance.reshape(-1), image.reshape(-1)
-    for start in range(0, len(light), _BLOCK_SIZE):
-        part = slice(start, start + _BLOCK_SIZE)
-        signal = light[part] * np.float32(1.0 / exposure.saturation)
-        if noise is not None:
-            signal += noise_of(signal, exposure, noise, draws)
-        values[part] = tone_map(signal)
-    return image
-
-
-def noise_of(signal: Floats, exposure: Exposure, noise: NoiseSettings, draws: np.random.Generator) -> Floats:
-    """Return the noise of a signal; both as shares of full scale."""
+    if noise is None:
+        return tone_map(luminance, exposure.saturation)
     well = noise.full_well / _linear(exposure.gain)
-    deviation: Floats = np.maximum(signal, np.float32(0.0))
-    deviation *= np.float32(1.0 / well)
-    deviation += np.float32((noise.read_noise / well) ** 2)
-    np.sqrt(deviation, out=deviation)
+    variance = np.array([(noise.read_noise / well) ** 2, 1.0 / well], dtype=np.float32)
     # Each value of the generator contains four numbers of 16 bits.
-    raw: NDArray[np.uint64] = draws.bit_generator.random_raw(-(-signal.size // 4))
-    deviation *= _normal_values(1 << 16).take(raw.view(np.uint16)[: signal.size]).reshape(signal.shape)
-    return deviation
+    numbers: NDArray[np.uint64] = draws.bit_generator.random_raw(-(-luminance.size // 4))
+    return tone_map(
+        luminance, exposure.saturation, PixelNoise(variance, numbers.view(np.uint16), _normal_values(1 << 16))
+    )
 
 
 @cache

@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION
 from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
 
 HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
 """Tested headings of the first axis [rad]."""
+_COS, _SIN = np.cos(HEADINGS), np.sin(HEADINGS)
 CLOSEST = 0.03
 """Minimum distance from an edge that counts [m]."""
 MOST_POINTS = 300
@@ -46,9 +48,8 @@ def rectangles(plan: Array) -> list[Rectangle]:
     laser scanners, IV 2017, algorithm 4. Other headings that are peaks of about the same closeness follow.
     """
     chosen = plan if len(plan) <= MOST_POINTS else plan[:: math.ceil(len(plan) / MOST_POINTS)]
-    cos, sin = np.cos(HEADINGS)[:, None], np.sin(HEADINGS)[:, None]
-    along, across = cos * chosen[:, 0] + sin * chosen[:, 1], cos * chosen[:, 1] - sin * chosen[:, 0]
-    nearest = np.minimum(_to_edge(along), _to_edge(across))
+    nearest = np.empty((len(HEADINGS), len(chosen)))
+    _find_nearest_edges(np.ascontiguousarray(chosen[:, 0]), np.ascontiguousarray(chosen[:, 1]), _COS, _SIN, nearest)
     # The second term decides between headings that are equal by the criterion, by the distances of all points. Without
     # it the first one would be selected, and a mirrored object would not have a mirrored heading.
     closeness = np.sum(1.0 / np.maximum(nearest, CLOSEST), axis=1) + 1.0 / (1.0 + np.sum(nearest, axis=1))
@@ -66,12 +67,28 @@ def bounds(plan: Array, yaw: float) -> Rectangle:
     return Rectangle(yaw, (float(along.min()), float(across.min())), (float(along.max()), float(across.max())))
 
 
-def _to_edge(values: Array) -> Array:
-    """Return the distance (H, N) of each value from the end of its row's range that is closer to the whole row."""
-    to_high, to_low = values.max(axis=1, keepdims=True) - values, values - values.min(axis=1, keepdims=True)
-    nearer_high = np.einsum("hn,hn->h", to_high, to_high) < np.einsum("hn,hn->h", to_low, to_low)
-    nearest: Array = np.where(nearer_high[:, None], to_high, to_low)
-    return nearest
+@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1])")
+def _find_nearest_edges(x: Array, y: Array, cos: Array, sin: Array, nearest: Array) -> None:
+    """Find the distances (H, N) of points to the nearer of two edges of the rectangle of each heading around them.
+
+    Of both edges across an axis, the one that is closer to all points by the sum of squares counts.
+    """
+    count = len(x)
+    for heading in range(len(cos)):
+        for axis in range(2):
+            ax, ay = (cos[heading], sin[heading]) if axis == 0 else (-sin[heading], cos[heading])
+            low, high = math.inf, -math.inf
+            for point in range(count):
+                place = ax * x[point] + ay * y[point]
+                low, high = min(low, place), max(high, place)
+            of_low = of_high = 0.0
+            for point in range(count):
+                place = ax * x[point] + ay * y[point]
+                of_low, of_high = of_low + (place - low) ** 2, of_high + (high - place) ** 2
+            for point in range(count):
+                place = ax * x[point] + ay * y[point]
+                distance = high - place if of_high < of_low else place - low
+                nearest[heading, point] = min(nearest[heading, point], distance) if axis else distance
 
 
 RANGE_NOISE = 0.03

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.base.randomness import generator
 
 SECTORS = 24
@@ -52,40 +50,52 @@ def ground_height(points: Array, foot: float) -> Array:
     sector = np.rint(turn).astype(np.int64) % SECTORS
     bins = int(distance.max() / BIN) + 1
     cell = sector * bins + (distance / BIN).astype(np.int64)
-    low = _lowest(points[:, 2], cell)
+    lowest = np.full(SECTORS * bins, -1)
+    _find_lowest(np.ascontiguousarray(points[:, 2]), cell, lowest)
+    low = lowest[lowest >= 0]
     near = low[distance[low] < NEAR]
     slope = _plane(points[near, :2], points[near, 2] - foot)
-    plane = foot + points[:, :2] @ slope
+    plane: Array = foot + points[:, :2] @ slope
     offset, where = np.full((SECTORS, bins), np.inf), np.zeros((SECTORS, bins))
     offset.ravel()[cell[low]] = points[low, 2] - plane[low]
     where.ravel()[cell[low]] = distance[low]
-    # Outward along each sector: a point is ground if it is hardly higher or lower than the last one that is.
-    is_ground = np.zeros(offset.shape, dtype=bool)
-    last, at = np.zeros(SECTORS), np.zeros(SECTORS)
-    for number in range(bins):
-        fits = np.abs(offset[:, number] - last) <= BEND * (where[:, number] - at) + ROUGHNESS
-        is_ground[:, number] = fits
-        last, at = np.where(fits, offset[:, number], last), np.where(fits, where[:, number], at)
-    order = np.argsort(sector, kind="stable")
-    bounds = np.searchsorted(sector[order], np.arange(SECTORS + 1))
-    for number in range(SECTORS):
-        mine = order[bounds[number] : bounds[number + 1]]
-        known = is_ground[number]
-        if mine.size and known.any():
-            along = np.concatenate([[0.0], where[number, known]])
-            plane[mine] += np.interp(distance[mine], along, np.concatenate([[0.0], offset[number, known]]))
+    _follow_ground(offset, where, sector, distance, plane)
     return plane
 
 
-def _lowest(z: Array, cell: Integers) -> Integers:
-    """Return the row of the lowest point of each cell, in order of the cells; of several, the first one."""
-    count = int(cell.max()) + 1
-    height = np.full(count, np.inf)
-    np.minimum.at(height, cell, z)
-    rows = np.flatnonzero(z == height[cell])[::-1]
-    row = np.full(count, -1)
-    row[cell[rows]] = rows
-    return row[row >= 0]
+@kernel("void(f8[::1], i8[::1], i8[::1])")
+def _find_lowest(z: Array, cell: Integers, lowest: Integers) -> None:
+    """Find the row of the lowest point of each cell; of several, the first one."""
+    for row, number in enumerate(cell):
+        if lowest[number] < 0 or z[row] < z[lowest[number]]:
+            lowest[number] = row
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i8[::1], f8[::1], f8[::1])")
+def _follow_ground(offset: Array, where: Array, sector: Integers, distance: Array, plane: Array) -> None:
+    """Add the offsets of the ground from the plane below points (N,), interpolated along the sector of each.
+
+    offset, where  (SECTORS, B) offset of the lowest point of each bin from the plane, and its distance; reused
+    """
+    sectors, bins = offset.shape
+    knots = np.zeros(sectors, dtype=np.int64)
+    for number in range(sectors):
+        # Outward along the sector: a point is ground if it is hardly higher or lower than the last one that is.
+        last = at = 0.0
+        for place in range(bins):
+            rise, reach = offset[number, place], where[number, place]
+            if abs(rise - last) <= BEND * (reach - at) + ROUGHNESS:
+                last, at = rise, reach
+                offset[number, knots[number]], where[number, knots[number]] = rise, reach
+                knots[number] += 1
+    for row, number in enumerate(sector):
+        x, x0, y0, knot = distance[row], 0.0, 0.0, 0
+        while knot < knots[number] and where[number, knot] <= x:
+            x0, y0 = where[number, knot], offset[number, knot]
+            knot += 1
+        if knot < knots[number]:
+            y0 += (offset[number, knot] - y0) / (where[number, knot] - x0) * (x - x0)
+        plane[row] += y0
 
 
 def _plane(plan: Array, rise: Array) -> Array:
@@ -128,7 +138,7 @@ DEEPEST = 4.5
 def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> list[Integers]:
     """Return the rows of each cluster of points (N, 2 or more) in plan view, with the sensor at the origin.
 
-    Euclidean clustering with a k-d tree (Rusu, Semantic 3D object maps, 2010). The distance threshold grows with the
+    Euclidean clustering (Rusu, Semantic 3D object maps, 2010). The distance threshold grows with the
     distance from the sensor, as the gaps between the columns of rays do. With `grazing`, points of neighboring columns
     are also connected by the angle between the ray and the line through the points, for surfaces at grazing incidence
     (Bogoslavskyi and Stachniss, Fast range image-based segmentation of sparse 3D laser scans, IROS 2016).
@@ -139,27 +149,46 @@ def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> lis
     _, cell = np.unique(np.floor(plan / CELL).astype(np.int64) @ (1 << 24, 1), return_inverse=True)
     counts = np.bincount(cell)
     x, y = np.bincount(cell, plan[:, 0]) / counts, np.bincount(cell, plan[:, 1]) / counts
-    first, second = _connected_pairs(x, y, azimuth_step, grazing)
-    links = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(len(x), len(x)))
-    count, of_cell = connected_components(links, directed=False)
-    label = of_cell[cell]
-    order = np.argsort(label, kind="stable")
-    ends = np.searchsorted(label[order], np.arange(count + 1))
-    return [order[ends[number] : ends[number + 1]].astype(np.int64) for number in range(count)]
-
-
-def _connected_pairs(x: Array, y: Array, azimuth_step: float, grazing: bool) -> tuple[Integers, Integers]:
-    """Return the pairs of cells that are connected."""
     distance = np.hypot(x, y)
     reach = np.maximum(NEAREST, COLUMNS * azimuth_step * distance)
-    farthest = math.hypot(float(reach.max()), DEEPEST) if grazing else float(reach.max())
-    pairs = cKDTree(np.stack([x, y], axis=1)).query_pairs(farthest, output_type="ndarray")
-    a, b = pairs[:, 0], pairs[:, 1]
-    gap = np.hypot(x[a] - x[b], y[a] - y[b])
-    near = gap <= np.minimum(reach[a], reach[b])
-    if grazing:
-        between = np.abs(np.arctan2(x[a] * y[b] - y[a] * x[b], x[a] * x[b] + y[a] * y[b]))
-        ahead, behind = np.minimum(distance[a], distance[b]), np.maximum(distance[a], distance[b])
-        steep = np.arctan2(ahead * np.sin(between), behind - ahead * np.cos(between)) >= GRAZING
-        near |= (between <= NEXT_COLUMN * azimuth_step) & steep & (behind - ahead <= DEEPEST)
-    return a[near].astype(np.int64), b[near].astype(np.int64)
+    of_cell = np.arange(len(x))
+    _connect(x, y, distance, reach, azimuth_step, grazing, of_cell)
+    label = np.unique(of_cell, return_inverse=True)[1][cell]
+    return np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1])
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8, b1, i8[::1])")
+def _connect(
+    x: Array, y: Array, distance: Array, reach: Array, azimuth_step: float, grazing: bool, label: Integers
+) -> None:
+    """Find the first cell of the cluster of each cell; cells are in order of the columns of their grid."""
+    farthest = math.hypot(reach.max(), DEEPEST) if grazing else reach.max()
+    for second in range(len(x)):
+        for first in range(second - 1, -1, -1):
+            if x[second] - x[first] > farthest + CELL:
+                break
+            gap = math.hypot(x[second] - x[first], y[second] - y[first])
+            if gap > farthest:
+                continue
+            connected = gap <= min(reach[first], reach[second])
+            ahead, behind = min(distance[first], distance[second]), max(distance[first], distance[second])
+            if grazing and not connected and behind - ahead <= DEEPEST:
+                between = abs(
+                    math.atan2(x[first] * y[second] - y[first] * x[second], x[first] * x[second] + y[first] * y[second])
+                )
+                steep = math.atan2(ahead * math.sin(between), behind - ahead * math.cos(between)) >= GRAZING
+                connected = steep and between <= NEXT_COLUMN * azimuth_step
+            if connected:
+                low, high = _root(label, first), _root(label, second)
+                label[max(low, high)] = min(low, high)
+    for cell in range(len(x)):
+        label[cell] = label[label[cell]]
+
+
+@kernel("i8(i8[::1], i8)")
+def _root(label: Integers, cell: int) -> int:
+    """Return the first cell of a cluster, and shorten the path to it."""
+    while label[cell] != cell:
+        label[cell] = label[label[cell]]
+        cell = label[cell]
+    return cell

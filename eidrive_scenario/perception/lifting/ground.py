@@ -9,6 +9,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION, MapContext
 from eidrive_scenario.perception.geometry.projection import NEAREST, level_frame, straight_boxes
 from eidrive_scenario.perception.geometry.size_priors import possible_classes, prior_of
@@ -297,24 +298,11 @@ class _View:
     def _project(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
         """Return edges (3, N, K, 4) of the projections, and depths (3, N, K) of the centers."""
         corners = self._hulls * self._sizes[:, None]
-        cos, sin = np.cos(headings)[..., None], np.sin(headings)[..., None]
-        x = cos * corners[:, None, :, 0] - sin * corners[:, None, :, 1] + place[..., 0:1]
-        y = sin * corners[:, None, :, 0] + cos * corners[:, None, :, 1] + place[..., 1:2]
-        z = np.broadcast_to((corners[:, None, :, 2] + ground[:, None, None] - self._frame.height), x.shape)
-        turn = self._turn
-        across = turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z
-        down = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
-        ahead = np.maximum(turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z, NEAREST)
-        u, v = across / ahead, down / ahead
-        top, bottom = v.min(axis=-1), v.max(axis=-1)
-        if self._cut.any():
-            # Parts outside the border show neither top nor bottom: only points within the image count.
-            is_visible = (u >= self._borders[:, None, None, 0]) & (u <= self._borders[:, None, None, 1])
-            any_visible = is_visible.any(axis=-1)
-            top = np.where(any_visible, np.where(is_visible, v, np.inf).min(axis=-1), top)
-            bottom = np.where(any_visible, np.where(is_visible, v, -np.inf).max(axis=-1), bottom)
-        edges = np.stack([u.min(axis=-1), top, u.max(axis=-1), bottom], axis=-1)
-        return edges, ahead.mean(axis=-1)
+        corners[..., 2] = corners[..., 2] + ground[:, None] - self._frame.height
+        edges, depth = np.empty((*place.shape[:3], 4)), np.empty(place.shape[:3])
+        turn, borders = np.ascontiguousarray(self._turn), np.ascontiguousarray(self._borders)
+        _find_edges(corners, np.cos(headings), np.sin(headings), place, turn, NEAREST, self._cut, borders, edges, depth)
+        return edges, depth
 
     def _weights(self, depth: Array) -> Array:
         """Return the inverse standard deviation (N, K, 4) of each edge, from the box and the prior size."""
@@ -335,3 +323,49 @@ class _View:
         axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
         sizes = (self._deviations[:, :2] / 2.0) ** 2
         return np.asarray(scale[:, None, None] * fit + np.einsum("nij,nj,nkj->nik", axes, sizes, axes))
+
+
+@kernel(
+    "void(f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[:,::1], f8, b1[::1], f8[:,::1], f8[:,:,:,::1],"
+    "f8[:,:,::1])"
+)
+def _find_edges(
+    corners: Array, cos: Array, sin: Array, place: Array, turn: Array, nearest: float, cut: Bools, borders: Array,
+    edges: Array, depth: Array,
+) -> None:  # fmt: skip
+    """Find left, top, right, bottom of the projections of hulls (N, P, 3) at places (T, N, K, 2) and headings (N, K).
+
+    cut, borders  (N,) and (N, 2) whether and where the left and right border of the image cut an object: parts outside
+                  show neither top nor bottom, if others are within the image
+    depth         (T, N, K) mean of the points, of which P is a multiple of eight
+    """
+    trials, count, headings, _ = place.shape
+    partial = np.empty(8)
+    for trial in range(trials):
+        for row in range(count):
+            for heading in range(headings):
+                px, py = place[trial, row, heading, 0], place[trial, row, heading, 1]
+                c, s = cos[row, heading], sin[row, heading]
+                left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+                visible_top, visible_bottom = np.inf, -np.inf
+                partial[:] = 0.0
+                for point in range(corners.shape[1]):
+                    x = c * corners[row, point, 0] - s * corners[row, point, 1] + px
+                    y = s * corners[row, point, 0] + c * corners[row, point, 1] + py
+                    z = corners[row, point, 2]
+                    ahead = max(turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z, nearest)
+                    u = (turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z) / ahead
+                    v = (turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z) / ahead
+                    left, top, right, bottom = min(left, u), min(top, v), max(right, u), max(bottom, v)
+                    if cut[row] and borders[row, 0] <= u <= borders[row, 1]:
+                        visible_top, visible_bottom = min(visible_top, v), max(visible_bottom, v)
+                    partial[point % 8] += ahead
+                if visible_top <= visible_bottom:
+                    top, bottom = visible_top, visible_bottom
+                edges[trial, row, heading, 0], edges[trial, row, heading, 1] = left, top
+                edges[trial, row, heading, 2], edges[trial, row, heading, 3] = right, bottom
+                # The order in which numpy adds, for which equal terms have equal sums
+                total = ((partial[0] + partial[1]) + (partial[2] + partial[3])) + (
+                    (partial[4] + partial[5]) + (partial[6] + partial[7])
+                )
+                depth[trial, row, heading] = total / corners.shape[1]

@@ -11,8 +11,8 @@ import pytest
 from eidrive_scenario import __version__
 
 HEAVY = (
-    "asn1tools", "cv2", "dask", "jinja2", "matplotlib", "mcap", "networkx", "onnxruntime", "openvino", "optuna",
-    "pandas", "pyarrow", "pyproj", "scipy", "sqlite3", "torch",
+    "asn1tools", "cv2", "dask", "jinja2", "matplotlib", "mcap", "networkx", "numba", "onnxruntime", "openvino",
+    "optuna", "pandas", "pyarrow", "pyproj", "scipy", "sqlite3", "torch",
 )  # fmt: skip
 SHORT = (*HEAVY, "msgspec", "numpy", "py_trees", "pybullet", "rich", "simpleeval", "yaml")
 UNUSED = (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
-from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box, rectangles
+from eidrive_scenario.perception.lidar.box_fit import HEADINGS, Fit, _find_nearest_edges, fit_box, rectangles
 
 PATTERN = Pattern(math.radians(1.0), math.radians(1.0), math.radians(15.0))
 CLASSES = ("car", "van", "truck", "bus", "motorbike", "bicycle", "pedestrian")
@@ -220,3 +220,16 @@ def test_fit_box_of_single_column_beside_occluder_extends_behind_it(seed: int) -
     )
     assert left.box[1] == pytest.approx(2.3, abs=0.1)
     assert right.box[1] == pytest.approx(-2.3, abs=0.1)
+
+
+def test_distances_to_the_nearer_edges_equal_those_of_turned_points() -> None:
+    plan = np.random.default_rng(4).normal(0.0, 2.0, (60, 2))
+    cos, sin = np.cos(HEADINGS), np.sin(HEADINGS)
+    nearest = np.empty((len(HEADINGS), len(plan)))
+    _find_nearest_edges(np.ascontiguousarray(plan[:, 0]), np.ascontiguousarray(plan[:, 1]), cos, sin, nearest)
+    for c, s, distances in zip(cos, sin, nearest, strict=True):
+        edges = []
+        for places in (plan @ (c, s), plan @ (-s, c)):
+            both = places - places.min(), places.max() - places
+            edges.append(min(both, key=lambda part: float((part**2).sum())))
+        np.testing.assert_allclose(distances, np.minimum(*edges), atol=1e-12)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, clusters, ground_height
+from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, _follow_ground, clusters, ground_height
 
 
 def rings(height: float, slope: tuple[float, float] = (0.0, 0.0), columns: int = 90) -> np.ndarray:
@@ -59,6 +59,23 @@ def test_ground_height_without_points_is_empty() -> None:
     assert ground_height(np.empty((0, 3)), 0.0).shape == (0,)
 
 
+def test_ground_height_between_knots_is_interpolated() -> None:
+    """Sectors 0 and 12: a plane that the lowest points of bins of 2 m leave by small steps, as `np.interp` does."""
+    rng = np.random.default_rng(3)
+    offset, where = np.full((24, 20), np.inf), np.zeros((24, 20))
+    for number in (0, 12):
+        where[number] = 2.0 * np.arange(20) + rng.uniform(0.0, 1.9, 20)
+        offset[number] = np.cumsum(rng.uniform(-0.05, 0.05, 20))
+    offset[0, 7] += 1.5  # a body
+    sector, distance, plane = np.repeat([0, 12, 5], 50), rng.uniform(0.0, 50.0, 150), np.ones(150)
+    expected = np.ones(150)
+    for number, knots in ((0, np.delete(np.arange(20), 7)), (12, np.arange(20))):
+        along, rise = ([0.0, *table[number, knots]] for table in (where, offset))
+        expected[sector == number] += np.interp(distance[sector == number], along, rise)
+    _follow_ground(offset, where, sector, distance, plane)
+    np.testing.assert_array_equal(plane, expected)
+
+
 def groups(points: np.ndarray, step: float = 0.01, **options: bool) -> list[list[int]]:
     return sorted(sorted(rows.tolist()) for rows in clusters(points, step, **options))
 
@@ -93,6 +110,24 @@ def test_clusters_are_independent_of_point_order() -> None:
     order = rng.permutation(len(points))
     shuffled = sorted(sorted(int(order[row]) for row in rows) for rows in clusters(points[order], 0.01))
     assert shuffled == groups(points) == [list(range(20)), list(range(20, 40)), list(range(40, 60))]
+
+
+def test_clusters_are_the_connected_components_of_near_cells() -> None:
+    """Random points, compared with a search in the table of all distances between the centers of their cells."""
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-12.0, 12.0, (400, 2))
+    cells = sorted(set(map(tuple, np.floor(points / 0.1).astype(int).tolist())))
+    members = [[row for row in range(400) if tuple(np.floor(points[row] / 0.1)) == cell] for cell in cells]
+    centers = np.array([points[rows].mean(axis=0) for rows in members])
+    gap = np.linalg.norm(centers[:, None] - centers, axis=-1)
+    reach = np.maximum(0.5, 2.0 * 0.04 * np.linalg.norm(centers, axis=1))
+    near = gap <= np.minimum(reach[:, None], reach)
+    label = np.arange(len(cells))
+    for _ in range(len(cells)):
+        label = np.where(near, label, len(cells)).min(axis=1)
+    expected = [sorted(row for cell in np.flatnonzero(label == first) for row in members[cell]) for first in set(label)]
+    assert 20 < len(expected) < 300
+    assert groups(points, 0.04, grazing=False) == sorted(expected)
 
 
 def test_clusters_without_points_are_empty() -> None:

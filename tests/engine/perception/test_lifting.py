@@ -15,6 +15,7 @@ from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels, straight_boxes
+from eidrive_scenario.perception.lifting.ground import _find_edges
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount
@@ -284,3 +285,25 @@ def test_lift_from_mast_separates_cars_parked_bumper_to_bumper(street: Any) -> N
     found = lift(edges, ["car", "car"], [1.0, 1.0], view, readings.lidars["roof"], time=0.0)
     for row, thing in enumerate((near, far)):
         assert iou_bev(found.boxes, thing.box[None])[row, 0] > 0.6
+
+
+def test_edges_of_projected_hulls_equal_those_of_their_points() -> None:
+    """The borders of the image cut the second of two objects, which has points on both sides."""
+    rng = np.random.default_rng(5)
+    corners, place = rng.uniform(-1.0, 1.0, (2, 16, 3)), np.array([8.0, 0.0]) + rng.uniform(-1.0, 1.0, (3, 2, 4, 2))
+    headings, cut, borders = (
+        rng.uniform(-3.0, 3.0, (2, 4)),
+        np.array([False, True]),
+        np.array([[-9.0, 9.0], [-0.1, 0.1]]),
+    )
+    turn = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    edges, depth = np.empty((3, 2, 4, 4)), np.empty((3, 2, 4))
+    _find_edges(corners, np.cos(headings), np.sin(headings), place, turn, 0.1, cut, borders, edges, depth)
+    for trial, row, number in np.ndindex(3, 2, 4):
+        cos, sin = math.cos(headings[row, number]), math.sin(headings[row, number])
+        plan = corners[row, :, :2] @ [[cos, sin], [-sin, cos]] + place[trial, row, number]
+        u, v = -plan[:, 1] / plan[:, 0], -corners[row, :, 2] / plan[:, 0]
+        shown = v[np.abs(u) <= 0.1] if row == 1 else v
+        expected = u.min(), shown.min(), u.max(), shown.max()
+        np.testing.assert_allclose(edges[trial, row, number], expected, rtol=1e-12)
+        assert depth[trial, row, number] == pytest.approx(plan[:, 0].mean(), rel=1e-12)
