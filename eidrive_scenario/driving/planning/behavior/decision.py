@@ -280,7 +280,9 @@ class Decider:
         with_maneuvers: bool = False,
     ) -> Options:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
-        more = passing_profiles(situation, scene, self._settings, self._body) if with_maneuvers else []
+        more: list[LateralProfile] = []
+        if with_maneuvers:
+            more = passing_profiles(situation, scene, self._settings, self._body, has_begun=self._passes)
         profiles = profiles + more
         course = Course(situation.line.along, situation.limits, situation.wanted)
         waiting, refused = set(), set()

@@ -161,11 +161,13 @@ class _Obstacle(NamedTuple):
 
 
 def passing_profiles(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, *, has_begun: bool
 ) -> list[LateralProfile]:
     """Return maneuvers past what holds the vehicle up, or out of the way of an oncoming vehicle in its lane.
 
     The result is empty if the vehicle queues or nothing is free beside it.
+
+    has_begun  whether the vehicle passes something already; what then appears behind that is no queue
     """
     head_on = _head_on(situation, scene, body)
     if head_on is not None:
@@ -175,7 +177,7 @@ def passing_profiles(
     if held_out is not None:
         found.append(held_out)
     blocker = _blocker(situation, scene, body)
-    if blocker is None or _queues(situation, scene, blocker, body):
+    if blocker is None or (not has_begun and _queues(situation, scene, blocker, body)):
         return found
     obstacle = _obstacle(situation, scene, settings, blocker, body)
     if not may_pass(situation, scene, body):

@@ -32,9 +32,8 @@ PAUSE = 6.0
 """Time of waiting without oncoming traffic after which traffic out of view is expected to drive as fast as that in view
 did, or as the vehicle wants to, instead of at the speed limit [s]; of the order of the critical gaps of the Highway
 Capacity Manual (4.1 to 7.5 s)."""
-LONGEST_PAUSE = 20.0
-"""Time of waiting without oncoming traffic after which the vehicle relies on others to respond [s]; that after which a
-queue is passed as well."""
+LONGEST_PAUSE = 2.0 * PAUSE
+"""Time of waiting without oncoming traffic after which the vehicle relies on others to respond [s]; a choice."""
 SLOWEST = 0.5
 """Share of the wanted speed that traffic out of view is expected to drive at least."""
 FREE_TIME = 1.0

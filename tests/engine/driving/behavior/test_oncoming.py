@@ -55,8 +55,8 @@ def verdict(
 ) -> Verdict:
     """Return the verdict on PASSING at 10 m/s from `s` on, past a car of 5 m that stands at 40 m, and other objects.
 
-    The front axle crosses the border where 3 blend(share) = 0.75, at a share of 0.36, with the rear axle at 4.4 m: up to
-    -15 m, at 1.5 s, the vehicle can stop before it. It returns at 62.8 m, of which 9.5 s is the next time, with the
+    The front axle crosses the border where 3 blend(share) = 0.75, at a share of 0.36, with the rear axle at 4.4 m: up
+    to -15 m, at 1.5 s, the vehicle can stop before it. It returns at 62.8 m, of which 9.5 s is the next time, with the
     front at 68.8 m.
     """
     motion = Motion(s + 10.0 * TIMES, np.full(len(TIMES), 10.0))

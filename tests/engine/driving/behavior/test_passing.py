@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 
@@ -10,11 +12,14 @@ from eidrive_scenario.driving.planning.behavior.proposals import Start, change_l
 
 @pytest.mark.parametrize("y", [LANE, LANE - 1.0])
 def test_parked_bus_that_another_hid_is_passed_as_well(y: float) -> None:
-    """The second bus stands 4 m behind the first one, and is visible from 10 m before the rear of the first one."""
+    """The second bus stands 4 m behind the first one, and is visible from 10 m before the rear of the first one.
+
+    From where the vehicle stops it sees 48 m of the oncoming lane: it waits for 12 s, in which no traffic comes.
+    """
     buses = [KnownBox(x, y, kind="bus", size=(12.0, 2.5)) for x in (80.0, 96.0)]
     roads = two_lane_road()
     run = PlannedDrive(behavior(roads), roads)
-    run.run(26.0, lambda now: buses if run.path and run.path[-1][0] > 64.0 else buses[:1])
+    run.run(36.0, lambda now: buses if run.path and run.path[-1][0] > 64.0 else buses[:1])
     run.world.close()
     assert run.front > 130.0
     assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
@@ -56,3 +61,31 @@ def test_vehicle_at_the_offset_beside_a_standing_obstacle_continues(side: int, s
 
 def test_vehicle_not_aside_of_a_near_obstacle_does_not_pass_it() -> None:
     assert passing("pass", 2.0, (80.0, 120.0), Start(100.0, 1.5, 0.0, 5.0), 2.0, 1, stands=True) is None
+
+
+def test_slow_bicycle_is_overtaken_on_an_empty_road() -> None:
+    """At 4.5 m/s it is 195 m along the road after 30 s; the vehicle is beyond it, and back in its lane."""
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads, 13.0), roads, speed=13.0)
+    run.run(30.0, lambda now: [KnownBox(60.0 + 4.5 * now, LANE - 0.6, vx=4.5, kind="bicycle", size=(1.8, 0.6))])
+    run.world.close()
+    assert run.front > 220.0
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
+
+
+def test_bicycle_is_followed_until_the_oncoming_lane_is_free() -> None:
+    """Cars at 10 m/s, one every 40 m and the last one from 300 m, meet the vehicle on its side of the road."""
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads, 13.0), roads, speed=13.0)
+
+    def others(now: float) -> list[KnownBox]:
+        bicycle = KnownBox(60.0 + 4.5 * now, LANE - 0.6, vx=4.5, kind="bicycle", size=(1.8, 0.6))
+        return [bicycle, *(KnownBox(60.0 + 40.0 * k - 10.0 * now, 1.75, vx=-10.0, yaw=math.pi) for k in range(7))]
+
+    run.run(40.0, others)
+    run.world.close()
+    for number, (x, y, _) in enumerate(run.path):
+        cars = others(number * 0.05)[1:]
+        if any(abs(car.x - x - 1.4) < 4.7 for car in cars):
+            assert y + 0.92 < 1.75 - 0.9, "clear of the oncoming car"
+    assert run.front > others(40.0)[0].x + 5.0
