@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -46,7 +47,7 @@ STEEPEST = 0.5
 SAME_LINE = 0.3
 """Maximum difference of the offsets from two lines at which one is the extension of the other [m]."""
 VIEW = 80.0
-"""Assumed range of the perception of a station without a setting `range` [m]."""
+"""Assumed range of sensors without a limit, such as cameras [m]."""
 MARGIN_AHEAD = 40.0
 """Length of the line that is considered beyond the horizon and behind the vehicle [m]."""
 
@@ -73,7 +74,6 @@ class BehaviorPlanner(RoutePlanner):
         self._rules = JunctionRules(roads) if roads is not None and roads.junctions else None
         self._predictor = Predictor(roads, self._times, self._rules)
         self._passages: tuple[Passage, ...] = ()
-        self._decider = Decider(own, spec, self._times, settings.range or VIEW)
         self._line: ReferenceLine | None = None
         self._conflict_ways: ConflictWays | None = None
         self._ways: list[ConflictWay] = []
@@ -87,6 +87,17 @@ class BehaviorPlanner(RoutePlanner):
         self._decided = -math.inf
         self._reasons: Array = np.empty((0, 2))
         """Places of the objects that are the reason of the decision [m]."""
+
+    @cached_property
+    def _range(self) -> float:
+        """Distance up to which the sensors detect objects ahead [m]; it is known after the constructor."""
+        ahead = [sector for sector in self.view or () if abs(sector.yaw) <= sector.half_angle]
+        farthest = max((sector.x + sector.range for sector in ahead), default=math.inf)
+        return farthest if math.isfinite(farthest) else self.settings.range or VIEW
+
+    @cached_property
+    def _decider(self) -> Decider:
+        return Decider(self.planner_settings, self.spec, self._times, self._range)
 
     def observe_regions(self, regions: Sequence[PerceptionRegion]) -> None:
         self._regions = regions
@@ -146,7 +157,7 @@ class BehaviorPlanner(RoutePlanner):
                 Occluders.of_map(self.roads),
                 self.spec,
                 self.view or (),
-                self.settings.range or VIEW,
+                self._range,
             )
         motion = (s, max(ego.speed, 0.0), wanted)
         place: tuple[float, float, float] = tuple(ego.position.tolist())
