@@ -57,16 +57,16 @@ class AgeOfInformation(LinkCriterion):
     def _ages(self) -> dict[Measure, tuple[float, Link]]:
         """Return the largest age of each measure with its link; without the undefined ones."""
         known = self._log.statistics_by_link(self.time)
-        found: dict[Measure, tuple[float, Link]] = {}
+        ages: dict[Measure, tuple[float, Link]] = {}
         for link in sorted(self._used):
             row = known.get(link)
             values: dict[Measure, float | None] = dict.fromkeys(PHRASES, math.inf)
             if row is not None:
                 values = {"mean": row.mean_age, "p95": row.p95_age, "peak": row.peak_age}
             for measure, value in values.items():
-                if value is not None and (measure not in found or value > found[measure][0]):
-                    found[measure] = value, link
-        return found
+                if value is not None and (measure not in ages or value > ages[measure][0]):
+                    ages[measure] = value, link
+        return ages
 
     def verdict(self) -> Verdict:
         settings, found = self._settings, self._ages().get(self._settings.measure)

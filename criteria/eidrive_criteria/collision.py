@@ -118,11 +118,11 @@ class Collision(Criterion):
 
     def metrics(self) -> Mapping[str, float]:
         """Return the numbers of contacts and of those by own fault, and time [s] and speed [m/s] of the first one."""
-        found = {f"{self.name}.count": float(len(self._hits))}
+        metrics = {f"{self.name}.count": float(len(self._hits))}
         if self._hits:
-            found[f"{self.name}.time"] = self._hits[0].time
-            found[f"{self.name}.impact_speed"] = self._hits[0].speed
-            found[f"{self.name}.at_fault"] = float(
+            metrics[f"{self.name}.time"] = self._hits[0].time
+            metrics[f"{self.name}.impact_speed"] = self._hits[0].speed
+            metrics[f"{self.name}.at_fault"] = float(
                 sum(hit.impact is not None and hit.impact.at_fault for hit in self._hits)
             )
-        return found
+        return metrics

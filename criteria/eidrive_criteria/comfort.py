@@ -88,7 +88,7 @@ class Comfort(Criterion):
 
     def _extremes(self) -> dict[str, Worst]:
         """Return the value with the largest ratio to its limit, by quantity."""
-        found: dict[str, Worst] = {}
+        extremes: dict[str, Worst] = {}
         for part in self._parts:
             if len(part) < FEWEST:
                 continue
@@ -96,9 +96,9 @@ class Comfort(Criterion):
                 ratios = np.where(values >= 0.0, values / high, values / low)
                 index = int(np.argmax(ratios))
                 worst = Worst(float(ratios[index]), quantity, float(values[index]), part[index].time)
-                if quantity not in found or worst.ratio > found[quantity].ratio:
-                    found[quantity] = worst
-        return found
+                if quantity not in extremes or worst.ratio > extremes[quantity].ratio:
+                    extremes[quantity] = worst
+        return extremes
 
     def _quantities(self, part: Sequence[Sample]) -> Iterator[tuple[str, Array, float, float]]:
         """Yield name, values (N,), minimum and maximum of each quantity."""

@@ -133,15 +133,15 @@ MOST_SEEDS = 1_000_000
 
 def parse_seeds(option: str, text: str) -> list[int]:
     """Return the seeds of a text such as `1-10`, `3` or `1,2,5-8`. Raise SettingError for another text."""
-    found: list[int] = []
+    seeds: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
             raise SettingError(Diagnostic(f"{option}: no seeds (got {quoted(text)}; expected 1-10 or 1,2,5)"))
         if dash and int(last) - int(first) >= MOST_SEEDS:
             raise SettingError(Diagnostic(f"{option}: more than {MOST_SEEDS} seeds (got {quoted(text)})"))
-        found += range(int(first), int(last or first) + 1)
-    return found
+        seeds += range(int(first), int(last or first) + 1)
+    return seeds
 
 
 def parse_shard(text: str) -> tuple[int, int]:

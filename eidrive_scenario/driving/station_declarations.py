@@ -108,7 +108,7 @@ def declared_detectors(
     Raise SettingError with all diagnostics of detectors, sensors, fusion methods and vehicle controllers.
     """
     diagnostics: list[Diagnostic] = []
-    found: dict[str, Detector] = {}
+    detectors: dict[str, Detector] = {}
     for name, station in settings.items():
         subject = ErrorSubject(f"station {name!r}")
         controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
@@ -116,26 +116,26 @@ def declared_detectors(
         source = "--detector" if by_option else controller.source
         line = None if by_option else _line(controller, "detector_settings", "detector")
         try:
-            found[name] = subject.call(build_detector, station, source=source, line=line)
-            weights = found[name].load_weights if load_weights else found[name].check_weights
+            detectors[name] = subject.call(build_detector, station, source=source, line=line)
+            weights = detectors[name].load_weights if load_weights else detectors[name].check_weights
             subject.call(weights, allow_torchscript=allow_torchscript)
             source, line = controller.source, _line(controller, "sensors")
-            for sensor in station.rig_sensors(found[name].needs, found[name].default_sensors).values():
+            for sensor in station.rig_sensors(detectors[name].needs, detectors[name].default_sensors).values():
                 sensor_class(sensor.kind).check_settings(sensor)
             line = _line(controller, "fusion_settings", "fusion")
-            subject.call(build_fusion, station, found[name], source=controller.source, line=line)
+            subject.call(build_fusion, station, detectors[name], source=controller.source, line=line)
             line = _line(controller, "vehicle_controller_settings", "vehicle_controller")
             vehicle_controller_settings(station, source=controller.source, line=line)
         except SettingError as error:
             diagnostics += error.at(source, line).diagnostics
     if diagnostics:
         raise SettingError(list(dict.fromkeys(diagnostics)))
-    return found
+    return detectors
 
 
 def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:
     """Build the encoder of every station with ASN.1 modules. Raise SettingError with the location of the property."""
-    found = {}
+    encoders = {}
     folder = Path(scenario.path).parent if scenario.path is not None else Path()
     for name, station in settings.items():
         if station.asn1_files:
@@ -143,8 +143,8 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
             files = [folder / file for file in station.asn1_files]
             line = _line(controller, "asn1_files")
             category = actor_spec(name, scenario.entities[name]).category
-            found[name] = Asn1Encoder(files, station.messages, station=category, source=controller.source, line=line)
-    return found
+            encoders[name] = Asn1Encoder(files, station.messages, station=category, source=controller.source, line=line)
+    return encoders
 
 
 def _line(controller: Controller, *properties: str) -> int:

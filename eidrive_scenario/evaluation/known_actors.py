@@ -152,13 +152,13 @@ class FalseTracks:
 
     def metrics(self) -> dict[str, float]:
         """Return `false_tracks.NAME.per_minute`, `.brakings` and `.brakings_without_cause` of each station."""
-        found: dict[str, float] = {}
+        metrics: dict[str, float] = {}
         minutes = (self._end - self._start) / 60.0
         for name, station in self._stations.items():
-            found[f"false_tracks.{name}.per_minute"] = station.tracks / minutes if minutes > 0.0 else 0.0
-            found[f"false_tracks.{name}.brakings"] = station.brakings
-            found[f"false_tracks.{name}.brakings_without_cause"] = station.without_cause
-        return found
+            metrics[f"false_tracks.{name}.per_minute"] = station.tracks / minutes if minutes > 0.0 else 0.0
+            metrics[f"false_tracks.{name}.brakings"] = station.brakings
+            metrics[f"false_tracks.{name}.brakings_without_cause"] = station.without_cause
+        return metrics
 
 
 def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> Sequence[int]:

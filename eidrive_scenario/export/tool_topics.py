@@ -38,12 +38,12 @@ ALL_TOPICS = tuple(_TOPICS)
 
 def check_topics(names: Iterable[str]) -> tuple[str, ...]:
     """Return these names of topics, each once. Raise SettingError if one is unknown, or if its library is missing."""
-    found = tuple(dict.fromkeys(names))
-    for name in found:
+    topics = tuple(dict.fromkeys(names))
+    for name in topics:
         if name not in _TOPICS:
             raise SettingError(Diagnostic(f"there are no topics {name!r}", f"give {' or '.join(_TOPICS)}"))
         _TOPICS[name][0]()
-    return found
+    return topics
 
 
 def add_topics(recording: str | Path, topics: Iterable[str] = ALL_TOPICS) -> tuple[str, ...]:

@@ -260,12 +260,12 @@ def construct(extension_class: Any, *arguments: Any, **keywords: Any) -> Any:
 
 def third_party_files() -> dict[str, dict[str, Registration]]:
     """Return the registrations of loaded third-party extensions, by file and qualified name of their classes."""
-    found: dict[str, dict[str, Registration]] = {}
+    files: dict[str, dict[str, Registration]] = {}
     for extension_class, known in _loaded.items():
         file = getattr(sys.modules.get(extension_class.__module__), "__file__", None)
         if file is not None and not is_built_in(extension_class):
-            found.setdefault(file, {})[extension_class.__qualname__] = known
-    return found
+            files.setdefault(file, {})[extension_class.__qualname__] = known
+    return files
 
 
 def registration(extension_class: type) -> Registration | None:

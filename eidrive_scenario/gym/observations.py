@@ -364,7 +364,7 @@ def points_ahead(route: PathPart, ego: EgoState, settings: RouteSettings) -> lis
     x, y, dx, dy, square = segments[0]
     share = ((own_x - x) * dx + (own_y - y) * dy) / square
     start = along[0] + min(max(share, 0.0), 1.0) * (along[1] - along[0])
-    found: list[float] = []
+    points: list[float] = []
     for number in range(1, settings.points + 1):
         wanted = start + number * settings.spacing
         if wanted > along[-1]:
@@ -373,5 +373,5 @@ def points_ahead(route: PathPart, ego: EgoState, settings: RouteSettings) -> lis
         x, y, dx, dy, square = segments[index]
         share = (wanted - along[index]) / math.sqrt(square)
         ahead_x, ahead_y = x + share * dx - own_x, y + share * dy - own_y
-        found += 1.0, cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
-    return found
+        points += 1.0, cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
+    return points

@@ -301,14 +301,14 @@ def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
 def duplicate_entries(catalog: etree._Element, source: str) -> dict[str, Diagnostic]:
     """Return an error for each name that several entries of a catalog have, at the second of them."""
     first: dict[str, etree._Element] = {}
-    found: dict[str, Diagnostic] = {}
+    entries: dict[str, Diagnostic] = {}
     for child in catalog.iterchildren(etree.Element):
         name = child.get("name")
-        if name is None or first.setdefault(name, child) is child or name in found:
+        if name is None or first.setdefault(name, child) is child or name in entries:
             continue
         message = f"the catalog has a second entry {name!r}; the first is at line {line_of(first[name])}"
-        found[name] = Diagnostic(message, "use unique names", source, line_of(child))
-    return found
+        entries[name] = Diagnostic(message, "use unique names", source, line_of(child))
+    return entries
 
 
 def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:

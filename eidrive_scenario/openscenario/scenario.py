@@ -138,11 +138,11 @@ class Scenario:
     @cached_property
     def entities_by_type(self) -> Mapping[model.ObjectType, tuple[str, ...]]:
         """Return the names of the entities of each type in the order of the file; external objects are a type."""
-        found: dict[model.ObjectType, tuple[str, ...]] = {}
+        entities: dict[model.ObjectType, tuple[str, ...]] = {}
         for name, entity in self.entities.items():
             kind = model.ObjectType.EXTERNAL if name in self.external else _OBJECT_TYPES[type(entity)]
-            found[kind] = (*found.get(kind, ()), name)
-        return found
+            entities[kind] = (*entities.get(kind, ()), name)
+        return entities
 
     def resolved(self, reference: model.CatalogReference) -> model.Element:
         """Return the catalog entry with the parameters that the reference assigns."""

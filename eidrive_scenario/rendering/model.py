@@ -75,8 +75,8 @@ class Cells(NamedTuple):
         """Return the triangles of the selected cells."""
         first, count = self.first[chosen], self.counts[chosen]
         ends = np.cumsum(count)
-        found: Integers = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
-        return found
+        rows: Integers = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
+        return rows
 
 
 @dataclass(frozen=True)

@@ -136,8 +136,8 @@ def _sides(pinhole: Pinhole) -> Array:
     left, right = -pinhole.center_x / pinhole.focal, (pinhole.width - pinhole.center_x) / pinhole.focal
     top, bottom = -pinhole.center_y / pinhole.focal, (pinhole.height - pinhole.center_y) / pinhole.focal
     planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
-    found: Array = planes / np.linalg.norm(planes, axis=1, keepdims=True)
-    return found
+    sides: Array = planes / np.linalg.norm(planes, axis=1, keepdims=True)
+    return sides
 
 
 def _in_sight(

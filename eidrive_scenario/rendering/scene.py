@@ -57,12 +57,12 @@ class Roadside:
 
     def instances(self, viewpoint: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
         """Return all objects within sight of a camera at `viewpoint` (3,), with the signal states at `time` [s]."""
-        found = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
+        instances = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
         near = np.flatnonzero(np.linalg.norm(self._places - viewpoint, axis=1) < IN_SIGHT)
         for row in near.tolist():
             glow = _glow(self._heads[row], states.get(self._heads[row].signal.id), time)
-            found.append(replace(self._unlit[row], glow=glow))
-        return found
+            instances.append(replace(self._unlit[row], glow=glow))
+        return instances
 
 
 def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:

@@ -121,8 +121,8 @@ def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spaci
     kept = np.zeros(count, dtype=bool)
     kept[[0, -1]] = True
     _keep(shape, s, kept, 0, count - 1)
-    found: Array = s[kept]
-    return found
+    sections: Array = s[kept]
+    return sections
 
 
 def _keep(shape: Array, s: Array, kept: NDArray[np.bool_], first: int, last: int) -> None:

@@ -168,8 +168,8 @@ def _normal_values(count: int) -> Floats:
     from scipy.special import ndtri
 
     numbers = ndtri((np.arange(count) + 0.5) / count)
-    found: Floats = (numbers / numbers.std()).astype(np.float32)
-    return found
+    values: Floats = (numbers / numbers.std()).astype(np.float32)
+    return values
 
 
 def _linear(gain: float) -> float:

@@ -137,8 +137,8 @@ def draw_drops_on_lens(luminance: Floats, weather: Weather, draws: np.random.Gen
 
 def _pixels(points: Array, pinhole: Pinhole) -> Array:
     center = np.array([pinhole.center_x - 0.5, pinhole.center_y - 0.5])
-    found: Array = points[:, :2] / points[:, 2:] * pinhole.focal + center
-    return found
+    pixels: Array = points[:, :2] / points[:, 2:] * pinhole.focal + center
+    return pixels
 
 
 def _refracted_light(luminance: Floats) -> Floats:

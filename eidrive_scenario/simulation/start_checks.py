@@ -100,14 +100,14 @@ def _trains(scenario: Scenario) -> Mapping[str, str]:
     front = {
         trailer: name for name, entity in scenario.entities.items() if (trailer := declared_trailer(entity)) is not None
     }
-    found = {}
+    trains = {}
     for trailer, towing in front.items():
         seen = {trailer}
         while towing in front and towing not in seen:
             seen.add(towing)
             towing = front[towing]
-        found[trailer] = towing
-    return found
+        trains[trailer] = towing
+    return trains
 
 
 def _off_road(

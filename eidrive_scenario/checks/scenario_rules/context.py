@@ -100,13 +100,13 @@ class ReachabilityAnalysis:
 
         The state also depends on the ancestors and descendants of the element.
         """
-        found: dict[Node, list[Node]] = {}
+        dependents: dict[Node, list[Node]] = {}
         for node in self._outline.nodes:
             for trigger in (node.start, stop_trigger(node)):
                 conditions = [one for group in (trigger.condition_group if trigger else ()) for one in group.condition]
                 for other in dict.fromkeys(node for one in conditions for node in self._states.dependencies(one)):
-                    found.setdefault(other, []).append(node)
-        return found
+                    dependents.setdefault(other, []).append(node)
+        return dependents
 
     def _advance(self, node: Node) -> bool:
         states = self._states

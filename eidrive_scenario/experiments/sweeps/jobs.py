@@ -86,7 +86,7 @@ def contents_of(scenario: Path, points: Sequence[Point], settings: RunSettings) 
     Build these runs, and those with the least and the greatest of the numbers of a setting, to find invalid values.
     Raise InputError for an invalid value of a setting; one of a parameter concerns its own runs only.
     """
-    found: dict[tuple[str, Scalar], str] = {}
+    contents: dict[tuple[str, Scalar], str] = {}
     for name in dict.fromkeys(name for point in points for name in without_run(point)):
         values = dict.fromkeys(point[name] for point in points if name in point)
         texts = [value for value in values if isinstance(value, str)]
@@ -98,10 +98,10 @@ def contents_of(scenario: Path, points: Sequence[Point], settings: RunSettings) 
         for text in () if name.startswith(f"{CHANNEL}.") else texts:
             digest = _digest_with(name, text, scenario, points, settings)
             if digest is not None:
-                found[name, text] = digest
+                contents[name, text] = digest
     if RUN in points[0]:
-        found |= _contents_of_runs(scenario, dict.fromkeys(int(point[RUN]) for point in points), settings)
-    return found
+        contents |= _contents_of_runs(scenario, dict.fromkeys(int(point[RUN]) for point in points), settings)
+    return contents
 
 
 def _digest_with(name: str, value: str, scenario: Path, points: Sequence[Point], settings: RunSettings) -> str | None:

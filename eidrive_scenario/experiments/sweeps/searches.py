@@ -95,12 +95,12 @@ class BoundarySearch:
 
     def proposals(self, count: int) -> list[float]:
         """Return the values of the next runs. Their outcomes are assumed to be the likelier ones for each other."""
-        held, found = self._log.copy(), []
+        held, proposals = self._log.copy(), []
         for _ in range(count):
             x, likelier = self._next(held)
-            found.append(x)
+            proposals.append(x)
             held = held + self._log_likelihood(x, likelier)
-        return found
+        return proposals
 
     def _next(self, log: Array) -> tuple[float, bool]:
         """Return the value with the minimum expected entropy of the boundary, and its likelier outcome."""
@@ -334,15 +334,15 @@ def _is_number(value: Any) -> bool:
 
 def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:
     kinds = optuna.distributions
-    found = {}
+    distributions = {}
     for axis in axes:
         if axis.is_whole:
-            found[axis.name] = kinds.IntDistribution(*axis.ends)
+            distributions[axis.name] = kinds.IntDistribution(*axis.ends)
         elif axis.is_interval:
-            found[axis.name] = kinds.FloatDistribution(*axis.ends)
+            distributions[axis.name] = kinds.FloatDistribution(*axis.ends)
         else:
-            found[axis.name] = kinds.CategoricalDistribution(axis.values)
-    return found
+            distributions[axis.name] = kinds.CategoricalDistribution(axis.values)
+    return distributions
 
 
 def _values(axes: Sequence[Axis], params: dict[str, Any]) -> dict[str, Scalar]:

@@ -349,10 +349,10 @@ def parameter_hints(data: Any, scope: Scope | None, path: str = "") -> dict[str,
         return {}
     if isinstance(data, Mapping | list | tuple):
         entries = data.items() if isinstance(data, Mapping) else enumerate(data)
-        found: dict[str, str] = {}
+        hints: dict[str, str] = {}
         for key, value in entries:
-            found |= parameter_hints(value, scope, _below(path, key))
-        return found
+            hints |= parameter_hints(value, scope, _below(path, key))
+        return hints
     if not is_reference(data):
         return {}
     texts = []

@@ -202,7 +202,7 @@ class LightsOnMap:
             return {}
         centers, heights = np.array([view.center for view in views]), np.array([view.height for view in views])
         shares = lamp_network().probabilities(crops(camera.rgb, centers, heights))
-        found = {}
+        states = {}
         for view, share in zip(views, shares, strict=True):
             likely = np.where(self._possible[view.row], share, 0.0)
             in_box = view.row in boxes
@@ -211,8 +211,8 @@ class LightsOnMap:
                 likely /= max(float(likely.sum()), 1e-9)
             index = int(np.argmax(likely))
             if SHOWN[index] != NONE and likely[index] >= (SURE_IN_BOX if in_box else SURE):
-                found[view.row] = (float(likely[index]), SHOWN[index])
-        return found
+                states[view.row] = (float(likely[index]), SHOWN[index])
+        return states
 
     def _match(self, found: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
         """Return score and state of the box with the highest score for each signal, by its row."""

@@ -172,7 +172,7 @@ def _fit_points(
     places[behind, 1] = camera.size[1] / 2.0
     away = np.hypot(*(world[:, :2] - camera.pose[:2, 3]).T)
     in_image = edges_in_image(boxes, camera).tolist()
-    found: list[Fit | None] = []
+    points: list[Fit | None] = []
     for row, (box, name) in enumerate(zip(boxes, classes, strict=True)):
         guess, spread = by_ground.boxes[row], by_ground.covariance[row]
         place = guess[:2] - camera.pose[:2, 3]
@@ -196,8 +196,8 @@ def _fit_points(
             if other != row:
                 others |= _within(places, boxes[other])
         fit = _foreground(scan, camera, target, places, away, others)
-        found.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
-    return found
+        points.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
+    return points
 
 
 def _total_covariance(fit: Fit, scan: Scan, target: Target, camera: CameraReading) -> Array:

@@ -56,10 +56,10 @@ class Feed:
         """Return the next events of a client, empty after `timeout` [s] without one. Return None after the last one."""
         with self._changed:
             self._changed.wait_for(lambda: len(self._events) > client.position or self._is_stopped, timeout)
-            found = self._events[client.position : client.position + _BATCH]
-            if not found and self._is_stopped:
+            events = self._events[client.position : client.position + _BATCH]
+            if not events and self._is_stopped:
                 return None
-            return found
+            return events
 
     def advance(self, client: Client, count: int) -> None:
         """Note that a number of events was sent to a client."""

@@ -356,7 +356,7 @@ def _path(plan: Plan | None) -> list[list[float]]:
 
 def _boxes(detections: Detections, *, ellipses: bool = False) -> list[list[float | None]]:
     existence = detections.existence.tolist() or [None] * len(detections)
-    found: list[list[float | None]] = []
+    boxes: list[list[float | None]] = []
     for row, ((x, y, _, length, width, height, yaw), exists) in enumerate(
         zip(detections.boxes.tolist(), existence, strict=True)
     ):
@@ -366,5 +366,5 @@ def _boxes(detections: Detections, *, ellipses: bool = False) -> list[list[float
         box = [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3), round(height, 2)]
         axes = ellipse_of_95_percent(detections.covariance[row]) if ellipses else None
         ellipse = [] if axes is None else [round(axes[0], 2), round(axes[1], 2), round(axes[2], 3)]
-        found.append([*box, *([share] if share is not None or ellipse else []), *ellipse])
-    return found
+        boxes.append([*box, *([share] if share is not None or ellipse else []), *ellipse])
+    return boxes

@@ -57,10 +57,10 @@ def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
 
     The result is empty without images.
     """
-    found: dict[str, dict[str, Any]] = {}
+    files: dict[str, dict[str, Any]] = {}
     folder = run / IMAGES
     if not folder.is_dir():
-        return found
+        return files
     for station in sorted(path for path in folder.iterdir() if path.is_dir()):
         ticks: dict[str, list[int]] = {}
         for entry in os.scandir(station):
@@ -69,11 +69,11 @@ def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
                 ticks.setdefault(match["camera"], []).append(int(match["tick"]))
         if ticks:
             relative = quote(os.fsencode(Path(os.path.relpath(station, page)).as_posix()))
-            found[unquote(station.name)] = {
+            files[unquote(station.name)] = {
                 unquote(camera): {"address": f"{relative}/{quote(os.fsencode(camera))}-", "ticks": sorted(numbers)}
                 for camera, numbers in sorted(ticks.items())
             }
-    return found
+    return files
 
 
 TEMPLATE = "replay/page.html.jinja"

@@ -152,8 +152,8 @@ class NearestPoints:
         # The nearest point is not farther than the nearest pivot.
         limit = gap.min(axis=1) * (1.0 + 1e-9) + _ROUNDING
         excluded = (gap - radius > limit[:, None]).all(axis=0)
-        found: Integers = (~excluded).repeat(_PER_PIVOT)[: len(self.points)].nonzero()[0]
-        return found
+        candidates: Integers = (~excluded).repeat(_PER_PIVOT)[: len(self.points)].nonzero()[0]
+        return candidates
 
 
 def _in_order(index: Integers, squares: Array) -> tuple[Array, Integers]:
@@ -164,10 +164,10 @@ def _in_order(index: Integers, squares: Array) -> tuple[Array, Integers]:
 
 def _squares(to: Array, columns: Array) -> Array:
     """Return the squared distances (M, N) of points (M, D) from points with the coordinates `columns` (D, N)."""
-    found: Array = to[:, 0, None] - columns[0]
-    found *= found
+    squares: Array = to[:, 0, None] - columns[0]
+    squares *= squares
     for number, column in enumerate(columns[1:], start=1):
         offset = to[:, number, None] - column
         offset *= offset
-        found += offset
-    return found
+        squares += offset
+    return squares

@@ -218,12 +218,12 @@ class Road:
     @cached_property
     def directions(self) -> Mapping[int, int]:
         """+1 if traffic drives in the direction of s, else -1, by lane id; +1 for lane 0."""
-        found = {0: 1}
+        directions = {0: 1}
         for section in self.sections:
             for number, lane in section.lanes.items():
                 usual = -1 if (number > 0) == (self.rule == "RHT") else 1
-                found.setdefault(number, -usual if lane.direction == "reversed" else usual)
-        return found
+                directions.setdefault(number, -usual if lane.direction == "reversed" else usual)
+        return directions
 
     def section_at(self, s: float) -> LaneSection:
         """Return the lane section at s."""

@@ -108,12 +108,12 @@ def cycle_warnings(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
 
 def _leaders(cycle: SignalCycle) -> list[SignalCycle]:
     """Return the controllers that a controller refers to, directly or through others."""
-    found: list[SignalCycle] = []
+    leaders: list[SignalCycle] = []
     at = cycle.leader
-    while at is not None and at not in found:
-        found.append(at)
+    while at is not None and at not in leaders:
+        leaders.append(at)
         at = at.leader
-    return found
+    return leaders
 
 
 def _group(name: str, roads: RoadNetwork | None) -> tuple[str, ...]:

@@ -265,15 +265,15 @@ def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[St
 
 def _links(roads: RoadNetwork) -> Mapping[RoadEnd, list[RoadEnd]]:
     """Return the connected ends of roads by the links of lanes."""
-    found: dict[RoadEnd, list[RoadEnd]] = {}
+    links: dict[RoadEnd, list[RoadEnd]] = {}
     for one, two, edge in roads.graph.edges(data=True):
         if edge["kind"] == "successor" and one.road != two.road:
             leaving = RoadEnd(one.road, roads.driving_direction(one.road, one.lane))
             entering = RoadEnd(two.road, -roads.driving_direction(two.road, two.lane))
             for a, b in ((leaving, entering), (entering, leaving)):
-                if b not in found.setdefault(a, []):
-                    found[a].append(b)
-    return found
+                if b not in links.setdefault(a, []):
+                    links[a].append(b)
+    return links
 
 
 def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list[RoadEnd]:

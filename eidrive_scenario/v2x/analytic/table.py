@@ -33,11 +33,11 @@ class ErrorTable:
     def errors(self) -> Mapping[str, Array]:
         """Error probability (D,) by cause."""
         left = np.ones_like(self.distance)
-        found = {}
+        errors = {}
         for cause, probability in self.given.items():
-            found[cause] = left * probability
-            left = left - found[cause]
-        return found
+            errors[cause] = left * probability
+            left = left - errors[cause]
+        return errors
 
     @cached_property
     def delivery_ratio(self) -> Array:

@@ -106,12 +106,12 @@ def range_class(boxes: Array, center: Array) -> Integers:
 
 def _hits(boxes: Array, points: Array) -> Bools:
     """Return whether at least one point is on each body (N,), as OPV2V lists objects."""
-    found = np.zeros(len(boxes), dtype=bool)
+    hits = np.zeros(len(boxes), dtype=bool)
     for row, (x, y, z, length, width, height, yaw) in enumerate(boxes.tolist()):
         near = points[np.abs(points[:, :2] - (x, y)).max(axis=1) < length]
         body = (x, y, z + ABOVE_GROUND / 2.0, length + _MARGIN, width + _MARGIN, height - ABOVE_GROUND + _MARGIN, yaw)
-        found[row] = bool(points_in_box(near, np.array(body)).any())
-    return found
+        hits[row] = bool(points_in_box(near, np.array(body)).any())
+    return hits
 
 
 def sample_codes(found: Detections, truth: Truth, center: Array) -> tuple[Codes, Codes, Integers]:

@@ -36,11 +36,11 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
     Raise SettingError for a name that no part uses, or if the part uses none of them.
     """
     _check("--detectors", names, dict.fromkeys(name for one in PARTS.values() for name in one.detectors))
-    found = tuple(name for name in part.detectors if name in names) if names else part.default
-    if not found:
+    detectors = tuple(name for name in part.detectors if name in names) if names else part.default
+    if not detectors:
         message = f"--detectors: part {part.name} uses none of them (got {quoted(','.join(names))})"
         raise SettingError(Diagnostic(message, f"known: {', '.join(part.detectors)}"))
-    return found
+    return detectors
 
 
 def _check(what: str, names: Iterable[str], known: Iterable[str]) -> None:

@@ -108,26 +108,26 @@ class ConflictWays:
 
     def _lanes_of(self, junction: str) -> list[tuple[tuple[LaneKey, ...], Course, float]]:
         """Return the lanes through a junction from far upstream on, their courses, and the speeds of traffic [m/s]."""
-        found = self._lanes.get(junction)
-        if found is None:
-            found = self._lanes[junction] = []
+        lanes = self._lanes.get(junction)
+        if lanes is None:
+            lanes = self._lanes[junction] = []
             for key in self._last_lanes.get(junction, ()):
                 for chain in self._upstream([key], 0.0):
                     course = self._courses.course_of(chain)
                     if course is not None:
-                        found.append((tuple(chain), course, max(map(self._roads.usual_speed, chain))))
-        return found
+                        lanes.append((tuple(chain), course, max(map(self._roads.usual_speed, chain))))
+        return lanes
 
     @cached_property
     def _last_lanes(self) -> dict[str, list[LaneKey]]:
         """Last lanes of the ways through each junction. Traffic does not use center lanes, which the graph lacks."""
-        found: dict[str, list[LaneKey]] = {}
+        lanes: dict[str, list[LaneKey]] = {}
         for key, drivable in self._roads.graph.nodes(data="drivable"):
             road = self._roads.road(key.road)
             last = len(road.sections) - 1 if self._roads.driving_direction(key.road, key.lane) > 0 else 0
             if drivable and road.junction_id is not None and key.section == last:
-                found.setdefault(road.junction_id, []).append(key)
-        return found
+                lanes.setdefault(road.junction_id, []).append(key)
+        return lanes
 
     def _upstream(self, chain: list[LaneKey], length: float) -> list[list[LaneKey]]:
         """Return the chains of lanes that lead to the end of a lane of a junction."""

@@ -172,31 +172,31 @@ def passing_profiles(
     head_on = _head_on(situation, scene, body)
     if head_on is not None:
         return _evasions(situation, scene, settings, body, head_on)
-    found = []
+    profiles = []
     held_out = _behind_neighbor(situation, scene, settings, body)
     if held_out is not None:
-        found.append(held_out)
+        profiles.append(held_out)
     blocker = _blocker(situation, scene, body)
     if blocker is None or (not has_begun and _queues(situation, scene, blocker, body)):
-        return found
+        return profiles
     obstacle = _obstacle(situation, scene, settings, blocker, body)
     if not may_pass(situation, scene, body):
         profile = None if obstacle is None else _around(situation, settings, obstacle, body, _overtaking(situation))
-        return found if profile is None or not profile.uses_oncoming else [*found, profile]
+        return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
     if not math.isnan(faster) and _rear_is_free(situation, scene, faster, body.center):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = Start(*situation.steered, situation.speed)
-        found.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
+        profiles.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
     if obstacle is not None:
         # Beside a lane for it, a moving vehicle is overtaken by a change of lane.
         changes = not math.isnan(faster) and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
         sides = (-overtaking,) if changes else (overtaking, -overtaking)
-        found += [
+        profiles += [
             profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
         ]
-    return found
+    return profiles
 
 
 def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
@@ -223,14 +223,14 @@ def _evasions(
     """
     places = (situation.s + 10.0, head_on.s)
     here, there = (situation.line.lanes_beside(situation.lanes_at(place)) for place in places)
-    found = []
+    evasions = []
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
         if not (math.isnan(offset) or math.isnan(beyond)) and _rear_is_free(situation, scene, offset, body.center):
             name = f"change lane to the {'left' if side > 0 else 'right'}"
             start = Start(*situation.steered, situation.speed)
-            found.append(towards(name, offset, start, settings.lateral_acceleration, side=side))
-    return found
+            evasions.append(towards(name, offset, start, settings.lateral_acceleration, side=side))
+    return evasions
 
 
 def _behind_neighbor(

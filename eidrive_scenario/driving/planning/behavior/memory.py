@@ -218,7 +218,7 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
     ellipses = zip((mean / scale).tolist(), (half / scale).tolist(), (of_both / scale).tolist(), strict=True)
     errors = zip(greatest.tolist(), ellipses, strict=True)
     age = max(now - detections.time, 0.0)
-    found = []
+    objects = []
     columns = (detections.boxes.tolist(), detections.velocity.tolist(), errors)
     for row, (box, (vx, vy), (variance, ellipse)) in enumerate(zip(*columns, strict=True)):
         if existence[row] < least:
@@ -233,8 +233,8 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         known.mean_speed, known.ellipse = known.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
         known.first_seen, known.mean_place = now, (x, y)
         known.z = z - height / 2.0
-        found.append(known)
-    return found
+        objects.append(known)
+    return objects
 
 
 def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:

@@ -168,17 +168,17 @@ class Predictor:
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""
-        found: list[list[Course]] = [[] for _ in objects]
+        lanes: list[list[Course]] = [[] for _ in objects]
         moving = [index for index, known in enumerate(objects) if known.speed >= STANDING and known.kind not in ON_FOOT]
         if not moving or self._roads is None or self._courses is None:
-            return found
+            return lanes
         x, y, z = np.array([(objects[index].x, objects[index].y, objects[index].z) for index in moving]).T.copy()
         rows, _, owners = self._roads.overlapped_lanes(x, y, None if self._level else z)
         drivable = self._roads.tables.lane_drivable
         for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
             if drivable[row]:
-                found[moving[owner]] += self._courses.ahead(row)
-        return found
+                lanes[moving[owner]] += self._courses.ahead(row)
+        return lanes
 
 
 def _straight_on(known: KnownObject, travelled: Array, speed: Array) -> Hypothesis:

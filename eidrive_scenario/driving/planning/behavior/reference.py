@@ -135,10 +135,10 @@ class ReferenceLine:
 
     def lanes_beside(self, index: int) -> LanesBeside:
         """Return the lanes at a point of the line."""
-        found = self._beside.get(index)
-        if found is None:
-            found = self._beside[index] = self._lanes_at(index)
-        return found
+        lanes = self._beside.get(index)
+        if lanes is None:
+            lanes = self._beside[index] = self._lanes_at(index)
+        return lanes
 
     def _lanes_at(self, index: int) -> LanesBeside:
         roads = self._roads

@@ -250,8 +250,8 @@ class Course:
 
     @cached_property
     def _places(self) -> list[float]:
-        found: list[float] = self.along.tolist()
-        return found
+        places: list[float] = self.along.tolist()
+        return places
 
     @cached_property
     def _fastest(self) -> list[float]:
