@@ -1,4 +1,4 @@
-"""Warnings about stations: areas off the roads, delays shorter than the time step, driving stations at rest."""
+"""Warnings about stations: areas off the roads, short delays and views, driving stations at rest."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
+from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.view import WorldView
@@ -101,6 +102,29 @@ def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -
                 f"detections of {name!r} are known one step of {dt:g} s later: "
                 f"its detector_latency is only {station.detector_latency:g} s",
                 "use a smaller step (--dt) to resolve it",
+            )
+
+
+REACTION = 0.5
+"""Time from the sight of an obstacle to braking [s], as in the occlusion model of the planner."""
+
+
+def short_views(settings: Mapping[str, AgentSettings], detectors: Mapping[str, Detector]) -> Iterator[Diagnostic]:
+    """Yield a warning for each driving station that cannot stop within the range of its sensors from its target
+    speed."""
+    for name, station in settings.items():
+        deceleration = getattr(station.planner_settings, "hard_deceleration", None)
+        detector, speed = detectors.get(name), station.target_speed
+        if detector is None or deceleration is None or speed is None:
+            continue
+        sensors = station.rig_sensors(detector.needs, detector.default_sensors).values()
+        ranges = [getattr(sensor, "range", math.inf) for sensor in sensors if sensor.kind in detector.needs]
+        view, needed = max(ranges, default=math.inf), speed * REACTION + speed**2 / (2.0 * deceleration)
+        if needed > view:
+            yield Diagnostic(
+                f"the sensors of {name!r} detect objects up to {view:g} m: from its target speed of {speed:g} m/s it "
+                f"stops within {needed:.0f} m",
+                "set the property 'range' of its sensors, or a lower target speed",
             )
 
 

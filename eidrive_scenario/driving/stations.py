@@ -24,7 +24,12 @@ from eidrive_scenario.driving.station_declarations import (
     resolved_stations,
     without_speed,
 )
-from eidrive_scenario.driving.station_warnings import areas_off_road, short_channel_delay, short_detector_latencies
+from eidrive_scenario.driving.station_warnings import (
+    areas_off_road,
+    short_channel_delay,
+    short_detector_latencies,
+    short_views,
+)
 from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, StationPerception
 from eidrive_scenario.errors import Diagnostic, ErrorSubject
 from eidrive_scenario.fusion.method import FusionMethod
@@ -196,6 +201,7 @@ class Stations(DrivingStack):
         context = self._context
         yield from areas_off_road(context.scenario, self._settings, context.roads)
         yield from short_detector_latencies(self._settings, context.dt)
+        yield from short_views({name: self._settings[name] for name in self.possible_drivers}, self._detectors)
         if context.channel is not None:
             yield from short_channel_delay(self._channel.profile, context.dt, "--channel")
 

@@ -39,7 +39,7 @@ def make(tmp_path: Path) -> Make:
 
 
 def ours(warnings: tuple[str, ...]) -> list[str]:
-    words = ("never started", "covered only", "step of", "never holds a vehicle")
+    words = ("never started", "covered only", "step of", "never holds a vehicle", "detect objects up to")
     return [warning for warning in warnings if any(word in warning for word in words)]
 
 
@@ -150,6 +150,17 @@ def test_detector_latency_below_one_step_is_reported(make: Make) -> None:
     path = make((area, f'<Property name="detector_latency" value="0.02"/>{area}'))
     (warning,) = ours(run_file(path, settings=RunSettings(time_limit=0.3)).warnings)
     assert "detections of 'Ego' are known one step of 0.05 s later: its detector_latency is only 0.02 s" in warning
+
+
+@pytest.mark.parametrize(("speed", "warns"), [(18.0, False), (18.5, True)])
+def test_target_speed_beyond_the_view_is_reported(make: Make, speed: float, warns: bool) -> None:
+    """From 18.1 m/s a vehicle stops within 50 m: 0.5 s · 18.1 m/s + (18.1 m/s)² / (2 · 4 m/s²)."""
+    speed_property = f'<Property name="target_speed" value="{speed}"/>'
+    path = make(('name="module" value="eidrive"/>', f'name="module" value="eidrive"/>{speed_property}'))
+    warnings = ours(run_file(path, settings=RunSettings(planner="behavior", time_limit=0.3)).warnings)
+    assert [warning.partition(": from")[0] for warning in warnings] == (
+        ["the sensors of 'Ego' detect objects up to 50 m"] if warns else []
+    )
 
 
 @pytest.mark.parametrize(
