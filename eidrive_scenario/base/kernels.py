@@ -33,7 +33,7 @@ class Kernel(Generic[P, R]):
     @cached_property
     def compiled(self) -> Any:
         """Compiled function, loaded from the cache if it is there."""
-        # numba compiles calls of its own functions only: the kernels that this one calls are replaced by theirs.
+        # numba only compiles calls of functions that it has compiled: the kernels that this one calls are replaced.
         names = self.__wrapped__.__globals__
         called = {
             name: names[name].compiled
@@ -46,8 +46,8 @@ class Kernel(Generic[P, R]):
 def kernel(signature: str) -> Callable[[Callable[P, R]], Kernel[P, R]]:
     """Return the decorator of a kernel with this signature of numba, such as `f8(f4[:,::1], i8)`.
 
-    A kernel reads its arguments, constants of its own module, and kernels of its own module: numba does not compile it
-    again if another module changes. Division by zero gives infinity or NaN, as in arrays of numpy.
+    A kernel reads its arguments, constants and kernels of the same module: numba does not compile it again if another
+    module changes. Division by zero gives infinity or NaN, as in arrays of numpy.
     """
     return lambda function: Kernel(function, signature)
 
@@ -69,7 +69,7 @@ def _compile(function: FunctionType, signature: str) -> Any:
 
 
 _noted: set[str] = set()
-"""What was printed about the compilation in this process, each once."""
+"""Messages about the compilation that this process has printed."""
 
 
 def _announcement() -> Any:

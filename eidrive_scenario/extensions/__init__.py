@@ -1,1 +1,1 @@
-"""What a name refers to: extensions by entry points, files of the library and of a project, and their settings."""
+"""Names and their meaning: extensions by entry points, files of the library and of a project, and their settings."""

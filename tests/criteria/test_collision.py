@@ -168,7 +168,7 @@ def test_side_of_a_corner_contact_is_that_of_the_approach(
         (15.0, 0.0, 0.0, "on a crosswalk"),  # partly
     ],
 )
-def test_collision_of_a_stopped_actor_is_a_fault_where_it_must_not_stop(
+def test_stopped_actor_is_at_fault_where_it_must_not_stop(
     frame: Any, car: Any, roads: Any, x: float, y: float, yaw: float, place: str | None
 ) -> None:
     """The lane has a width of 3.5 m around y = 0, the opposite one around 3.5 m."""

@@ -326,7 +326,8 @@ class Decider:
             waiting=frozenset(waiting),
             refused=frozenset(refused),
         )
-        return Options(options, rolled, evaluation, frozenset(waiting), frozenset(refused))
+        horizon = float(self._times[-1])
+        return Options(options, rolled, evaluation, horizon, frozenset(waiting), frozenset(refused))
 
     def _verified(
         self, situation: Situation, scene: Surroundings, profile: LateralProfile, stops: list[Wall]
@@ -366,14 +367,14 @@ class Decider:
                 stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
                 place = min(place, situation.s + stop)
             s = situation.s + self._center
-            eye = (s, profile.offset_at(s))
+            viewpoint = (s, profile.offset_at(s))
             waits = situation.speed < AT_REST and place - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene, self._body):
                 is_free = self._oncoming.yields(
                     scene,
                     situation.line,
                     beside,
-                    eye,
+                    viewpoint,
                     situation.now,
                     is_last_place=math.isinf(profile.waits_at),
                 )

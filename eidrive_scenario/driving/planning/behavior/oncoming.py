@@ -49,7 +49,7 @@ is not given up for the noise of a motion."""
 NARROW = 1.0
 """Distance between an object and the center of the oncoming lane below which traffic has to slow down for it [m]: half
 the width of a car."""
-EYE, TARGET = 1.5, 1.0
+VIEWPOINT, TARGET = 1.5, 1.0
 """Heights of sensor and traffic above the road for the view over a crest [m]."""
 BRAKING = 3.0
 """Deceleration with which a maneuver is given up [m/s²]; Autoware limits its stops for obstacles to about that."""
@@ -137,14 +137,19 @@ class OncomingTraffic:
         self._others_yield &= shift is not None
 
     def first_hidden(
-        self, line: ReferenceLine, scene: Surroundings, beside: LanesBeside, eye: tuple[float, float], step: int = 0
+        self,
+        line: ReferenceLine,
+        scene: Surroundings,
+        beside: LanesBeside,
+        viewpoint: tuple[float, float],
+        step: int = 0,
     ) -> float:
         """Return the place on the oncoming lane nearest to the vehicle from which traffic may come unseen [m].
 
-        eye   distance along the line and offset of the vehicle [m]
+        viewpoint   distance along the line and offset of the vehicle [m]
         step  index of the time
         """
-        s, d = eye
+        s, d = viewpoint
         places = s + self._ahead
         oncoming = beside.oncoming
         # Traffic behind an oncoming vehicle is not faster than that, and an object in the lane slows traffic down: they
@@ -207,14 +212,14 @@ class OncomingTraffic:
         self._others_yield &= is_current
         if self._others_yield:
             return Verdict.GO
-        eyes = motion.s + body.center
-        beside_line = profile.offset(eyes)
-        here = (float(eyes[0]), float(beside_line[0]))
+        viewpoints = motion.s + body.center
+        beside_line = profile.offset(viewpoints)
+        here = (float(viewpoints[0]), float(beside_line[0]))
         free = self._free(line, scene, beside, here, end, now)
         if self._suffices(free, here[0], back + reserve, end, beside, now):
             return Verdict.GO
         step = min(max(last, 0), len(times) - 1)
-        there = (float(eyes[step]), float(beside_line[step]))
+        there = (float(viewpoints[step]), float(beside_line[step]))
         hidden = self.first_hidden(line, scene, beside, there, step)
         if not self._suffices(hidden, there[0], back + reserve - float(times[step]), end, beside, now):
             return refused
@@ -228,7 +233,7 @@ class OncomingTraffic:
         scene: Surroundings,
         line: ReferenceLine,
         beside: LanesBeside,
-        eye: tuple[float, float],
+        viewpoint: tuple[float, float],
         now: float,
         *,
         is_last_place: bool,
@@ -238,34 +243,35 @@ class OncomingTraffic:
 
         is_last_place  whether there is no other place to wait at
         """
-        place = self.first_hidden(line, scene, beside, eye)
-        front = eye[0] + self._body.half_length
+        place = self.first_hidden(line, scene, beside, viewpoint)
+        front = viewpoint[0] + self._body.half_length
         is_patient = self._is_patient(now, PAUSE if is_last_place else LONGEST_PAUSE)
         self._others_yield = is_patient and place - approach(self._usual, math.inf) >= front
         return self._others_yield
 
     def _suffices(
-        self, hidden: float, eye: float, duration: float, end: float, beside: LanesBeside, now: float
+        self, hidden: float, viewpoint: float, duration: float, end: float, beside: LanesBeside, now: float
     ) -> bool:
         """Return whether traffic from a hidden place does not come to `end` in a time [s].
 
-        After the pause, none is expected from beyond the range of the sensors at `eye`, where nothing else hides it.
+        After the pause, none is expected from beyond the range of the sensors at `viewpoint`, where nothing else
+        hides it.
         """
-        if self._is_patient(now) and self._is_in_view(hidden, eye):
+        if self._is_patient(now) and self._is_in_view(hidden, viewpoint):
             return hidden >= end
         speed = self.hidden_speed(beside, now)
         return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration)) >= end
 
-    def _is_in_view(self, hidden: float, eye: float) -> bool:
-        """Return whether nothing but the range of the sensors limits the view from `eye`."""
-        return hidden >= eye + float(self._ahead[-1]) - SAMPLE
+    def _is_in_view(self, hidden: float, viewpoint: float) -> bool:
+        """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""
+        return hidden >= viewpoint + float(self._ahead[-1]) - SAMPLE
 
     def _free(
         self,
         line: ReferenceLine,
         scene: Surroundings,
         beside: LanesBeside,
-        eye: tuple[float, float],
+        viewpoint: tuple[float, float],
         end: float,
         now: float,
     ) -> float:
@@ -275,8 +281,8 @@ class OncomingTraffic:
         the sensors, none is expected until some comes into view.
         """
         known = self._free_to - self.hidden_speed(beside, now) * (now - self._free_at)
-        hidden = self.first_hidden(line, scene, beside, eye)
-        if self._is_patient(now) and self._is_in_view(hidden, eye[0]) and hidden >= end:
+        hidden = self.first_hidden(line, scene, beside, viewpoint)
+        if self._is_patient(now) and self._is_in_view(hidden, viewpoint[0]) and hidden >= end:
             hidden = math.inf
         self._free_to, self._free_at = max(known, hidden), now
         return self._free_to
@@ -381,7 +387,7 @@ def _beyond_crest(line: ReferenceLine, s: float, ahead: Array) -> Bools:
     """Return which distances `ahead` of a place on the line (P,) the road between hides."""
     if line.heights is None:
         return np.zeros(len(ahead), dtype=bool)
-    here = float(np.interp(s, line.along, line.heights)) + EYE
+    here = float(np.interp(s, line.along, line.heights)) + VIEWPOINT
     road = np.interp(s + ahead, line.along, line.heights) - here
     # The steepest line of sight over the road up to each place; traffic below it is hidden.
     steepest = np.maximum.accumulate(road / ahead)

@@ -260,6 +260,8 @@ class Options(msgspec.Struct, frozen=True):
     options: Sequence[Option]
     rolled: Rollout
     evaluation: Evaluation
+    horizon: float
+    """Time for which the options are rolled out [s]."""
     waiting: frozenset[int] = frozenset()
     """Profiles that end before an oncoming lane, for a view into it."""
     refused: frozenset[int] = frozenset()
@@ -282,7 +284,7 @@ class Options(msgspec.Struct, frozen=True):
     def best(self, profiles: int | None = None) -> int:
         """Return the index of the option with the highest score, among those along the first `profiles`.
 
-        The emergency brake is one of them only if the others collide soon.
+        The emergency brake is one of them only if the others collide soon, or have a risk as great as only a near contact has.
         """
         count = len(self.options)
         if profiles is not None:
@@ -291,7 +293,8 @@ class Options(msgspec.Struct, frozen=True):
         brake = self.emergency
         with_brake, score[brake] = float(score[brake]), -math.inf
         best = int(np.argmax(score))
-        is_urgent = float(self.evaluation.collision[best]) < URGENT
+        collision, risk = float(self.evaluation.collision[best]), float(self.evaluation.risk[best])
+        is_urgent = collision < URGENT or risk > 1.0 - FARTHER * URGENT / self.horizon
         return brake if is_urgent and with_brake > float(score[best]) else best
 
     def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int:
