@@ -284,7 +284,7 @@ class Options(msgspec.Struct, frozen=True):
     def best(self, profiles: int | None = None) -> int:
         """Return the index of the option with the highest score, among those along the first `profiles`.
 
-        The emergency brake is one of them only if the others collide soon, or have a risk as great as only a near contact has.
+        The emergency brake is one of them only if the best other one collides soon, or has a risk as of a near contact.
         """
         count = len(self.options)
         if profiles is not None:

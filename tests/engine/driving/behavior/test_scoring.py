@@ -1,13 +1,15 @@
-"""Evaluation of proposals: time gaps to crossing traffic, by the right of way."""
+"""Evaluation of proposals: time gaps to crossing traffic, by the right of way, and the emergency brake."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 
 from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Option, Proposal, inside_way
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
-from eidrive_scenario.driving.planning.behavior.scoring import evaluate
+from eidrive_scenario.driving.planning.behavior.scoring import Evaluation, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -57,3 +59,24 @@ def test_traffic_with_the_right_of_way_needs_a_larger_gap(
 ) -> None:
     assert (risk(arrival, yields=False) > 0.0) == without
     assert (risk(arrival, yields=True) > 0.0) == with_right_of_way
+
+
+@pytest.mark.parametrize(
+    ("collision", "risk", "brakes"),
+    [(3.9, 0.0, True), (4.1, 0.0, False), (math.inf, 0.61, True), (math.inf, 0.59, False)],
+)
+def test_emergency_brake_acts_for_what_is_near(collision: float, risk: float, brakes: bool) -> None:
+    """The risk of a contact decreases by 0.8 to the horizon of 8 s: to 0.6 in 4 s."""
+    way = np.zeros((0, 1), dtype=bool)
+    route = LateralProfile("route", (0.0,), (0.0,))
+    proposals = (Proposal(0, 1.0, "all", 4.0), Proposal(0, 0.0, "all", 8.0, is_emergency=True))
+    evaluation = Evaluation(
+        score=np.array([-100.0, -2.0]),
+        collision=np.array([collision, np.inf]),
+        risk=np.array([risk, 0.0]),
+        impact=np.zeros(2),
+        cause=np.full(2, -1),
+    )
+    rolled = Rollout(np.zeros((2, 1)), np.zeros((2, 1)), np.full((2, 1), -1))
+    options = Options([Option(proposal, route, way, [], way) for proposal in proposals], rolled, evaluation, 8.0)
+    assert options.best() == int(brakes)
