@@ -43,6 +43,8 @@ SAMPLE = 2.0
 RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
 """Response time [s] and deceleration [m/s²] of traffic that comes into view while the vehicle is in its lane; those of
 RSS for a vehicle that keeps to its lane (Shalev-Shwartz et al. 2017)."""
+HARD_RESPONSE = 6.0
+"""Deceleration that the vehicle expects of such traffic after the longest pause [m/s²]; a choice."""
 RESERVE = 1.5
 """Time that has to remain before traffic is met for a maneuver to begin [s]; one that has begun needs none, so that it
 is not given up for the noise of a motion."""
@@ -90,6 +92,7 @@ class OncomingTraffic:
         self._times = times
         self._body = body
         self._lateral_acceleration = settings.lateral_acceleration
+        self._wanted = 0.0
         self._usual, self._fastest = 0.0, 0.0
         """Speed of traffic that is expected out of view, and greatest speed of traffic in view until now [m/s]."""
         self._others_yield = False
@@ -113,6 +116,7 @@ class OncomingTraffic:
             self._last = now
             self._free_to = -math.inf if math.isinf(self._free_to) else self._free_to
             self._fastest = max(self._fastest, -float(scene.speed[is_oncoming, 0].min()))
+        self._wanted = wanted
         self._usual = max(self._fastest, SLOWEST * wanted) if self._fastest else wanted
         if held_up:
             self._held_up_until = now
@@ -245,8 +249,12 @@ class OncomingTraffic:
         """
         place = self.first_hidden(line, scene, beside, viewpoint)
         front = viewpoint[0] + self._body.half_length
-        is_patient = self._is_patient(now, PAUSE if is_last_place else LONGEST_PAUSE)
-        self._others_yield = is_patient and place - approach(self._usual, math.inf) >= front
+        has_waited_long = self._is_patient(now, LONGEST_PAUSE)
+        way = approach(self._usual, math.inf)
+        if has_waited_long:
+            way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
+        is_patient = has_waited_long or (is_last_place and self._is_patient(now))
+        self._others_yield = is_patient and place - way >= front
         return self._others_yield
 
     def _suffices(
@@ -377,10 +385,10 @@ class OncomingTraffic:
         return bool((comes & (rear < end)).any())
 
 
-def approach(speed: float, duration: float) -> float:
+def approach(speed: float, duration: float, deceleration: float = RESPONSE_DECELERATION) -> float:
     """Return the way of traffic that comes into view, responds to the vehicle in its lane, and brakes [m]."""
-    braking = min(max(duration - RESPONSE, 0.0), speed / RESPONSE_DECELERATION)
-    return speed * min(duration, RESPONSE) + speed * braking - 0.5 * RESPONSE_DECELERATION * braking**2
+    braking = min(max(duration - RESPONSE, 0.0), speed / deceleration)
+    return speed * min(duration, RESPONSE) + speed * braking - 0.5 * deceleration * braking**2
 
 
 def _beyond_crest(line: ReferenceLine, s: float, ahead: Array) -> Bools:
