@@ -131,8 +131,9 @@ BEFORE_OBSTACLE = 2.0
 """Distance between the rear of the vehicle and a passed obstacle at which it starts to return [m]."""
 SWUNG_OUT = 1.0
 """Distance by which the front is beside an obstacle when the lateral motion ends [m]; it is 99 % complete before."""
-BEFORE_MOVING = 4.0
-"""Gap behind a moving vehicle at which the lateral motion to overtake it ends [m]; a choice, twice `standstill_gap`."""
+BEFORE_MOVING = 1.1
+"""Time by which the lateral motion to overtake a moving vehicle ends earlier than beside a standing one [s]: with a gap
+as in following."""
 MEAN_SHARE = 0.75
 """Share of the maximum acceleration that the car-following model has on average up to 0.9 of the wanted speed."""
 QUEUE_GAP, QUEUE_PATIENCE = 15.0, 20.0
@@ -386,8 +387,7 @@ def _obstacle(
             end + own * _catch_up_time(end - rear, situation.speed - own, wanted - own, gain)
             for end, own in zip(ends, speed, strict=True)
         ]
-        if math.isnan(situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0)).faster):
-            begin -= SWUNG_OUT + BEFORE_MOVING
+        begin -= BEFORE_MOVING * slowest
         begin += slowest * _catch_up_time(begin - situation.s, situation.speed - slowest, wanted - slowest, gain)
     end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
     step = (end - begin) / 3.0
@@ -425,8 +425,7 @@ def _around(
         return None
     border = min(_border(lanes, side, body) for lanes in obstacle.beside)
     fastest = max(one.speed for one in obstacle.objects)
-    profile = msgspec.structs.replace(profile, border=border)
-    return msgspec.structs.replace(profile, overtakes=max(fastest, 0.0)) if profile.uses_oncoming else profile
+    return msgspec.structs.replace(profile, border=border, overtakes=0.0 if stands else max(fastest, 0.0))
 
 
 def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:

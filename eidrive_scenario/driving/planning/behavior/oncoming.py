@@ -38,6 +38,9 @@ SLOWEST = 0.5
 """Share of the wanted speed that traffic out of view is expected to drive at least."""
 FREE_TIME = 1.0
 """Time without an obstruction after which the vehicle does not wait any more [s]."""
+FARTHEST = 150.0
+"""Distance up to which a view into the oncoming lane is of use [m]: traffic at 50 km/h needs 11 s for it, about the
+duration of a maneuver from standstill."""
 SAMPLE = 2.0
 """Spacing of the places on the oncoming lane that are checked for a view [m]."""
 RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
@@ -87,7 +90,7 @@ class OncomingTraffic:
     """
 
     def __init__(self, view: float, times: Array, body: Body, settings: BehaviorSettings) -> None:
-        self._ahead: Array = np.arange(SAMPLE, view + SAMPLE, SAMPLE)
+        self._ahead: Array = np.arange(SAMPLE, min(view, FARTHEST) + SAMPLE, SAMPLE)
         """Distances of the places that are checked for a view [m]."""
         self._times = times
         self._body = body
