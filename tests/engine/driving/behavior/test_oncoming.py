@@ -14,7 +14,7 @@ from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 from eidrive_scenario.driving.planning.path import PlannedPath
 
-BESIDE = LanesBeside(oncoming=3.5, oncoming_limit=20.0)
+BESIDE = LanesBeside(oncoming=3.5, oncoming_limit=15.0)
 TIMES = np.arange(0.0, 12.01, 0.25)
 BODY = Body(3.8, 1.0, 2.85, 0.9)
 SETTINGS = BehaviorSettings()
@@ -51,7 +51,7 @@ def traffic(view: float) -> OncomingTraffic:
 
 
 def verdict(
-    *objects: tuple[float, float, float], view: float = 300.0, now: float = 0.0, s: float = -30.0, current: bool = False
+    *objects: tuple[float, float, float], view: float = 150.0, now: float = 0.0, s: float = -30.0, current: bool = False
 ) -> Verdict:
     """Return the verdict on PASSING at 10 m/s from `s` on, past a car of 5 m that stands at 40 m, and other objects.
 
@@ -93,10 +93,10 @@ def test_approach_is_a_response_time_and_braking() -> None:
 
 def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> None:
     waiting = traffic(50.0)
-    assert waiting.hidden_speed(BESIDE, PAUSE - 0.1) == 20.0
+    assert waiting.hidden_speed(BESIDE, PAUSE - 0.1) == 15.0
     assert waiting.hidden_speed(BESIDE, PAUSE) == 10.0
     waiting.observe(scene((30.0, 3.5, -8.0)), 0.0, 10.0, 4.0, held_up=True)
-    assert waiting.hidden_speed(BESIDE, PAUSE + 1.0) == 20.0, "traffic in view restarts the time"
+    assert waiting.hidden_speed(BESIDE, PAUSE + 1.0) == 15.0, "traffic in view restarts the time"
     assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
 
 
@@ -115,9 +115,9 @@ def test_current_maneuver_needs_no_reserve(start: float, expected: Verdict) -> N
 @pytest.mark.parametrize(
     ("view", "now", "expected"),
     [
-        (180.0, 0.0, Verdict.GO),  # from -13.6 m on; traffic at 20 m/s needs at most 20 + 400 / 6 = 86.7 m to 68.8 m
-        (150.0, 0.0, Verdict.WAIT),
-        (150.0, PAUSE, Verdict.GO),  # traffic at 10 m/s needs 95 m, and none is expected from beyond the range
+        (140.0, 0.0, Verdict.GO),  # from -13.6 m on; traffic at 15 m/s needs at most 15 + 225 / 6 = 52.5 m to 68.8 m
+        (130.0, 0.0, Verdict.WAIT),
+        (130.0, PAUSE, Verdict.GO),  # none is expected from beyond the range
         (100.0, PAUSE, Verdict.GO),
         (70.0, PAUSE, Verdict.WAIT),  # the range ends before the maneuver does
     ],
