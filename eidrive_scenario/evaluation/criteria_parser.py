@@ -274,11 +274,19 @@ def _check_context(criterion: Criterion, context: CriteriaContext, source: str, 
         ("entity", criterion.subjects, context.entities),
         ("monitor", criterion.monitors, context.monitors),
     ):
-        unknown = [one for one in names if known is not None and one not in known]
+        unknown = [subject for subject in names if known is not None and subject not in known]
         if unknown:
-            hints = [suggestion(one, known) if known else f"the scenario declares no {kind}" for one in unknown]
-            messages = [f"criterion {name!r}: unknown {kind} {one!r}" for one in unknown]
-            raise SettingError([Diagnostic(*text, source, line) for text in zip(messages, hints, strict=True)])
+            raise SettingError(
+                [
+                    Diagnostic(
+                        f"criterion {name!r}: unknown {kind} {subject!r}",
+                        suggestion(subject, known) if known else f"the scenario declares no {kind}",
+                        source,
+                        line,
+                    )
+                    for subject in unknown
+                ]
+            )
     if criterion.needs_roads and not context.has_roads:
         message = f"criterion {name!r} requires roads, and the scenario has none"
         raise SettingError(Diagnostic(message, "add a LogicFile to its RoadNetwork", source, line))

@@ -96,9 +96,9 @@ def shade(
         albedo = among.surfaces.albedo[triangle[lamp_lit]]
         luminance[lamp_lit] += albedo * shone[lamp_lit, None] * LAMP_COLOR
     wet = np.float32(1.0 - DARKENING * min(2.0 * at.weather.wetness, 1.0))
-    place = (at.view.place[:2] % 4096.0).astype(np.float32)
+    origin = (at.view.place[:2] % 4096.0).astype(np.float32)
     factors = np.where(SOAKS, wet, np.float32(1.0))
-    _add_grain(luminance, places, finish, GRAIN, factors, place, patches(), grit())
+    _add_grain(luminance, places, finish, GRAIN, factors, origin, patches(), grit())
     _add_mirrors(luminance, triangle, places, among.surfaces, at, sun)
     return luminance
 

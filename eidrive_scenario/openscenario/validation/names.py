@@ -173,20 +173,20 @@ def check_names(
 ) -> None:
     """Report duplicate names and references to missing elements."""
     elements = list(elements)
-    known: dict[str, dict[str, model.Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
+    declared: dict[str, dict[str, model.Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
     unnamed: set[str] = set()
     for kind, name, element in _definitions(root, elements, entries):
         if name is None:
             unnamed.add(kind)
             continue
-        if name in known[kind] and kind in _UNIQUE:
+        if name in declared[kind] and kind in _UNIQUE:
             collector.error(
                 f"two {_plural(kind)} are named {name!r}",
-                f"the other one is in line {known[kind][name].line}; rename one",
+                f"the other one is in line {declared[kind][name].line}; rename one",
                 at=element,
             )
-        known[kind].setdefault(name, element)
-    complete = {kind: names for kind, names in known.items() if kind not in unnamed}
+        declared[kind].setdefault(name, element)
+    complete = {kind: names for kind, names in declared.items() if kind not in unnamed}
     exempt = {id(parameter) for element in elements for parameter in _undeclared_parameter(element)}
     exempt |= {
         id(element.trailer_ref)

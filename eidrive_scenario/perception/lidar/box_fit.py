@@ -79,15 +79,15 @@ def _find_nearest_edges(x: Array, y: Array, cos: Array, sin: Array, nearest: Arr
             ax, ay = (cos[heading], sin[heading]) if axis == 0 else (-sin[heading], cos[heading])
             low, high = math.inf, -math.inf
             for point in range(count):
-                place = ax * x[point] + ay * y[point]
-                low, high = min(low, place), max(high, place)
+                along = ax * x[point] + ay * y[point]
+                low, high = min(low, along), max(high, along)
             of_low = of_high = 0.0
             for point in range(count):
-                place = ax * x[point] + ay * y[point]
-                of_low, of_high = of_low + (place - low) ** 2, of_high + (high - place) ** 2
+                along = ax * x[point] + ay * y[point]
+                of_low, of_high = of_low + (along - low) ** 2, of_high + (high - along) ** 2
             for point in range(count):
-                place = ax * x[point] + ay * y[point]
-                distance = high - place if of_high < of_low else place - low
+                along = ax * x[point] + ay * y[point]
+                distance = high - along if of_high < of_low else along - low
                 nearest[heading, point] = min(nearest[heading, point], distance) if axis else distance
 
 
