@@ -10,7 +10,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
-from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Verdict
+from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Outlook, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
     ROUTE,
     Body,
@@ -343,17 +343,12 @@ class Decider:
         here, body = (situation.s, situation.speed), (self._front, self._center)
         rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads)], course, here, body, scene)
         beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
-        verdict = self._oncoming.verify(
-            profile,
-            Motion(rolled.s[0], rolled.speed[0]),
-            scene,
-            situation.line,
-            beside,
-            situation.now,
-            is_current=self._current is not None and self._current.name == profile.name,
-        )
+        outlook = Outlook(situation.line, scene, beside)
+        is_current = self._current is not None and self._current.name == profile.name
+        motion = Motion(rolled.s[0], rolled.speed[0])
+        verdict = self._oncoming.verify(profile, motion, outlook, situation.now, is_current=is_current)
         place = self._oncoming.waiting_place(profile, situation.s)
-        has_begun = self._passes and self._current is not None and self._current.name == profile.name
+        has_begun = self._passes and is_current
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
             verdict = Verdict.WAIT
         if verdict is Verdict.WAIT:
@@ -370,14 +365,8 @@ class Decider:
             viewpoint = (s, profile.offset_at(s))
             waits = situation.speed < AT_REST and place - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene, self._body):
-                is_free = self._oncoming.yields(
-                    scene,
-                    situation.line,
-                    beside,
-                    viewpoint,
-                    situation.now,
-                    is_last_place=math.isinf(profile.waits_at),
-                )
+                is_last_place = math.isinf(profile.waits_at)
+                is_free = self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
         return profile, verdict, place
 

@@ -83,6 +83,14 @@ class Motion(NamedTuple):
     speed: Array
 
 
+class Outlook(NamedTuple):
+    """What the vehicle has before it: its line, the objects, and the lanes beside the line."""
+
+    line: ReferenceLine
+    scene: Surroundings
+    beside: LanesBeside
+
+
 class OncomingTraffic:
     """Oncoming traffic that one vehicle observes over time, and what may come from where it has no view.
 
@@ -143,19 +151,12 @@ class OncomingTraffic:
         self._free_to = -math.inf if shift is None else self._free_to + shift
         self._others_yield &= shift is not None
 
-    def first_hidden(
-        self,
-        line: ReferenceLine,
-        scene: Surroundings,
-        beside: LanesBeside,
-        viewpoint: tuple[float, float],
-        step: int = 0,
-    ) -> float:
+    def first_hidden(self, outlook: Outlook, viewpoint: tuple[float, float], step: int = 0) -> float:
         """Return the place on the oncoming lane nearest to the vehicle from which traffic may come unseen [m].
 
-        viewpoint   distance along the line and offset of the vehicle [m]
-        step  index of the time
+        viewpoint  distance along the line and offset of the vehicle [m];  step  index of the time
         """
+        line, scene, beside = outlook
         s, d = viewpoint
         places = s + self._ahead
         oncoming = beside.oncoming
@@ -177,21 +178,14 @@ class OncomingTraffic:
         return float(s + first * SAMPLE)
 
     def verify(
-        self,
-        profile: LateralProfile,
-        motion: Motion,
-        scene: Surroundings,
-        line: ReferenceLine,
-        beside: LanesBeside,
-        now: float,
-        *,
-        is_current: bool,
+        self, profile: LateralProfile, motion: Motion, outlook: Outlook, now: float, *, is_current: bool
     ) -> Verdict:
         """Return whether the vehicle may follow a profile that uses the oncoming lane.
 
         now         current time [s]
         is_current  whether it follows the profile already; then it needs no reserve
         """
+        _, scene, beside = outlook
         if math.isnan(beside.oncoming):
             return Verdict.GO
         body, side, times, border = self._body, profile.side, self._times, profile.border
@@ -212,9 +206,8 @@ class OncomingTraffic:
         has_stopped = float(motion.speed[0]) < SLOW and side * float(offsets[0]) < border + OVERRUN
         must_return = (first == 0 and not has_stopped) or self._moves(profile, motion, scene)
         refused = Verdict.GIVE_UP if must_return else Verdict.WAIT
-        reserve = 0.0 if is_current else RESERVE
-        end = place + body.front
-        if math.isinf(back) or self._meets(profile, scene, motion, first, back, end, reserve):
+        end, until = place + body.front, back if is_current else back + RESERVE
+        if math.isinf(back) or self._meets(profile, motion, scene, first, until, end):
             return refused
         self._others_yield &= is_current
         if self._others_yield:
@@ -222,35 +215,26 @@ class OncomingTraffic:
         viewpoints = motion.s + body.center
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
-        free = self._free(line, scene, beside, here, end, now)
-        if self._suffices(free, here[0], back + reserve, end, beside, now):
+        free = self._free(outlook, here, end, now)
+        if self._suffices(free, here[0], until, end, beside, now):
             return Verdict.GO
         step = min(max(last, 0), len(times) - 1)
         there = (float(viewpoints[step]), float(beside_line[step]))
-        hidden = self.first_hidden(line, scene, beside, there, step)
-        if not self._suffices(hidden, there[0], back + reserve - float(times[step]), end, beside, now):
+        hidden = self.first_hidden(outlook, there, step)
+        if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
             return refused
         # Until then the vehicle may have to return to its lane.
-        until, front = float(times[step] + duration[step]), there[0] + body.half_length
-        may_return = step <= first or self._suffices(free, here[0], until, front, beside, now)
+        returned, front = float(times[step] + duration[step]), there[0] + body.half_length
+        may_return = step <= first or self._suffices(free, here[0], returned, front, beside, now)
         return Verdict.GO if may_return else refused
 
-    def yields(
-        self,
-        scene: Surroundings,
-        line: ReferenceLine,
-        beside: LanesBeside,
-        viewpoint: tuple[float, float],
-        now: float,
-        *,
-        is_last_place: bool,
-    ) -> bool:
+    def yields(self, outlook: Outlook, viewpoint: tuple[float, float], now: float, *, is_last_place: bool) -> bool:
         """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
         stop before it.
 
         is_last_place  whether there is no other place to wait at
         """
-        place = self.first_hidden(line, scene, beside, viewpoint)
+        place = self.first_hidden(outlook, viewpoint)
         front = viewpoint[0] + self._body.half_length
         has_waited_long = self._is_patient(now, LONGEST_PAUSE)
         way = approach(self._usual, math.inf)
@@ -277,22 +261,14 @@ class OncomingTraffic:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""
         return hidden >= viewpoint + float(self._ahead[-1]) - SAMPLE
 
-    def _free(
-        self,
-        line: ReferenceLine,
-        scene: Surroundings,
-        beside: LanesBeside,
-        viewpoint: tuple[float, float],
-        end: float,
-        now: float,
-    ) -> float:
+    def _free(self, outlook: Outlook, viewpoint: tuple[float, float], end: float, now: float) -> float:
         """Return the place up to which the oncoming lane is free of unseen traffic [m].
 
         What was in view stays free until traffic can have come there. Where none is expected from beyond the range of
         the sensors, none is expected until some comes into view.
         """
-        known = self._free_to - self.hidden_speed(beside, now) * (now - self._free_at)
-        hidden = self.first_hidden(line, scene, beside, viewpoint)
+        known = self._free_to - self.hidden_speed(outlook.beside, now) * (now - self._free_at)
+        hidden = self.first_hidden(outlook, viewpoint)
         if self._is_patient(now) and self._is_in_view(hidden, viewpoint[0]) and hidden >= end:
             hidden = math.inf
         self._free_to, self._free_at = max(known, hidden), now
@@ -367,22 +343,15 @@ class OncomingTraffic:
         return np.asarray(gap >= np.maximum(returning, braking) + BEHIND), duration
 
     def _meets(
-        self,
-        profile: LateralProfile,
-        scene: Surroundings,
-        motion: Motion,
-        first: int,
-        back: float,
-        end: float,
-        reserve: float,
+        self, profile: LateralProfile, motion: Motion, scene: Surroundings, first: int, until: float, end: float
     ) -> bool:
-        """Return whether oncoming traffic in view meets the vehicle between the step `first` and its return."""
+        """Return whether oncoming traffic in view is before `end` [m] at the time `until` [s], and was ahead of the
+        vehicle at the step `first`: then it meets it."""
         aside = np.abs(profile.side * max(abs(value) for value in profile.values) - scene.d)
         beside = aside - scene.half_width < self._body.half_width + scene.margin[:, None] * 0.5
         comes = np.logical_or.reduce(beside & (scene.speed < -ONCOMING_SPEED), axis=1)
         comes &= scene.front[:, first] > float(motion.s[first]) - self._body.rear
         # Beyond the horizon all keep their last speeds.
-        until = back + reserve
         step = min(int(np.searchsorted(self._times, until)), len(self._times) - 1)
         rear = scene.rear[:, step] + scene.speed[:, step] * max(until - float(self._times[-1]), 0.0)
         return bool((comes & (rear < end)).any())

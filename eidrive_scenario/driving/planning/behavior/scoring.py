@@ -26,7 +26,7 @@ FARTHER = 0.8
 LEAST_LACK = 0.3
 """Risk of a clearance that is just too small; it increases to 1 at a contact. A choice: a step, so that no option gains
 by a clearance that lacks a millimeter."""
-ASIDE = 0.5
+OUT_OF_LANE = 0.5
 """Offset from the route from which on the vehicle is in the way of oncoming traffic, not that in its way [m]."""
 AT_REST = 0.1
 """Speed below which the vehicle stands [m/s]."""
@@ -228,7 +228,7 @@ def _overlaps(
         late = touching & head_on & has_just_stopped[:, None, :]
         # A vehicle that stands still is not hit by its own fault, except in the way of traffic with the right of way or
         # of oncoming traffic that is in its own lane.
-        is_aside = (np.abs(offsets).max(axis=0) > ASIDE)[:, None, :]
+        is_aside = (np.abs(offsets).max(axis=0) > OUT_OF_LANE)[:, None, :]
         blameless = at_rest & (scene.speed != 0.0) & ~(crosses & scene.yields)[:, None] & ~(head_on & is_aside)
         touching &= ~blameless
     lack = np.where(counts, np.minimum(lack, 1.0), 0.0)

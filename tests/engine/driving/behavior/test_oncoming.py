@@ -7,7 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, Motion, OncomingTraffic, Verdict, approach
+from eidrive_scenario.driving.planning.behavior.oncoming import (
+    PAUSE,
+    Motion,
+    OncomingTraffic,
+    Outlook,
+    Verdict,
+    approach,
+)
 from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Start, with_view
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -61,17 +68,17 @@ def verdict(
     """
     motion = Motion(s + 10.0 * TIMES, np.full(len(TIMES), 10.0))
     there = scene(*(objects or ((40.0, 0.0, 0.0),)))
-    return traffic(view).verify(PASSING, motion, there, LINE, BESIDE, now, is_current=current)
+    return traffic(view).verify(PASSING, motion, Outlook(LINE, there, BESIDE), now, is_current=current)
 
 
 def test_free_view_ends_at_its_range() -> None:
-    assert traffic(100.0).first_hidden(LINE, scene(), BESIDE, (0.0, 0.0)) == pytest.approx(100.0, abs=4.0)
+    assert traffic(100.0).first_hidden(Outlook(LINE, scene(), BESIDE), (0.0, 0.0)) == pytest.approx(100.0, abs=4.0)
 
 
 @pytest.mark.parametrize("gap", [10.0, 20.0])
 def test_truck_ahead_hides_the_lane_beyond_the_line_of_sight(gap: float) -> None:
     # The line of sight over the rear left corner, at (gap, 1.0), reaches the center of the next lane at 3.5 gap.
-    hidden = traffic(100.0).first_hidden(LINE, scene((gap + 2.5, 0.0, 0.0)), BESIDE, (0.0, 0.0))
+    hidden = traffic(100.0).first_hidden(Outlook(LINE, scene((gap + 2.5, 0.0, 0.0)), BESIDE), (0.0, 0.0))
     assert hidden == pytest.approx(3.5 * gap, abs=2.0)
 
 
@@ -80,7 +87,7 @@ def test_crest_hides_the_lane_beyond_it() -> None:
     falls by (1.5 - 2) / 40, and is 1 m above the road beyond where (100 + x): 5 - 0.05 x + 1 = 5 + 0.0125 x."""
     line = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [400.0, 0.0]]), ends=False), None)
     line.__dict__["heights"] = 0.05 * (100.0 - np.abs(line.along - 100.0))
-    hidden = traffic(200.0).first_hidden(line, scene(), BESIDE, (60.0, 0.0))
+    hidden = traffic(200.0).first_hidden(Outlook(line, scene(), BESIDE), (60.0, 0.0))
     assert hidden == pytest.approx(100.0 + 1.0 / 0.0625, abs=2.0)
 
 
@@ -137,8 +144,10 @@ def test_vehicle_that_cannot_return_any_more_goes_on() -> None:
 
 def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
     motion = Motion(10.0 * TIMES, np.full(len(TIMES), 10.0))
-    there = scene((40.0, 0.0, 0.0))
-    assert traffic(10.0).verify(PASSING, motion, there, LINE, LanesBeside(), 0.0, is_current=False) is Verdict.GO
+    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), LanesBeside())
+    assert traffic(10.0).verify(PASSING, motion, outlook, 0.0, is_current=False) is Verdict.GO
+        traffic(10.0).verify(PASSING, motion, Outlook(LINE, there, LanesBeside()), 0.0, is_current=False) is Verdict.GO
+    )
 
 
 def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
