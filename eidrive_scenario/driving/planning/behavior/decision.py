@@ -20,6 +20,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     Proposal,
     Start,
     Wall,
+    at_edge,
     conflicts,
     crossing_walls,
     inside_way,
@@ -294,10 +295,11 @@ class Decider:
             holds: list[Wall] = []
             if profile.uses_oncoming:
                 profile, verdict, place = self._verified(situation, scene, profile, stops)
-                if verdict is Verdict.WAIT:
+                if verdict in (Verdict.WAIT, Verdict.FOLLOW):
                     waiting.add(number)
+                if verdict is Verdict.WAIT:
                     holds.append(Wall(place, math.inf, "wait for a free oncoming lane"))
-                elif verdict is Verdict.GIVE_UP:
+                if verdict is Verdict.GIVE_UP:
                     refused.add(number)
             way = inside_way(scene, profile, self._half_width)
             for hold in holds:
@@ -351,8 +353,10 @@ class Decider:
         has_begun = self._passes and is_current
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
             verdict = Verdict.WAIT
+        start = Start(*situation.steered, situation.speed)
+        s = situation.s + self._center
+        viewpoint = (s, profile.offset_at(s))
         if verdict is Verdict.WAIT:
-            start = Start(*situation.steered, situation.speed)
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
             better = with_view(profile, start, self._settings, sufficient)
             if better is not None:
@@ -361,13 +365,15 @@ class Decider:
                 # Nearer to the obstacle it would see less.
                 stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
                 place = min(place, situation.s + stop)
-            s = situation.s + self._center
-            viewpoint = (s, profile.offset_at(s))
             waits = situation.speed < AT_REST and place - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene, self._body):
                 is_last_place = math.isinf(profile.waits_at)
                 is_free = self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
+        elif verdict is Verdict.FOLLOW:
+            if self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=False):
+                return profile, Verdict.GO, place
+            profile = at_edge(profile, start, self._settings)
         return profile, verdict, place
 
     def _kept_names(self, situation: Situation) -> frozenset[str]:

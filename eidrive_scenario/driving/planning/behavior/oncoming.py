@@ -69,10 +69,11 @@ BEHIND = 1.0
 
 
 class Verdict(Enum):
-    """Result of the verification: go on; wait before the border of the lane; give the maneuver up."""
+    """Result of the verification: go on; wait before the border of the lane, or follow at it; give the maneuver up."""
 
     GO = auto()
     WAIT = auto()
+    FOLLOW = auto()
     GIVE_UP = auto()
 
 
@@ -196,7 +197,8 @@ class OncomingTraffic:
         first = int(outside.argmax())
         back, place = self._return(profile, motion, outside)
         possible, duration = self._can_give_up(profile, motion, scene, np.maximum(side * offsets - border, 0.0))
-        if first and not self._moves(profile, motion, scene):
+        moves = self._moves(profile, motion, scene)
+        if first and not moves:
             # Behind a standing object there is seldom space to return: the vehicle stops before the border.
             stop = motion.s + motion.speed**2 / (2.0 * BRAKING) + motion.speed * DELAY
             possible &= stop <= float(motion.s[first])
@@ -204,8 +206,8 @@ class OncomingTraffic:
         if last < 0 and first == 0:
             return Verdict.GO
         has_stopped = float(motion.speed[0]) < SLOW and side * float(offsets[0]) < border + OVERRUN
-        must_return = (first == 0 and not has_stopped) or self._moves(profile, motion, scene)
-        refused = Verdict.GIVE_UP if must_return else Verdict.WAIT
+        held = Verdict.FOLLOW if moves else Verdict.WAIT
+        refused = held if first or (has_stopped and not moves) else Verdict.GIVE_UP
         end, until = place + body.front, back if is_current else back + RESERVE
         if math.isinf(back) or self._meets(profile, motion, scene, first, until, end):
             return refused

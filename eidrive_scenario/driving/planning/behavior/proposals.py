@@ -187,6 +187,12 @@ def passing(
     return LateralProfile(name, tuple(places), (*values, value, value, 0.0), slope, side)
 
 
+def at_edge(profile: LateralProfile, start: Start, settings: BehaviorSettings) -> LateralProfile:
+    """Return the motion to the edge of the lane, from where the vehicle sees past what a profile overtakes."""
+    edge = profile.side * (profile.border - AT_OFFSET)
+    return towards(profile.name, edge, start, settings.lateral_acceleration, profile.side)
+
+
 def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings, place: float) -> LateralProfile | None:
     """Return a profile past an obstacle in two lateral motions, with a way at the edge of the lane between them, where
     the vehicle has a view into the oncoming lane.
