@@ -12,6 +12,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
 from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Outlook, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    AT_OFFSET,
     ROUTE,
     Body,
     LateralProfile,
@@ -373,7 +374,10 @@ class Decider:
         elif verdict is Verdict.FOLLOW:
             if self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=False):
                 return profile, Verdict.GO, place
-            profile = at_edge(profile, start, self._settings)
+            edge = at_edge(profile, start, self._settings)
+            # A motion to the edge that has begun is completed, instead of a new one in each tick.
+            current = self._current if is_current else None
+            profile = current if current is not None and abs(current.last - edge.last) < AT_OFFSET else edge
         return profile, verdict, place
 
     def _kept_names(self, situation: Situation) -> frozenset[str]:
