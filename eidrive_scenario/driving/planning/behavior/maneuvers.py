@@ -191,9 +191,10 @@ def passing_profiles(
         start = Start(*situation.steered, situation.speed)
         profiles.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
     if obstacle is not None:
-        # Beside a lane for it, a moving vehicle is overtaken by a change of lane.
-        changes = not math.isnan(faster) and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
-        sides = (-overtaking,) if changes else (overtaking, -overtaking)
+        # A moving vehicle is overtaken on one side only, and beside a lane for it by a change of lane.
+        sides: tuple[int, ...] = (overtaking, -overtaking)
+        if max(one.speed for one in obstacle.objects) > ONCOMING_SPEED:
+            sides = (overtaking,) if math.isnan(faster) else ()
         profiles += [
             profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
         ]
