@@ -9,7 +9,8 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
+from eidrive_scenario.driving.planning.behavior.lane_changes import LEAST_TIME_GAP, RELAXATION, RELAXED_TIME_GAP
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, has_gap, may_pass, passing_profiles
 from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Outlook, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
@@ -30,8 +31,8 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
-from eidrive_scenario.driving.planning.behavior.scoring import URGENT, Options, evaluate
+from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.scoring import URGENT, WEIGHTS, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
@@ -104,6 +105,8 @@ CRUISE = Proposal(0, 1.0, "all", 4.0)
 """Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
 AT_REST, NEAR_PLACE = 0.1, 1.0
 """Speed of a vehicle that waits [m/s], and distance from its place of waiting [m]."""
+NEARLY = 0.05
+"""Difference to its own time gap at which the vehicle has it again after a lane change [s]."""
 HARDER = 0.3
 """Difference to a comfortable deceleration from which on braking is hard [m/s²]."""
 
@@ -142,6 +145,8 @@ class Decider:
         self._switched = -math.inf
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
+        self._time_gap: float | None = None
+        """Time gap that increases after a lane change [s]; None: that of the settings."""
         self._oncoming = OncomingTraffic(view, times, self._body, settings)
         self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
@@ -150,27 +155,33 @@ class Decider:
         self._brakes = False
         """Whether the last decision was emergency braking."""
 
-    def line_changed(self, shift: float | None) -> None:
+    def line_changed(self, shift: float | None, aside: float = 0.0) -> None:
         """Move the current maneuver to another line.
 
         shift  increase of the distances along the line [m]; None if the maneuver ends because the lines differ
+        aside  distance of the new line to the left of the one before [m], if the vehicle has changed to its lane
         """
-        self._oncoming.line_changed(shift)
+        self._oncoming.line_changed(None if aside else shift)
         current = self._current
         if current is None or shift is None:
             self._current = None
-        else:
-            places = tuple(place + shift for place in current.places)
-            self._current = msgspec.structs.replace(current, places=places, waits_at=current.waits_at + shift)
+            return
+        places = tuple(place + shift for place in current.places)
+        self._current = msgspec.structs.replace(current, places=places, waits_at=current.waits_at + shift)
+        if aside:
+            values = tuple(value - aside for value in current.values)
+            self._current = LateralProfile(ROUTE, places, values, current.slope)
 
     def decide(self, situation: Situation) -> Decision:
         """Return the best proposal."""
         settings = self._settings
         scene = self._scene(situation, settings)
+        self._adapt_time_gap(situation, scene)
         current = self._continued(situation)
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._towards(situation, ROUTE, 0.0))
+        profiles += self._required_change(situation, scene, current)
         expects = self._held_up and settings.lane_changes
         options = self._options(situation, scene, profiles, with_maneuvers=expects)
         best = options.best(len(profiles))
@@ -292,6 +303,7 @@ class Decider:
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
         here = (self._front, situation.s, situation.speed)
         stops = [situation.stop] if situation.stop is not None else []
+        change = situation.change
         for number, profile in enumerate(profiles):
             holds: list[Wall] = []
             if profile.uses_oncoming:
@@ -302,19 +314,28 @@ class Decider:
                     holds.append(Wall(place, math.inf, "wait for a free oncoming lane"))
                 if verdict is Verdict.GIVE_UP:
                     refused.add(number)
+            changes = change is not None and profile.name == change.name
+            if change is not None and not changes:
+                holds.append(change.wall(self._front, self._settings.lateral_acceleration))
             way = inside_way(scene, profile, self._half_width)
             for hold in holds:
                 way &= scene.rear < hold.s + self._front
             crossing = conflicts(scene, way, situation.s)
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
-                number, crossing, self._settings, emergency=self._emergency, is_current=number == 0
+                number,
+                crossing,
+                self._settings,
+                emergency=self._emergency,
+                is_current=number == 0,
+                seeks_gap=change is not None and situation.s >= change.begin and not changes,
             ):
                 kind = proposal.precedence
                 if kind not in reactions:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
-                options.append(Option(proposal, profile, way, *reactions[kind]))
+                time_gap = RELAXED_TIME_GAP if changes else self._time_gap
+                options.append(Option(proposal, profile, way, *reactions[kind], time_gap))
         start, body = (situation.s, situation.speed), (self._front, self._center)
         rolled = self._roller.roll(options, course, start, body, scene)
         evaluation = evaluate(
@@ -328,6 +349,7 @@ class Decider:
             kept=self._kept_names(situation),
             waiting=frozenset(waiting),
             refused=frozenset(refused),
+            late=self._lateness(situation, scene, options, rolled),
         )
         horizon = float(self._times[-1])
         return Options(options, rolled, evaluation, horizon, frozenset(waiting), frozenset(refused))
@@ -380,6 +402,34 @@ class Decider:
             profile = current if current is not None and abs(current.last - edge.last) < AT_OFFSET else edge
         return profile, verdict, place
 
+    def _required_change(
+        self, situation: Situation, scene: Surroundings, current: LateralProfile
+    ) -> list[LateralProfile]:
+        """Return the motion into the lane to which the route changes, if a gap is there; else nothing."""
+        change = situation.change
+        if change is None or situation.s < change.begin or current.name == change.name:
+            return []
+        start = Start(*situation.steered, situation.speed)
+        s, speed = np.array([[situation.s]]), np.array([[situation.speed]])
+        gap = has_gap(scene, change.offset, s, speed, self._body, RELAXED_TIME_GAP, step=0)
+        return [change.profile(start, self._settings.lateral_acceleration)] if gap.all() else []
+
+    def _lateness(
+        self, situation: Situation, scene: Surroundings, options: list[Option], rolled: Rollout
+    ) -> Array | None:
+        """Return the costs (P,) of the time until options change to the lane of the route; None if there is no change.
+
+        They increase with the desire to change; at the begin of the lanes only the first part counts.
+        """
+        change = situation.change
+        if change is None or situation.s < change.begin:
+            return None
+        gap = has_gap(scene, change.offset, rolled.s, rolled.speed, self._body, RELAXED_TIME_GAP)
+        first = np.where(gap.any(axis=1), self._times[gap.argmax(axis=1)], self._times[-1])
+        desire = change.desire(situation.s, situation.wanted)
+        stays = np.array([option.profile.name != change.name for option in options])
+        return np.asarray(stays * (WEIGHTS.stays + WEIGHTS.gap * desire * first / self._times[-1]))
+
     def _kept_names(self, situation: Situation) -> frozenset[str]:
         """Return the current maneuver, and the route if its lateral motion is complete: then the vehicle returns."""
         current = self._current
@@ -394,6 +444,23 @@ class Decider:
             return True
         way = float(options.rolled.s[best, -1] - options.rolled.s[best, 0])
         return way < SATISFIED * situation.free_progress(float(self._times[-1]), self._settings.acceleration)
+
+    def _adapt_time_gap(self, situation: Situation, scene: Surroundings) -> None:
+        """Set the time gap: short while the vehicle merges, then longer again unless another follows it closely."""
+        usual, change = self._settings.time_gap, situation.change
+        if change is not None and self._current is not None and self._current.name == change.name:
+            self._time_gap = min(RELAXED_TIME_GAP, usual)
+        if self._time_gap is None:
+            return
+        lane = [one for one in scene.present if abs(one.d - situation.d) < one.half_width + self._half_width]
+        center = situation.s + self._center
+        before = min((one.rear for one in lane if one.s > center), default=math.inf) - situation.s - self._front
+        after = situation.s - self._body.rear - max((one.front for one in lane if one.s <= center), default=-math.inf)
+        if after < before:
+            self._time_gap = min(LEAST_TIME_GAP, usual)
+        self._time_gap += (usual - self._time_gap) * self._settings.period / RELAXATION
+        if usual - self._time_gap < NEARLY:
+            self._time_gap = None
 
     def _kept(self, options: Options, best: int, now: float) -> int:
         """Return the best proposal; that of the current maneuver during its dwell time, unless it is risky.

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import VULNERABLE
+from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
@@ -58,6 +59,8 @@ class Situation(msgspec.Struct, frozen=True):
     """Kind of the nearest way ahead that no sensor shows and that limits the speed; empty without one."""
     road_limits: Array | None = None
     """Speed limits (M,) by curves and the end of the route only [m/s]; None if `limits` has no others."""
+    change: LaneChange | None = None
+    """Next lane change that the route requires."""
 
     def kind_of(self, owner: int) -> str:
         """Return the class of an object."""
@@ -146,7 +149,11 @@ NEAR_STOP = 40.0
 """Distance of a place where traffic stops, ahead of a standing vehicle, within which it queues [m]."""
 REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
 """Reaction time [s] and deceleration [m/s²] that a lane change may require of the traffic behind, and the minimum gap
-[m]."""
+[m]; the deceleration is that of the vehicle as well."""
+AHEAD_GAP = 2.0
+"""Minimum gap to the vehicle ahead at a lane change [m]."""
+BESIDE_LANE = 1.0
+"""Distance from the center of a lane within which a body is in it [m]: half the width of a vehicle."""
 
 
 class _Obstacle(NamedTuple):
@@ -186,7 +193,7 @@ def passing_profiles(
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
-    if not math.isnan(faster) and _rear_is_free(situation, scene, faster, body.center):
+    if not math.isnan(faster) and situation.change is None and _is_free(situation, scene, faster, body):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = Start(*situation.steered, situation.speed)
         profiles.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
@@ -228,7 +235,7 @@ def _evasions(
     evasions = []
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
-        if not (math.isnan(offset) or math.isnan(beyond)) and _rear_is_free(situation, scene, offset, body.center):
+        if not (math.isnan(offset) or math.isnan(beyond)) and _is_free(situation, scene, offset, body):
             name = f"change lane to the {'left' if side > 0 else 'right'}"
             start = Start(*situation.steered, situation.speed)
             evasions.append(towards(name, offset, start, settings.lateral_acceleration, side=side))
@@ -346,15 +353,33 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: B
     return any(-0.5 < one.rear - blocker.front < QUEUE_GAP and abs(one.d - blocker.d) < 1.0 for one in scene.present)
 
 
-def _rear_is_free(situation: Situation, scene: Surroundings, offset: float, center: float) -> bool:
-    """Return whether traffic behind on a lane can adapt to the vehicle with little braking."""
-    for one in scene.present:
-        if abs(one.d - offset) < one.half_width + 1.0 and one.s <= situation.s + center:
-            gap = situation.s - 1.0 - one.front
-            closing = max(one.speed - situation.speed, 0.0)
-            if gap < REAR_GAP + REAR_REACTION * closing + closing**2 / (2.0 * REAR_DECELERATION):
-                return False
-    return True
+def _is_free(situation: Situation, scene: Surroundings, offset: float, body: Body) -> bool:
+    """Return whether a lane has a gap beside the vehicle."""
+    s, speed = np.array([[situation.s]]), np.array([[situation.speed]])
+    return bool(has_gap(scene, offset, s, speed, body, 0.0, step=0).all())
+
+
+def has_gap(
+    scene: Surroundings, offset: float, s: Array, speed: Array, body: Body, time_gap: float, step: int | None = None
+) -> Bools:
+    """Return where (P, K) a lane has a gap that a vehicle can enter: neither it nor traffic behind has to brake hard.
+
+    offset    distance of the center of the lane to the left of the line [m]
+    s, speed  distances along the line [m] and speeds [m/s] (P, K) of the vehicle
+    time_gap  least time to a vehicle ahead and for one behind [s]
+    step      index of the time of single positions (P, 1); None: one position at each time
+    """
+    times = slice(None) if step is None else slice(step, step + 1)
+    lane: Bools = (np.abs(scene.d - offset) < scene.half_width + BESIDE_LANE)[:, times] & ~scene.crosses[:, times]
+    others, here = scene.speed[:, times], speed[:, None]
+    behind = scene.s[:, times] <= (s + body.center)[:, None]
+    ahead = scene.rear[:, times] - (s + body.front)[:, None]
+    after = (s - body.rear)[:, None] - scene.front[:, times]
+    closing, approach = np.maximum(here - others, 0.0), np.maximum(others - here, 0.0)
+    needed = AHEAD_GAP + time_gap * here + closing**2 / (2.0 * REAR_DECELERATION)
+    kept = np.maximum(time_gap * others, REAR_GAP) + REAR_REACTION * approach + approach**2 / (2.0 * REAR_DECELERATION)
+    blocked = lane & np.where(behind, after < kept, ahead < needed)
+    return np.asarray(~np.logical_or.reduce(blocked, axis=1))
 
 
 def _catch_up_time(gap: float, closing: float, top: float, acceleration: float) -> float:

@@ -19,6 +19,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
+from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange, Stage, stages
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
 from eidrive_scenario.driving.planning.behavior.occlusion import HiddenTraffic, Occluders
@@ -75,6 +76,8 @@ class BehaviorPlanner(RoutePlanner):
         self._predictor = Predictor(roads, self._times, self._rules)
         self._passages: tuple[Passage, ...] = ()
         self._line: ReferenceLine | None = None
+        self._stages: list[Stage] = []
+        """Lanes of a path that changes lanes, from the current one on."""
         self._conflict_ways: ConflictWays | None = None
         self._ways: list[ConflictWay] = []
         self._hidden: HiddenTraffic | None = None
@@ -125,12 +128,20 @@ class BehaviorPlanner(RoutePlanner):
     def _line_of(self, path: PlannedPath, ego: EgoState) -> ReferenceLine:
         """Return the reference line of the path; the current maneuver continues on an extended path."""
         before = self._line
-        if before is not None and before.path is path:
-            return before
         x, y, z = ego.position.tolist()
-        line = self._line = ReferenceLine(path, self.roads, z)
+        aside = 0.0
+        if before is not None and before.path is path:
+            change = self._change(before, self._place_on(before, x, y)[0])
+            if change is None or abs(self._place_on(before, x, y)[1] - change.offset) > abs(change.offset) / 2.0:
+                return before
+            aside = change.offset
+            self._stages = self._stages[1:]
+        else:
+            has_goal = any(part is not None for part in self._way)
+            self._stages = stages(ReferenceLine(path, self.roads, z)) if has_goal else []
+        line = self._line = ReferenceLine(path, self.roads, z, self._stages[0].offsets if self._stages else None)
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
-        self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
+        self._limits = speed_limits(line.curvature, line.path_limits, line.spacing, self.planner_settings)
         if self.observes_regions and self.roads is not None:
             if self._conflict_ways is None:
                 self._conflict_ways = ConflictWays(
@@ -140,10 +151,19 @@ class BehaviorPlanner(RoutePlanner):
         shift = None
         if before is not None:
             (s, d), (s_before, d_before) = (some.place(x, y, 0, len(some.points)) for some in (line, before))
-            shift = s - s_before if abs(d - d_before) < SAME_LINE else None
+            shift = s - s_before if abs(d - d_before + aside) < SAME_LINE else None
         self._decision = None
-        self._decider.line_changed(shift)
+        self._decider.line_changed(shift, aside)
         return line
+
+    def _change(self, line: ReferenceLine, s: float) -> LaneChange | None:
+        """Return the lane change that the path requires next, at a distance along the line; None without one."""
+        if len(self._stages) < 2:
+            return None
+        here, (offsets, _, _) = self._stages[:2]
+        begin, end = (float(line.along[index]) for index in (here.begin, here.end or 0))
+        index = line.index_at(min(max(s, begin), end))
+        return LaneChange(begin, end, float(offsets[index] - here.offsets[index]))
 
     def _caution(
         self, ego: EgoState, objects: Detections, line: ReferenceLine, s: float, wanted: float, now: float
@@ -220,11 +240,12 @@ class BehaviorPlanner(RoutePlanner):
             objects=near,
             prediction=self._predictor.predict(near, [lanes[row] for row in rows]),
             window=(low, max(high, low + 2)),
-            stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
+            stop=None if stop is None else Wall(line.along_of(stop.place), math.inf, stop.reason),
             now=now,
             gives_way=self._gives_way(s),
             hidden=hidden,
             road_limits=self._limits if hidden else None,
+            change=self._change(line, s),
         )
         return self._decider.decide(situation)
 

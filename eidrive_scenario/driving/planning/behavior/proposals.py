@@ -223,6 +223,8 @@ Precedence = Literal["all", "earlier", "none"]
 
 SPEED_SHARES = (1.0, 0.7, 0.4)
 """Target speeds of proposals, as shares of the wanted speed."""
+TOWARDS_GAP = (0.95, 0.85, 0.7, 0.5, 0.3)
+"""Target speeds of proposals by which a vehicle comes beside a gap, as shares of the wanted speed."""
 SIMILAR_SPEED = 1.0
 """Difference of speeds up to which objects are overtaken together [m/s]."""
 ONCOMING_SPEED = 0.5
@@ -271,6 +273,8 @@ class Option(msgspec.Struct, frozen=True):
     way: Bools
     walls: Sequence[Wall]
     leads: Bools
+    time_gap: float | None = None
+    """Time gap behind leaders [s]; None: that of the settings."""
 
 
 class Conflict(msgspec.Struct, frozen=True):
@@ -338,15 +342,24 @@ def crossing_walls(
 
 
 def proposals_for(
-    profile: int, found: list[Conflict], settings: BehaviorSettings, *, emergency: float, is_current: bool
+    profile: int,
+    found: list[Conflict],
+    settings: BehaviorSettings,
+    *,
+    emergency: float,
+    is_current: bool,
+    seeks_gap: bool = False,
 ) -> list[Proposal]:
     """Return the proposals along one profile.
 
     emergency  deceleration of the emergency brake [m/s²];  is_current  whether they include stopping
+    seeks_gap  whether they include gently changed speeds, by which the vehicle comes beside a gap in another lane
     """
     hard = settings.hard_deceleration
     kinds: tuple[Precedence, ...] = ("all", "earlier", "none") if any(c.crosses for c in found) else ("all",)
     made = [Proposal(profile, share, kind, hard) for kind in kinds for share in SPEED_SHARES]
+    if seeks_gap:
+        made += [Proposal(profile, share, "all", settings.comfortable_deceleration) for share in TOWARDS_GAP]
     if is_current:
         made.append(Proposal(profile, 0.0, "all", hard))
         made.append(Proposal(profile, 0.0, "all", settings.comfortable_deceleration, is_gentle=True))

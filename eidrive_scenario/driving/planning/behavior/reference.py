@@ -73,27 +73,38 @@ class LanesBeside(NamedTuple):
 class ReferenceLine:
     """Path of the route with distances along it (s) and to its left (d).
 
-    z  height of its start [m]
+    z        height of its start [m]
+    offsets  distances of the points of the line to the left of those of the path (M,) [m], if it is beside the path
     """
 
-    def __init__(self, path: PlannedPath, roads: RoadNetwork | None, z: float = 0.0) -> None:
+    def __init__(
+        self, path: PlannedPath, roads: RoadNetwork | None, z: float = 0.0, offsets: Array | None = None
+    ) -> None:
         self._z = z
         self.path = path
-        self.points: Array = path.points
+        self.points: Array = path.points if offsets is None else _beside_path(path.points, offsets)
         step = np.diff(self.points, axis=0)
         length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
         self.along: Array = np.concatenate([[0.0], np.cumsum(length)])
         self._places: list[float] = self.along.tolist()
         self.spacing = float(self.along[-1]) / len(length)
-        middle = np.vstack([self.points[1] - self.points[0], self.points[2:] - self.points[:-2], step[-1]])
-        self.tangent: Array = middle / np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)[:, None]
-        self.normal: Array = np.column_stack([-self.tangent[:, 1], self.tangent[:, 0]])
+        self.tangent, self.normal = _directions(self.points)
         self.heading: Array = np.unwrap(np.arctan2(self.tangent[:, 1], self.tangent[:, 0]))
         self.curvature: Array = np.gradient(self.heading, self.along) if len(self.along) > 1 else np.zeros(1)
         self._columns: Array = np.stack([*self.points.T, *self.tangent.T, self.along, self.heading])
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}
         self._place: LaneLocation | None = None
+        self._directions: dict[int, tuple[list[float], float]] = {}
+
+    @property
+    def path_limits(self) -> Array:
+        """Speed limits of the path at the points (M,) [m/s]; beside it only that at its end."""
+        if self.points is self.path.points:
+            return self.path.limits
+        limits = np.full(len(self.points), np.inf)
+        limits[-1] = self.path.limits[-1]
+        return limits
 
     @property
     def length(self) -> float:
@@ -104,6 +115,13 @@ class ReferenceLine:
     def heights(self) -> Array | None:
         """Heights of the road at the points (M,) [m]; None if all roads are level."""
         return path_heights(self.path, self._roads, self._z)
+
+    def along_of(self, place: float) -> float:
+        """Return the distance along the line at a distance along its path [m]."""
+        if self.points is self.path.points:
+            return place
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.path.points, axis=0).T))])
+        return float(np.interp(place, along, self.along))
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""
@@ -140,14 +158,32 @@ class ReferenceLine:
             lanes = self._beside[index] = self._lanes_at(index)
         return lanes
 
-    def _lanes_at(self, index: int) -> LanesBeside:
+    def lanes_of_direction(self, index: int) -> tuple[list[float], float]:
+        """Return the centers of the lanes of the direction of the line at a point, from left to right, and of that at
+        the point [m]. The result is empty outside of roads."""
+        known = self._directions.get(index)
+        if known is None:
+            known = self._directions[index] = self._centers_at(index)
+        return known
+
+    def _centers_at(self, index: int) -> tuple[list[float], float]:
+        there = self._section_at(index)
+        if there is None:
+            return [], math.nan
+        lanes, own = there.lanes, there.own
+        first = next((n + 1 for n in range(own - 1, -1, -1) if not _is_usable(lanes[n])), 0)
+        last = next((n for n in range(own + 1, len(lanes)) if not _is_usable(lanes[n])), len(lanes))
+        return [lane.center for lane in lanes[first:last] if 2.0 * lane.half_width >= NARROWEST], lanes[own].center
+
+    def _section_at(self, index: int) -> _Section | None:
+        """Return the lanes at a point of the line; None outside of roads."""
         roads = self._roads
         if roads is None:
-            return LanesBeside()
+            return None
         x, y = self.points[index].tolist()
         place = self._place = roads.locate_at(x, y, self._place, reach=5.0)
         if place is None:
-            return LanesBeside()
+            return None
         road = roads.road(place.road)
         section = road.section_at(place.s)
         # The road may be passed against its driving direction; left is left of the motion.
@@ -157,40 +193,76 @@ class ReferenceLine:
         order = [number for number in section.lanes if number]
         order = order if sense > 0 else order[::-1]
         if place.lane not in order:
-            return LanesBeside()
-        center, half = {}, {}
+            return None
+        lanes = []
         for number in order:
             lane = section.lanes[number]
-            center[number] = (lane_t(road, section, lane, place.s)[0] - place.t) * sense
-            half[number] = lane.width.value(place.s - section.s) / 2.0
-        own = order.index(place.lane)
-        lanes = [
-            (center[n], half[n], section.lanes[n].drivable, roads.driving_direction(road.id, n) == sense) for n in order
-        ]
-        if road.rule == "RHT":
-            beside = _beside(lanes, own)
+            center = (lane_t(road, section, lane, place.s)[0] - place.t) * sense
+            half = lane.width.value(place.s - section.s) / 2.0
+            lanes.append(_Lane(number, center, half, lane.drivable, roads.driving_direction(road.id, number) == sense))
+        return _Section(place, lanes, order.index(place.lane), road.rule == "LHT")
+
+    def _lanes_at(self, index: int) -> LanesBeside:
+        there = self._section_at(index)
+        if there is None or self._roads is None:
+            return LanesBeside()
+        place, lanes, own, keeps_left = there
+        if keeps_left:
+            mirrored = [lane._replace(center=-lane.center) for lane in reversed(lanes)]
+            beside = _beside(mirrored, len(lanes) - 1 - own).mirrored()
         else:
-            lanes = [(-middle, width, drivable, same) for middle, width, drivable, same in reversed(lanes)]
-            beside = _beside(lanes, len(lanes) - 1 - own).mirrored()
+            beside = _beside(lanes, own)
         if math.isnan(beside.oncoming):
             return beside
-        opposite = min(order, key=lambda number: abs(center[number] - beside.oncoming))
-        limit = roads.speed_limit(road.id, place.s, opposite)
+        opposite = min(lanes, key=lambda lane: abs(lane.center - beside.oncoming))
+        limit = self._roads.speed_limit(place.road, place.s, opposite.number)
         return beside if limit is None else beside._replace(oncoming_limit=limit)
 
 
-def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBeside:
-    """Return the lanes beside one of the lanes of a section, from left to right, with traffic on the right.
+class _Lane(NamedTuple):
+    """Lane beside a point of the line: number, distance of its center to the left and half width [m], whether it is
+    drivable, and whether its traffic drives in the direction of the line."""
 
-    lanes  center to the left of the line and half width [m], whether it is drivable, and whether its traffic drives in
-           the direction of the line
-    """
-    center, half, _, _ = lanes[own]
+    number: int
+    center: float
+    half_width: float
+    drivable: bool
+    with_traffic: bool
+
+
+class _Section(NamedTuple):
+    """Lanes at a point of the line from left to right, the index of that at the point, and the side of the traffic."""
+
+    place: LaneLocation
+    lanes: list[_Lane]
+    own: int
+    keeps_left: bool
+
+
+def _is_usable(lane: _Lane) -> bool:
+    return lane.drivable and lane.with_traffic
+
+
+def _directions(points: Array) -> tuple[Array, Array]:
+    """Return the unit vectors along a line of points (M, 2) and to its left (M, 2)."""
+    ahead = np.vstack([points[1] - points[0], points[2:] - points[:-2], points[-1] - points[-2]])
+    tangent = ahead / np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
+    return tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
+
+
+def _beside_path(points: Array, offsets: Array) -> Array:
+    """Return the points (M, 2) at offsets (M,) to the left of those of a path (M, 2) [m]."""
+    return np.asarray(points + offsets[:, None] * _directions(points)[1])
+
+
+def _beside(lanes: list[_Lane], own: int) -> LanesBeside:
+    """Return the lanes beside one of the lanes of a section, from left to right, with traffic on the right."""
+    _, center, half, _, _ = lanes[own]
     left_edge = far_edge = center + half
     right_edge = center - half
     left = right = oncoming = math.nan
     same = True
-    for place, width, drivable, with_traffic in reversed(lanes[:own]):
+    for _, place, width, drivable, with_traffic in reversed(lanes[:own]):
         if not drivable:
             break
         same = same and with_traffic
@@ -200,7 +272,7 @@ def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBesi
             left = place if math.isnan(left) and 2.0 * width >= NARROWEST else left
         elif math.isnan(oncoming) and math.isnan(left):
             oncoming = place
-    for place, width, drivable, with_traffic in lanes[own + 1 :]:
+    for _, place, width, drivable, with_traffic in lanes[own + 1 :]:
         if not drivable or not with_traffic:
             break
         right_edge = place - width

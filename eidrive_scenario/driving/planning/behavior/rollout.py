@@ -141,7 +141,7 @@ class Roller:
         )
         driver = self._driver
         twice_root = 2.0 * math.sqrt(driver.acceleration * driver.deceleration)
-        self._constants = driver.time_gap, driver.standstill_gap, twice_root, driver.exponent
+        self._constants = driver.standstill_gap, twice_root, driver.exponent
 
     def roll(
         self,
@@ -166,23 +166,29 @@ class Roller:
             proposal = option.proposal
             number, ahead = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
-            key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends)
+            time_gap = self._driver.time_gap if option.time_gap is None else option.time_gap
+            key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends, time_gap)
             if key not in known:
                 if ends not in stops:
                     stops[ends] = walls_over_time(option.walls, self._times)
                 bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
-                known[key] = self._motion(proposal, bounds, start, ahead)
+                known[key] = self._motion(proposal, bounds, start, ahead, time_gap)
             motions.append(known[key])
         s, speed, cause = zip(*motions, strict=True)
         return Rollout(np.array(s), np.array(speed), np.array(cause))
 
     def _motion(
-        self, proposal: Proposal, bounds: Bounds, start: tuple[float, float], leaders: list[list[Leader]]
+        self,
+        proposal: Proposal,
+        bounds: Bounds,
+        start: tuple[float, float],
+        leaders: list[list[Leader]],
+        time_gap: float,
     ) -> _Motion:
         s, speed = start
         motion = _Motion([s], [speed], [])
         add_place, add_speed, add_cause = motion.s.append, motion.speed.append, motion.cause.append
-        time_gap, standstill_gap, twice_root, exponent = self._constants
+        standstill_gap, twice_root, exponent = self._constants
         greatest, least = self._driver.acceleration, -proposal.deceleration
         is_emergency, is_free, desired = proposal.is_emergency, bounds.are_free, bounds.wanted
         for step, dt in enumerate(self._steps):

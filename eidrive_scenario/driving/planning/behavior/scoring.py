@@ -42,6 +42,8 @@ class Weights(msgspec.Struct, frozen=True):
     slower           of a lower target speed than wanted, which decides between options that are otherwise alike
     gentle           of a stop for an uncertain object, which is only chosen for such an object
     refused          for an oncoming lane that is not free; above any progress
+    stays            for a lane that the route leaves, where the vehicle may change; above those of the change
+    gap              of the time until it may change, at its most urgent; below the progress of the whole horizon
     view             in favor of a place with a view into the oncoming lane; above the progress to the obstacle
     crash            of a collision, above all other terms
     """
@@ -56,6 +58,8 @@ class Weights(msgspec.Struct, frozen=True):
     gentle: float = 50.0
     refused: float = 20.0
     view: float = 2.0
+    stays: float = 1.0
+    gap: float = 4.0
     crash: float = 100.0
 
 
@@ -85,6 +89,7 @@ def evaluate(
     kept: frozenset[str],
     waiting: frozenset[int] = frozenset(),
     refused: frozenset[int] = frozenset(),
+    late: Array | None = None,
 ) -> Evaluation:
     """Return the evaluation of all options, which are in the order of their profiles.
 
@@ -92,6 +97,7 @@ def evaluate(
     kept     names of the maneuvers that are no change: the current one, and the route after a complete one
     waiting  profiles that end before an oncoming lane, for a view into it
     refused  profiles that use an oncoming lane that is not free
+    late     cost of the time until a lane change that the route requires (P,); None without one
     """
     count, horizon = len(options), float(times[-1])
     offsets = _offsets(options, rolled, ego)
@@ -114,6 +120,8 @@ def evaluate(
     score -= WEIGHTS.risk * risk
     crash = 1.0 + (1.0 - collision / horizon) + 0.05 * impact
     score -= WEIGHTS.crash * np.where(np.isfinite(collision), crash, 0.0)
+    if late is not None:
+        score -= late
     held = waiting | refused
     may_go = any(option.profile.uses_oncoming and option.proposal.profile not in held for option in options)
     values: list[float] = score.tolist()

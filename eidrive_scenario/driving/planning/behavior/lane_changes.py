@@ -1,0 +1,151 @@
+"""Lane changes that a route requires: where they are possible, and how urgent they are.
+
+A path changes lanes in one place. The vehicle may do so anywhere as long as both lanes lie beside each other: until it
+has changed, its reference line continues in the lane before.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Start, Wall, change_length, towards
+from eidrive_scenario.driving.planning.behavior.reference import NARROWEST, ReferenceLine
+
+STRIDE = 2
+"""Distance of the points of a path at which its lanes are determined, in points."""
+SAME_LANE = NARROWEST / 2.0
+"""Distance between the centers of one lane at two such points [m], less than between two lanes."""
+OFF_CENTER = 0.1
+"""Distance of a path from the center of its lane from which on it changes lanes [m]."""
+ROOM = 50.0
+"""Length that is kept for each later change between the same lanes [m]."""
+DISTANCE, TIME = 295.0, 43.0
+"""Distance [m] and time [s] before the end of the lane at which a change becomes desired, by LMRS (Schakel 2012)."""
+RELAXED_TIME_GAP, RELAXATION = 0.56, 25.0
+"""Time gap at which a vehicle merges, and time constant with which it returns to its own [s], by LMRS."""
+LEAST_TIME_GAP = 0.2
+"""Time gap of a vehicle that has merged as long as another follows it closer than it follows itself [s]; a choice. At
+0.9 of the wanted speed the Intelligent Driver Model keeps 1.7 times the gap."""
+
+
+class Stage(NamedTuple):
+    """Lane before one of the changes of a path, or that after the last one.
+
+    offsets     distances of its center to the left of the points of the path (M,) [m]
+    begin, end  indices of the points between which the vehicle may leave it; none after the last change
+    """
+
+    offsets: Array
+    begin: int
+    end: int | None
+
+
+class LaneChange(msgspec.Struct, frozen=True):
+    """Change from the lane of the reference line to a neighboring one.
+
+    begin, end  distances along the line between which the vehicle may change [m]
+    offset      distance of the center of the other lane to the left at the vehicle [m]
+    """
+
+    begin: float
+    end: float
+    offset: float
+
+    @property
+    def side(self) -> int:
+        """1 to the left, -1 to the right."""
+        return 1 if self.offset > 0.0 else -1
+
+    @property
+    def name(self) -> str:
+        """What the vehicle does."""
+        return f"change lane to the {'left' if self.side > 0 else 'right'}"
+
+    def profile(self, start: Start, lateral_acceleration: float) -> LateralProfile:
+        """Return the motion into the other lane."""
+        return towards(self.name, self.offset, start, lateral_acceleration, self.side)
+
+    def wall(self, front: float, lateral_acceleration: float) -> Wall:
+        """Return the place at which the vehicle stops if it finds no gap, with enough space to change from there.
+
+        front  distance of the front from the reference point [m]
+        """
+        place = self.end - front - change_length(self.offset, 0.0, lateral_acceleration)
+        return Wall(place, np.inf, "wait for a gap before the end of the lane")
+
+    def desire(self, s: float, speed: float) -> float:
+        """Return how urgent the change is at a distance along the line [m] and a speed [m/s], in [0, 1]."""
+        left = self.end - s
+        return min(max(1.0 - left / DISTANCE, 1.0 - left / (TIME * max(speed, 1.0)), 0.0), 1.0)
+
+
+def stages(line: ReferenceLine) -> list[Stage]:
+    """Return the lanes of a path in their order; none if it changes no lane.
+
+    line  reference line on the path
+    """
+    crossings = _crossings(line)
+    if not crossings:
+        return []
+    last = len(line.points) - 1
+    before = [_followed(line, index, center) for index, center, _ in crossings]
+    lanes = [*before, _followed(line, crossings[-1][0] + STRIDE, crossings[-1][2])]
+    found = [Stage(lanes[-1].offsets, last, None)]
+    limit = last
+    for number in range(len(crossings) - 1, -1, -1):
+        lane, beside = lanes[number], lanes[number + 1]
+        end = max(min(lane.last, beside.last, limit), crossings[number][0])
+        on_path = np.abs(lane.offsets[: crossings[number][0]]) < OFF_CENTER
+        begin = int(np.flatnonzero(on_path)[-1]) if on_path.any() else 0
+        found.insert(0, Stage(lane.offsets, max(begin, beside.first), end))
+        limit = end - round(ROOM / line.spacing)
+    return found
+
+
+def _crossings(line: ReferenceLine) -> list[tuple[int, float, float]]:
+    """Return the last points of a path in each lane that it leaves for a neighboring one of the same direction, with
+    the offsets of the centers of the lane there and of the next one behind [m]."""
+    found = []
+    lanes, own = line.lanes_of_direction(0)
+    for index in range(STRIDE, len(line.points), STRIDE):
+        then, here = line.lanes_of_direction(index)
+        if abs(here - own) > SAME_LANE and _nearest(then, own) is not None and _nearest(lanes, here) is not None:
+            found.append((index - STRIDE, own, here))
+        lanes, own = then, here
+    return found
+
+
+class _Lane(NamedTuple):
+    """Lane along a path: offsets of its center at all points (M,) [m], and its first and last point."""
+
+    offsets: Array
+    first: int
+    last: int
+
+
+def _followed(line: ReferenceLine, index: int, center: float) -> _Lane:
+    """Return the lane whose center is at an offset at one point; beyond its ends the offset stays the same."""
+    offsets = {index: center}
+    ends = []
+    for step, bound in ((-STRIDE, -1), (STRIDE, len(line.points))):
+        here, value = index, center
+        for there in range(index + step, bound, step):
+            onward = _nearest(line.lanes_of_direction(there)[0], value)
+            if onward is None:
+                break
+            here, value = there, onward
+            offsets[here] = value
+        ends.append(here)
+    places = sorted(offsets)
+    filled = np.interp(np.arange(len(line.points)), places, [offsets[place] for place in places])
+    return _Lane(filled, *ends)
+
+
+def _nearest(centers: list[float], offset: float) -> float | None:
+    """Return the center of the lane at an offset [m]; None without one."""
+    nearest = min(centers, key=lambda center: abs(center - offset), default=None)
+    return nearest if nearest is not None and abs(nearest - offset) < SAME_LANE else None
