@@ -152,6 +152,8 @@ REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
 [m]; the deceleration is that of the vehicle as well."""
 AHEAD_GAP = 2.0
 """Minimum gap to the vehicle ahead at a lane change [m]."""
+ENTRY = 1.0
+"""Time that a vehicle needs to the border of the lane to which it changes, in which a gap may become larger [s]."""
 BESIDE_LANE = 1.0
 """Distance from the center of a lane within which a body is in it [m]: half the width of a vehicle."""
 
@@ -378,7 +380,9 @@ def has_gap(
     closing, approach = np.maximum(here - others, 0.0), np.maximum(others - here, 0.0)
     needed = AHEAD_GAP + time_gap * here + closing**2 / (2.0 * REAR_DECELERATION)
     kept = np.maximum(time_gap * others, REAR_GAP) + REAR_REACTION * approach + approach**2 / (2.0 * REAR_DECELERATION)
-    blocked = lane & np.where(behind, after < kept, ahead < needed)
+    gap, least = np.where(behind, after, ahead), np.where(behind, kept, needed)
+    opening = np.where(behind, closing, approach)
+    blocked = lane & ((gap < 0.0) | (gap + ENTRY * opening < least))
     return np.asarray(~np.logical_or.reduce(blocked, axis=1))
 
 

@@ -123,8 +123,9 @@ class _Motion(NamedTuple):
 
 
 class Roller:
-    """Rollout of proposals by the Intelligent Driver Model.
+    """Rollout of proposals by the improved Intelligent Driver Model (Treiber and Kesting 2013, section 11.3.7).
 
+    Below the wanted speed its gap in equilibrium is that of the settings, and it does not brake for larger ones.
     It computes with single numbers: for few proposals with few leaders each, arrays take four times as long.
     """
 
@@ -140,7 +141,9 @@ class Roller:
             emergency=settings.hard_deceleration,
         )
         driver = self._driver
-        twice_root = 2.0 * math.sqrt(driver.acceleration * driver.deceleration)
+        greatest, braking = driver.acceleration, driver.deceleration
+        # Before a standing object the improved model tends to b²/b' - a: here the comfortable deceleration.
+        twice_root = 2.0 * math.sqrt(greatest * braking**2 / (greatest + braking))
         self._constants = driver.standstill_gap, twice_root, driver.exponent
 
     def roll(
@@ -215,7 +218,11 @@ class Roller:
                 if leader != FREE:
                     bound = desired if desired > speed else speed
                     share = speed / (bound if bound > LEAST_SPEED else LEAST_SPEED)
-                    follow = greatest * (1.0 - share**exponent) - hardest
+                    free, square = greatest * (1.0 - share**exponent), hardest / greatest
+                    if square >= 1.0:
+                        follow = greatest - hardest
+                    else:
+                        follow = free * (1.0 - square ** (greatest / free)) if free > NEGLIGIBLE else 0.0
                     if follow < acceleration - NEGLIGIBLE:
                         cause = leader
                     if follow < acceleration:

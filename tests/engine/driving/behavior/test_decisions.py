@@ -92,7 +92,7 @@ def test_distant_ghost_is_approached_as_an_object(roads: RoadNetwork) -> None:
 @pytest.mark.parametrize("deviation", [0.5, 1.0])
 def test_doubled_covariance_increases_the_gap_by_its_growth(roads: RoadNetwork, deviation: float) -> None:
     fronts = [
-        drive(roads, lambda now, d=d: [PEDESTRIAN._replace(deviation=d)], 30.0).front  # type: ignore[misc]
+        drive(roads, lambda now, d=d: [PEDESTRIAN._replace(deviation=d)], 14.0).front  # type: ignore[misc]
         for d in (deviation, deviation * math.sqrt(2.0))
     ]
     growth = DEFAULTS.uncertainty * deviation * (math.sqrt(2.0) - 1.0)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Option, Proposal, Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.rollout import Course, Limits, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -44,12 +43,29 @@ FREE = Proposal(0, 1.0, "all", SETTINGS.hard_deceleration)
 
 
 def test_gap_behind_a_steady_leader_is_the_equilibrium_of_the_model() -> None:
-    # Stationary IDM: s = (s0 + v T) / sqrt(1 - (v / v0)^4)
+    # Improved IDM: s = s0 + v T below the wanted speed (Treiber and Kesting 2013, section 11.3.7)
     rolled = roll(FREE, 10.0, leader(30.0, 10.0))
     gap = 30.0 + 10.0 * TIMES[-1] - rolled.s[0, -1]
-    expected = (SETTINGS.standstill_gap + 10.0 * SETTINGS.time_gap) / math.sqrt(1.0 - (10.0 / 15.0) ** 4)
     assert rolled.speed[0, -1] == pytest.approx(10.0, abs=0.05)
-    assert gap == pytest.approx(expected, abs=0.1)
+    assert gap == pytest.approx(SETTINGS.standstill_gap + 10.0 * SETTINGS.time_gap, abs=0.1)
+
+
+def improved_idm(speed: float, wanted: float, gap: float, approach: float) -> float:
+    """Return the acceleration of the improved model below the wanted speed [m/s²].
+
+    Its deceleration b is chosen for a comfortable one c before standing objects: c² / b - a = c.
+    """
+    a, c = SETTINGS.acceleration, SETTINGS.comfortable_deceleration
+    b = c**2 / (a + c)
+    free = a * (1.0 - (speed / wanted) ** 4)
+    z = (SETTINGS.standstill_gap + speed * SETTINGS.time_gap + speed * approach / (2.0 * math.sqrt(a * b))) / gap
+    return a * (1.0 - z**2) if z >= 1.0 else free * (1.0 - z ** (2.0 * a / free))
+
+
+def test_standing_object_is_not_braked_for_harder_than_comfortably() -> None:
+    rolled = roll(FREE, 15.0, leader(120.0, 0.0))
+    braking = -np.diff(rolled.speed[0]) / 0.25
+    assert 1.0 < braking.max() <= SETTINGS.comfortable_deceleration
 
 
 def test_standing_leader_is_approached_to_the_standstill_gap() -> None:
@@ -66,13 +82,7 @@ def test_first_step_follows_the_leader_that_demands_the_hardest_braking(order: t
     names = [name for name in Surroundings.__struct_fields__ if name != "owner"]
     columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     scene = Surroundings(owner=(0, 1), **columns)
-    driver = IntelligentDriver(
-        time_gap=SETTINGS.time_gap,
-        standstill_gap=SETTINGS.standstill_gap,
-        acceleration=SETTINGS.acceleration,
-        deceleration=SETTINGS.comfortable_deceleration,
-    )
-    expected = driver.response(np.full(2, 10.0), np.full(2, 15.0), np.array([40.0, 60.0]), np.array([-2.0, 8.0]))
+    expected = improved_idm(10.0, 15.0, 40.0, -2.0), improved_idm(10.0, 15.0, 60.0, 8.0)
     rolled = roll(FREE, 10.0, scene)
     assert expected[1] < expected[0]
     assert (rolled.speed[0, 1] - 10.0) / 0.25 == pytest.approx(expected[1])
