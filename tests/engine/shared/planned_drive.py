@@ -73,23 +73,36 @@ class PlannedDrive:
     """Car on the right lane, from x = 20 m by default, in the physics world, controlled by PID along the plans."""
 
     def __init__(
-        self, planner: BehaviorPlanner, roads: RoadNetwork, *, speed: float = 10.0, start: float = 20.0
+        self,
+        planner: BehaviorPlanner,
+        roads: RoadNetwork,
+        *,
+        speed: float = 10.0,
+        start: float = 20.0,
+        y: float = LANE,
     ) -> None:
         self.world = World(roads, dt=0.05)
-        self.world.add(CAR, Placement(start, LANE, speed=speed), driven=True)
+        self.world.add(CAR, Placement(start, y, speed=speed), driven=True)
         self.planner = planner
         self.controller = PidController(CAR, 0.05)
         self.rig = Rig(CAR, {})
         self.plans: list[Plan] = []
         self.path: list[tuple[float, float, float]] = []
 
-    def run(self, seconds: float, objects: Callable[[float], Sequence[KnownBox]], *, age: float = 0.0) -> None:
+    def run(
+        self,
+        seconds: float,
+        objects: Callable[[float], Sequence[KnownBox]],
+        *,
+        age: float = 0.0,
+        goal: Goal = Goal(),  # noqa: B008 - immutable
+    ) -> None:
         """Run for a duration [s]; the planner receives the objects as they were `age` seconds before."""
         for _ in range(round(seconds / 0.05)):
             view = self.world.view()
             ego = self.rig.read(self.world, view).ego
             known = detections(view.time - age, *objects(view.time - age))
-            plan = self.planner.plan(ego, known, Goal(), view.time)
+            plan = self.planner.plan(ego, known, goal, view.time)
             self.plans.append(plan)
             self.path.append((float(view.position[0, 0]), float(view.position[0, 1]), float(view.speed[0])))
             self.world.step({}, {"Ego": self.controller.control(ego, plan)})

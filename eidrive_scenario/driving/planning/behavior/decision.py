@@ -9,8 +9,17 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.driving.planning.behavior.lane_changes import LEAST_TIME_GAP, RELAXATION, RELAXED_TIME_GAP
-from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, has_gap, may_pass, passing_profiles
+from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
+from eidrive_scenario.driving.planning.behavior.merging import (
+    MERGING_TIME_GAP,
+    TimeGap,
+    costs_of_waiting,
+    gap_leader,
+    has_gap_now,
+    leaves_room,
+    with_followers,
+)
 from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Outlook, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
@@ -31,8 +40,8 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller, Rollout
-from eidrive_scenario.driving.planning.behavior.scoring import URGENT, WEIGHTS, Options, evaluate
+from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
+from eidrive_scenario.driving.planning.behavior.scoring import URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
@@ -105,8 +114,6 @@ CRUISE = Proposal(0, 1.0, "all", 4.0)
 """Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
 AT_REST, NEAR_PLACE = 0.1, 1.0
 """Speed of a vehicle that waits [m/s], and distance from its place of waiting [m]."""
-NEARLY = 0.05
-"""Difference to its own time gap at which the vehicle has it again after a lane change [s]."""
 HARDER = 0.3
 """Difference to a comfortable deceleration from which on braking is hard [m/s²]."""
 
@@ -145,8 +152,7 @@ class Decider:
         self._switched = -math.inf
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
-        self._time_gap: float | None = None
-        """Time gap that increases after a lane change [s]; None: that of the settings."""
+        self._time_gap = TimeGap(settings)
         self._oncoming = OncomingTraffic(view, times, self._body, settings)
         self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
@@ -154,6 +160,10 @@ class Decider:
         """Whether the last decision was to pass in the oncoming lane, instead of waiting for it."""
         self._brakes = False
         """Whether the last decision was emergency braking."""
+
+    @property
+    def _current_name(self) -> str:
+        return ROUTE if self._current is None else self._current.name
 
     def line_changed(self, shift: float | None, aside: float = 0.0) -> None:
         """Move the current maneuver to another line.
@@ -176,12 +186,17 @@ class Decider:
         """Return the best proposal."""
         settings = self._settings
         scene = self._scene(situation, settings)
-        self._adapt_time_gap(situation, scene)
+        merges = situation.change is not None and self._current_name == situation.change.name
+        self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
         current = self._continued(situation)
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._towards(situation, ROUTE, 0.0))
-        profiles += self._required_change(situation, scene, current)
+        change = situation.change
+        if change is not None and current.name == change.name:
+            scene = with_followers(scene, change.offset, situation.motion, self._body)
+        elif change is not None and (motion := self._required_change(situation, scene, change)) is not None:
+            profiles.append(motion)
         expects = self._held_up and settings.lane_changes
         options = self._options(situation, scene, profiles, with_maneuvers=expects)
         best = options.best(len(profiles))
@@ -315,6 +330,7 @@ class Decider:
                 if verdict is Verdict.GIVE_UP:
                     refused.add(number)
             changes = change is not None and profile.name == change.name
+            sought = change if change is not None and situation.s >= change.begin and not changes else None
             if change is not None and not changes:
                 holds.append(change.wall(self._front, self._settings.lateral_acceleration))
             way = inside_way(scene, profile, self._half_width)
@@ -328,16 +344,28 @@ class Decider:
                 self._settings,
                 emergency=self._emergency,
                 is_current=number == 0,
-                seeks_gap=change is not None and situation.s >= change.begin and not changes,
+                seeks_gap=sought is not None,
             ):
                 kind = proposal.precedence
                 if kind not in reactions:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
-                time_gap = RELAXED_TIME_GAP if changes else self._time_gap
+                time_gap = MERGING_TIME_GAP if changes else self._time_gap.value
                 options.append(Option(proposal, profile, way, *reactions[kind], time_gap))
+            if sought is not None:
+                walls, leads = reactions["all"]
+                comfortable = self._settings.comfortable_deceleration
+                leads = leads | gap_leader(scene, sought.offset, situation.motion, self._body, comfortable)
+                gently = Proposal(number, 1.0, "all", comfortable)
+                options.append(Option(gently, profile, way, walls, leads, MERGING_TIME_GAP))
         start, body = (situation.s, situation.speed), (self._front, self._center)
         rolled = self._roller.roll(options, course, start, body, scene)
+        late = None
+        if change is not None and situation.s >= change.begin:
+            desire = change.desire(situation.s, situation.wanted)
+            last = change.wall(self._front, self._settings.lateral_acceleration).s
+            ends = (last, situation.end)
+            late = costs_of_waiting(change, options, rolled, scene, self._times, desire, self._body, ends)
         evaluation = evaluate(
             options,
             rolled,
@@ -349,10 +377,27 @@ class Decider:
             kept=self._kept_names(situation),
             waiting=frozenset(waiting),
             refused=frozenset(refused),
-            late=self._lateness(situation, scene, options, rolled),
+            late=late,
         )
         horizon = float(self._times[-1])
         return Options(options, rolled, evaluation, horizon, frozenset(waiting), frozenset(refused))
+
+    def _motion(
+        self,
+        situation: Situation,
+        scene: Surroundings,
+        profile: LateralProfile,
+        stops: list[Wall],
+        time_gap: float | None = None,
+    ) -> Motion:
+        """Return the motion along a profile at the wanted speed."""
+        way = inside_way(scene, profile, self._half_width)
+        crossing = conflicts(scene, way, situation.s)
+        leads = leading(scene, way, crossing, situation.s + self._center, CRUISE)
+        course = Course(situation.line.along, situation.limits, situation.wanted)
+        here, body = (situation.s, situation.speed), (self._front, self._center)
+        rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads, time_gap)], course, here, body, scene)
+        return Motion(rolled.s[0], rolled.speed[0])
 
     def _verified(
         self, situation: Situation, scene: Surroundings, profile: LateralProfile, stops: list[Wall]
@@ -361,16 +406,10 @@ class Decider:
 
         A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
         """
-        way = inside_way(scene, profile, self._half_width)
-        crossing = conflicts(scene, way, situation.s)
-        leads = leading(scene, way, crossing, situation.s + self._center, CRUISE)
-        course = Course(situation.line.along, situation.limits, situation.wanted)
-        here, body = (situation.s, situation.speed), (self._front, self._center)
-        rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads)], course, here, body, scene)
+        motion = self._motion(situation, scene, profile, stops)
         beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
         outlook = Outlook(situation.line, scene, beside)
         is_current = self._current is not None and self._current.name == profile.name
-        motion = Motion(rolled.s[0], rolled.speed[0])
         verdict = self._oncoming.verify(profile, motion, outlook, situation.now, is_current=is_current)
         place = self._oncoming.waiting_place(profile, situation.s)
         has_begun = self._passes and is_current
@@ -402,33 +441,21 @@ class Decider:
             profile = current if current is not None and abs(current.last - edge.last) < AT_OFFSET else edge
         return profile, verdict, place
 
-    def _required_change(
-        self, situation: Situation, scene: Surroundings, current: LateralProfile
-    ) -> list[LateralProfile]:
-        """Return the motion into the lane to which the route changes, if a gap is there; else nothing."""
-        change = situation.change
-        if change is None or situation.s < change.begin or current.name == change.name:
-            return []
-        start = Start(*situation.steered, situation.speed)
-        s, speed = np.array([[situation.s]]), np.array([[situation.speed]])
-        gap = has_gap(scene, change.offset, s, speed, self._body, RELAXED_TIME_GAP, step=0)
-        return [change.profile(start, self._settings.lateral_acceleration)] if gap.all() else []
+    def _required_change(self, situation: Situation, scene: Surroundings, change: LaneChange) -> LateralProfile | None:
+        """Return the motion into the lane to which the route changes; None without a gap.
 
-    def _lateness(
-        self, situation: Situation, scene: Surroundings, options: list[Option], rolled: Rollout
-    ) -> Array | None:
-        """Return the costs (P,) of the time until options change to the lane of the route; None if there is no change.
-
-        They increase with the desire to change; at the begin of the lanes only the first part counts.
+        Traffic behind the gap must not come too close later either: the vehicle may have to stop soon.
         """
-        change = situation.change
-        if change is None or situation.s < change.begin:
+        body = self._body
+        if situation.s < change.begin or not has_gap_now(
+            scene, change.offset, situation.motion, body, MERGING_TIME_GAP
+        ):
             return None
-        gap = has_gap(scene, change.offset, rolled.s, rolled.speed, self._body, RELAXED_TIME_GAP)
-        first = np.where(gap.any(axis=1), self._times[gap.argmax(axis=1)], self._times[-1])
-        desire = change.desire(situation.s, situation.wanted)
-        stays = np.array([option.profile.name != change.name for option in options])
-        return np.asarray(stays * (WEIGHTS.stays + WEIGHTS.gap * desire * first / self._times[-1]))
+        profile = change.profile(Start(*situation.steered, situation.speed), self._settings.lateral_acceleration)
+        stops = [situation.stop] if situation.stop is not None else []
+        s = self._motion(situation, scene, profile, stops, MERGING_TIME_GAP).s
+        has_room = leaves_room(scene, change.offset, s[None], body, len(self._times))[0, 0]
+        return profile if has_room else None
 
     def _kept_names(self, situation: Situation) -> frozenset[str]:
         """Return the current maneuver, and the route if its lateral motion is complete: then the vehicle returns."""
@@ -444,23 +471,6 @@ class Decider:
             return True
         way = float(options.rolled.s[best, -1] - options.rolled.s[best, 0])
         return way < SATISFIED * situation.free_progress(float(self._times[-1]), self._settings.acceleration)
-
-    def _adapt_time_gap(self, situation: Situation, scene: Surroundings) -> None:
-        """Set the time gap: short while the vehicle merges, then longer again unless another follows it closely."""
-        usual, change = self._settings.time_gap, situation.change
-        if change is not None and self._current is not None and self._current.name == change.name:
-            self._time_gap = min(RELAXED_TIME_GAP, usual)
-        if self._time_gap is None:
-            return
-        lane = [one for one in scene.present if abs(one.d - situation.d) < one.half_width + self._half_width]
-        center = situation.s + self._center
-        before = min((one.rear for one in lane if one.s > center), default=math.inf) - situation.s - self._front
-        after = situation.s - self._body.rear - max((one.front for one in lane if one.s <= center), default=-math.inf)
-        if after < before:
-            self._time_gap = min(LEAST_TIME_GAP, usual)
-        self._time_gap += (usual - self._time_gap) * self._settings.period / RELAXATION
-        if usual - self._time_gap < NEARLY:
-            self._time_gap = None
 
     def _kept(self, options: Options, best: int, now: float) -> int:
         """Return the best proposal; that of the current maneuver during its dwell time, unless it is risky.
@@ -478,16 +488,15 @@ class Decider:
         is_due = now - self._switched >= DWELL and now - self._challenger[1] >= PERSISTENT - TIME_TOLERANCE
         if is_due:
             return best
-        same = [row for row, option in enumerate(options.options) if option.profile.name == name]
-        if not same:
+        if all(option.profile.name != name for option in options.options):
             return best
-        kept = max(same, key=lambda row: float(options.evaluation.score[row]))
+        kept = options.best(name=name)
         is_risky = math.isfinite(options.evaluation.collision[kept])
         return best if is_risky or options.options[kept].proposal.profile in options.refused else kept
 
     def _decision(self, situation: Situation, options: Options, best: int) -> Decision:
         proposal, profile = options.options[best].proposal, options.options[best].profile
-        if self._current is None or profile.name != self._current.name:
+        if self._current is not None and profile.name != self._current.name:
             self._switched = situation.now
         self._current = profile
         self._passes = profile.uses_oncoming and proposal.profile not in options.waiting

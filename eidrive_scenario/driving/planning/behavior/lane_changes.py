@@ -25,11 +25,6 @@ ROOM = 50.0
 """Length that is kept for each later change between the same lanes [m]."""
 DISTANCE, TIME = 295.0, 43.0
 """Distance [m] and time [s] before the end of the lane at which a change becomes desired, by LMRS (Schakel 2012)."""
-RELAXED_TIME_GAP, RELAXATION = 0.56, 25.0
-"""Time gap at which a vehicle merges, and time constant with which it returns to its own [s], by LMRS."""
-LEAST_TIME_GAP = 0.2
-"""Time gap of a vehicle that has merged as long as another follows it closer than it follows itself [s]; a choice. At
-0.9 of the wanted speed the Intelligent Driver Model keeps 1.7 times the gap."""
 
 
 class Stage(NamedTuple):

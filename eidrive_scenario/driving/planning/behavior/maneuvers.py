@@ -10,10 +10,11 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
+from eidrive_scenario.driving.planning.behavior.merging import has_gap_now
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
     ONCOMING_SPEED,
@@ -61,6 +62,16 @@ class Situation(msgspec.Struct, frozen=True):
     """Speed limits (M,) by curves and the end of the route only [m/s]; None if `limits` has no others."""
     change: LaneChange | None = None
     """Next lane change that the route requires."""
+
+    @property
+    def motion(self) -> tuple[float, float]:
+        """Distance along the line [m] and speed [m/s]."""
+        return self.s, self.speed
+
+    @property
+    def end(self) -> float:
+        """Distance along the line at which the route ends [m]; inf if it goes on."""
+        return self.line.length if self.line.path.ends else math.inf
 
     def kind_of(self, owner: int) -> str:
         """Return the class of an object."""
@@ -147,15 +158,6 @@ TOGETHER = 25.0
 """Gap below which two obstacles are passed in one maneuver [m]."""
 NEAR_STOP = 40.0
 """Distance of a place where traffic stops, ahead of a standing vehicle, within which it queues [m]."""
-REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
-"""Reaction time [s] and deceleration [m/s²] that a lane change may require of the traffic behind, and the minimum gap
-[m]; the deceleration is that of the vehicle as well."""
-AHEAD_GAP = 2.0
-"""Minimum gap to the vehicle ahead at a lane change [m]."""
-ENTRY = 1.0
-"""Time that a vehicle needs to the border of the lane to which it changes, in which a gap may become larger [s]."""
-BESIDE_LANE = 1.0
-"""Distance from the center of a lane within which a body is in it [m]: half the width of a vehicle."""
 
 
 class _Obstacle(NamedTuple):
@@ -195,14 +197,19 @@ def passing_profiles(
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
-    if not math.isnan(faster) and situation.change is None and _is_free(situation, scene, faster, body):
+    moves = obstacle is not None and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
+    # The vehicle has to be back in its lane at the end of its route.
+    back = change_length(faster, situation.wanted, settings.lateral_acceleration)
+    returns = obstacle is None or not moves or obstacle.end + back < situation.end
+    may_change = not math.isnan(faster) and situation.change is None and returns
+    if may_change and has_gap_now(scene, faster, situation.motion, body):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = Start(*situation.steered, situation.speed)
         profiles.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
     if obstacle is not None:
         # A moving vehicle is overtaken on one side only, and beside a lane for it by a change of lane.
         sides: tuple[int, ...] = (overtaking, -overtaking)
-        if max(one.speed for one in obstacle.objects) > ONCOMING_SPEED:
+        if moves:
             sides = (overtaking,) if math.isnan(faster) else ()
         profiles += [
             profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
@@ -237,7 +244,7 @@ def _evasions(
     evasions = []
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
-        if not (math.isnan(offset) or math.isnan(beyond)) and _is_free(situation, scene, offset, body):
+        if not (math.isnan(offset) or math.isnan(beyond)) and has_gap_now(scene, offset, situation.motion, body):
             name = f"change lane to the {'left' if side > 0 else 'right'}"
             start = Start(*situation.steered, situation.speed)
             evasions.append(towards(name, offset, start, settings.lateral_acceleration, side=side))
@@ -353,37 +360,6 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: B
     if since is None or situation.now - since >= QUEUE_PATIENCE or _is_beside(situation, blocker, body):
         return False
     return any(-0.5 < one.rear - blocker.front < QUEUE_GAP and abs(one.d - blocker.d) < 1.0 for one in scene.present)
-
-
-def _is_free(situation: Situation, scene: Surroundings, offset: float, body: Body) -> bool:
-    """Return whether a lane has a gap beside the vehicle."""
-    s, speed = np.array([[situation.s]]), np.array([[situation.speed]])
-    return bool(has_gap(scene, offset, s, speed, body, 0.0, step=0).all())
-
-
-def has_gap(
-    scene: Surroundings, offset: float, s: Array, speed: Array, body: Body, time_gap: float, step: int | None = None
-) -> Bools:
-    """Return where (P, K) a lane has a gap that a vehicle can enter: neither it nor traffic behind has to brake hard.
-
-    offset    distance of the center of the lane to the left of the line [m]
-    s, speed  distances along the line [m] and speeds [m/s] (P, K) of the vehicle
-    time_gap  least time to a vehicle ahead and for one behind [s]
-    step      index of the time of single positions (P, 1); None: one position at each time
-    """
-    times = slice(None) if step is None else slice(step, step + 1)
-    lane: Bools = (np.abs(scene.d - offset) < scene.half_width + BESIDE_LANE)[:, times] & ~scene.crosses[:, times]
-    others, here = scene.speed[:, times], speed[:, None]
-    behind = scene.s[:, times] <= (s + body.center)[:, None]
-    ahead = scene.rear[:, times] - (s + body.front)[:, None]
-    after = (s - body.rear)[:, None] - scene.front[:, times]
-    closing, approach = np.maximum(here - others, 0.0), np.maximum(others - here, 0.0)
-    needed = AHEAD_GAP + time_gap * here + closing**2 / (2.0 * REAR_DECELERATION)
-    kept = np.maximum(time_gap * others, REAR_GAP) + REAR_REACTION * approach + approach**2 / (2.0 * REAR_DECELERATION)
-    gap, least = np.where(behind, after, ahead), np.where(behind, kept, needed)
-    opening = np.where(behind, closing, approach)
-    blocked = lane & ((gap < 0.0) | (gap + ENTRY * opening < least))
-    return np.asarray(~np.logical_or.reduce(blocked, axis=1))
 
 
 def _catch_up_time(gap: float, closing: float, top: float, acceleration: float) -> float:

@@ -59,7 +59,7 @@ class Weights(msgspec.Struct, frozen=True):
     refused: float = 20.0
     view: float = 2.0
     stays: float = 1.0
-    gap: float = 4.0
+    gap: float = 5.0
     crash: float = 100.0
 
 
@@ -289,15 +289,15 @@ class Options(msgspec.Struct, frozen=True):
         """Return the maneuver of an option."""
         return self.options[row].profile.name
 
-    def best(self, profiles: int | None = None) -> int:
-        """Return the index of the option with the highest score, among those along the first `profiles`.
+    def best(self, profiles: int | None = None, name: str | None = None) -> int:
+        """Return the index of the option with the highest score, among those along the first `profiles` or of one
+        maneuver.
 
         The emergency brake is one of them only if the best other one collides soon, or has a risk as of a near contact.
         """
-        count = len(self.options)
-        if profiles is not None:
-            count = sum(option.proposal.profile < profiles for option in self.options)
-        score = self.evaluation.score[:count].copy()
+        count = len(self.options) if profiles is None else profiles
+        counts = [option.proposal.profile < count and name in (None, option.profile.name) for option in self.options]
+        score = np.where(counts, self.evaluation.score, -math.inf)
         brake = self.emergency
         with_brake, score[brake] = float(score[brake]), -math.inf
         best = int(np.argmax(score))

@@ -110,6 +110,15 @@ class Surroundings(msgspec.Struct, frozen=True, dict=True):
         )
 
 
+def later(scene: Surroundings, steps: Integers, beyond: Array) -> Surroundings:
+    """Return the hypotheses at some of their times, and at times `beyond` the last one [s], at which they keep their
+    speeds and lanes."""
+    index = np.append(steps, np.full(len(beyond), scene.s.shape[1] - 1))
+    same = ("d", "half_length", "half_width", "speed", "crosses")
+    s = np.hstack([scene.s[:, steps], scene.s[:, -1:] + scene.speed[:, -1:] * beyond])
+    return msgspec.structs.replace(scene, s=s, **{name: getattr(scene, name)[:, index] for name in same})
+
+
 def surroundings(
     objects: list[KnownObject],
     prediction: Prediction,
