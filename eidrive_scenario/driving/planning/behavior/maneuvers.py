@@ -198,19 +198,19 @@ def passing_profiles(
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
     moves = obstacle is not None and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
-    # The vehicle has to be back in its lane at the end of its route.
-    back = change_length(faster, situation.wanted, settings.lateral_acceleration)
-    returns = obstacle is None or not moves or obstacle.end + back < situation.end
+    # The vehicle has to return to its lane before the end of its route.
+    returns = obstacle is None or not moves or obstacle.end < situation.end
     may_change = not math.isnan(faster) and situation.change is None and returns
     if may_change and has_gap_now(scene, faster, situation.motion, body):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = Start(*situation.steered, situation.speed)
         profiles.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
     if obstacle is not None:
-        # A moving vehicle is overtaken on one side only, and beside a lane for it by a change of lane.
+        # A moving vehicle is overtaken on one side only. With several lanes of its direction that is a change of lane:
+        # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
         sides: tuple[int, ...] = (overtaking, -overtaking)
         if moves:
-            sides = (overtaking,) if math.isnan(faster) else ()
+            sides = (overtaking,) if math.isnan(beside.left) and math.isnan(beside.right) else ()
         profiles += [
             profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
         ]

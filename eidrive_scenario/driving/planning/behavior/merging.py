@@ -32,6 +32,8 @@ MERGING_TIME_GAP, RELAXATION = 0.56, 25.0
 LEAST_TIME_GAP, NEARLY = 0.2, 0.05
 """Time gap of a vehicle that has merged as long as another follows it closer than it follows itself, and difference to
 its own time gap at which it has that again [s]; choices."""
+OVERRUN = 0.5
+"""Distance by which the vehicle may stop too late at the end of its lane [m]."""
 BEYOND = np.arange(1.0, 17.0)
 """Times after the horizon at which a gap is expected where all keep their speeds [s]."""
 
@@ -142,7 +144,8 @@ def costs_of_waiting(
     lasts = gap[:, :-1] & gap[:, 1:]
     first = np.where(lasts.any(axis=1), seconds[lasts.argmax(axis=1)], seconds[-1])
     stays = np.array([option.profile.name != change.name for option in options])
-    return np.asarray(stays * (WEIGHTS.stays + WEIGHTS.gap * desire * first / seconds[-1]))
+    overruns = rolled.s.max(axis=1) > last + OVERRUN
+    return np.asarray(stays * (WEIGHTS.stays + WEIGHTS.gap * desire * first / seconds[-1] + WEIGHTS.refused * overruns))
 
 
 class TimeGap:

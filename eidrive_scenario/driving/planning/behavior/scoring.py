@@ -41,7 +41,7 @@ class Weights(msgspec.Struct, frozen=True):
     switch           for another maneuver than the current one
     slower           of a lower target speed than wanted, which decides between options that are otherwise alike
     gentle           of a stop for an uncertain object, which is only chosen for such an object
-    refused          for an oncoming lane that is not free; above any progress
+    refused          for an oncoming lane that is not free, or beyond the end of a lane; above any progress
     stays            for a lane that the route leaves, where the vehicle may change; above those of the change
     gap              of the time until it may change, at its most urgent; below the progress of the whole horizon
     view             in favor of a place with a view into the oncoming lane; above the progress to the obstacle
