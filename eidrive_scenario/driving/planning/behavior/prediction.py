@@ -138,8 +138,10 @@ class Predictor:
             return [Hypothesis((x, y, yaw), speed)]
         travelled, speed = longitudinal_motion(now, known.acceleration, times)
         found: list[Hypothesis] = []
+        leaving: list[Hypothesis] = []
+        """Out of lanes that the vehicle leaves or only crosses: only if it follows no lane."""
         too_fast: list[Hypothesis] = []
-        """Along curves for which the vehicle is too fast: only if it follows no other lane."""
+        """Along curves for which the vehicle is too fast: only if it is in no other lane."""
         direction = math.atan2(known.vy, known.vx)
         noise = known.speed_error
         for course in courses:
@@ -152,18 +154,19 @@ class Predictor:
                 continue
             aside = now * math.sin(turn)
             offset: float | Array = left
-            if abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error):
+            leaves = abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error)
+            if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known, course, along, times) or (along_lane, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            fitting = found if fits else too_fast
+            fitting = (leaving if leaves else found) if fits else too_fast
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if len(found) == MOST_HYPOTHESES:
                 break
-        found = found or too_fast
+        found = found or leaving[:MOST_HYPOTHESES] or too_fast
         return found or [_straight_on(known, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
