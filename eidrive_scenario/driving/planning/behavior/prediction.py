@@ -23,6 +23,8 @@ LEAVING_RATE = 0.3
 LEAVING_ERROR = 3.5
 """Lateral speed of a vehicle that leaves its lane per standard deviation of its position [1/s], if that is larger: with
 a velocity from noisy positions."""
+CUTTING = 0.15
+"""Angle between the motion of a vehicle and its lane in a junction up to which it cuts the curve [rad]; a choice."""
 LANE_WIDTH = 3.5
 """Lateral distance after which a lane change is predicted to end [m]."""
 NOTICEABLE, GREATEST = 0.8, 4.0
@@ -139,7 +141,7 @@ class Predictor:
         travelled, speed = longitudinal_motion(now, known.acceleration, times)
         found: list[Hypothesis] = []
         leaving: list[Hypothesis] = []
-        """Out of lanes that the vehicle leaves or only crosses: only if it follows no lane."""
+        """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
         too_fast: list[Hypothesis] = []
         """Along curves for which the vehicle is too fast: only if it is in no other lane."""
         direction = math.atan2(known.vy, known.vx)
@@ -154,7 +156,10 @@ class Predictor:
                 continue
             aside = now * math.sin(turn)
             offset: float | Array = left
-            leaves = abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error)
+            wandering = max(LEAVING_RATE, LEAVING_ERROR * known.error)
+            if any(passage.start <= along <= passage.end for passage in course.passages):
+                wandering = max(wandering, CUTTING * now)
+            leaves = abs(aside) > wandering
             if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known, course, along, times) or (along_lane, speed)
@@ -162,7 +167,8 @@ class Predictor:
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            fitting = (leaving if leaves else found) if fits else too_fast
+            is_inside = abs(left) <= course.half_width + known.error
+            fitting = (found if is_inside and not leaves else leaving) if fits else too_fast
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if len(found) == MOST_HYPOTHESES:
                 break

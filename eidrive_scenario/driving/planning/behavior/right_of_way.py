@@ -229,14 +229,21 @@ class Course:
         """Distances at which the next segment begins."""
 
     def place(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return the distance along the course, the offset to the left and the heading at the nearest point."""
+        """Return the distance along the course, the offset to the left and the heading at the nearest point.
+
+        The heading is interpolated between the middles of the segments.
+        """
         gap = (self._x - x) ** 2 + (self._y - y) ** 2
         index = min(int(gap.argmin()), len(gap) - 2)
         x0, y0, x1, y1 = self._corners[index]
         length = math.hypot(x1 - x0, y1 - y0) or 1.0
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         ahead = (x - x0) * ux + (y - y0) * uy
-        return self._places[index] + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
+        share = ahead / length - 0.5
+        beside = min(max(index + (1 if share > 0.0 else -1), 0), len(self._turns) - 1)
+        turn = self._turns[index]
+        heading = turn + min(abs(share), 1.0) * (self._turns[beside] - turn)
+        return self._places[index] + ahead, (y - y0) * ux - (x - x0) * uy, float(wrap_angle(heading))
 
     def can_follow(self, along: float, speed: float) -> bool:
         """Return whether a vehicle with a speed [m/s] at a distance along the course can pass the curves ahead."""
@@ -247,6 +254,12 @@ class Course:
         """Start and end of each segment [m]."""
         x, y = self._x.tolist(), self._y.tolist()
         return list(zip(x[:-1], y[:-1], x[1:], y[1:], strict=True))
+
+    @cached_property
+    def _turns(self) -> list[float]:
+        """Headings of the segments without steps of a full turn [rad]."""
+        turns: list[float] = np.unwrap(self._heading).tolist()
+        return turns
 
     @cached_property
     def _places(self) -> list[float]:
