@@ -140,10 +140,10 @@ class Predictor:
             return [Hypothesis((x, y, yaw), speed)]
         travelled, speed = longitudinal_motion(now, known.acceleration, times)
         found: list[Hypothesis] = []
+        too_fast: list[Hypothesis] = []
+        """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
-        too_fast: list[Hypothesis] = []
-        """Along curves for which the vehicle is too fast: only if it is in no other lane."""
         direction = math.atan2(known.vy, known.vx)
         noise = known.speed_error
         for course in courses:
@@ -168,11 +168,11 @@ class Predictor:
             fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
             is_inside = abs(left) <= course.half_width + known.error
-            fitting = (found if is_inside and not leaves else leaving) if fits else too_fast
+            fitting = leaving if leaves or not is_inside else found if fits else too_fast
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if len(found) == MOST_HYPOTHESES:
                 break
-        found = found or leaving[:MOST_HYPOTHESES] or too_fast
+        found = found or too_fast or leaving[:MOST_HYPOTHESES]
         return found or [_straight_on(known, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:

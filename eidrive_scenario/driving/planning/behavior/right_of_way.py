@@ -193,10 +193,9 @@ MOST = 4
 """Maximum number of courses from one lane."""
 
 
-FASTEST_TURN = 7.0
-"""Maximum lateral acceleration of a vehicle that follows a course [m/s²], near the limit of adhesion."""
-FASTEST_STOP = 6.0
-"""Maximum deceleration before a curve [m/s²]."""
+FASTEST_TURN, FASTEST_STOP = 4.0, 2.0
+"""Maximum lateral acceleration in a curve, and deceleration before it, of a vehicle that is expected to follow a course
+[m/s²]; comfortable ones, as harder turns are rare."""
 
 
 class Course:

@@ -166,15 +166,15 @@ def test_stopping_motion_ends_at_its_place() -> None:
     assert (way[-1], speed[-1]) == pytest.approx((30.0, 0.0))
 
 
-def test_vehicle_follows_curves_up_to_the_limits_of_grip_and_brakes() -> None:
-    """In a curve of radius R up to √(7 R) m/s, and s meters before it up to √(7 R + 2 · 6 s) m/s."""
+def test_vehicle_is_expected_to_follow_curves_up_to_comfortable_accelerations() -> None:
+    """In a curve of radius R up to √(4 R) m/s, and s meters before it up to √(4 R + 2 · 2 s) m/s."""
     radius, straight = 20.0, 40.0
     angle = np.linspace(0.0, math.pi / 2.0, 16)
     bend = np.column_stack([straight + radius * np.sin(angle), radius * (1.0 - np.cos(angle))])
     points = np.concatenate([np.column_stack([np.arange(0.0, straight, 2.0), np.zeros(20)]), bend])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     course = Course(points, along, 1.75)
-    for place, limit in ((50.0, math.sqrt(7.0 * radius)), (20.0, math.sqrt(7.0 * radius + 2.0 * 6.0 * 20.0))):
+    for place, limit in ((50.0, math.sqrt(4.0 * radius)), (20.0, math.sqrt(4.0 * radius + 2.0 * 2.0 * 20.0))):
         assert course.can_follow(place, 0.95 * limit)
         assert not course.can_follow(place, 1.08 * limit)
     assert course.can_follow(-5.0, 5.0)
@@ -200,3 +200,25 @@ def test_vehicle_too_fast_for_its_only_lane_follows_it() -> None:
     assert found.objects == (0,)
     turned = np.unwrap(found.yaw[0])[-1] - pose.h
     assert turned == pytest.approx(30.0 * 8.0 / 51.75, rel=0.1), "along the curve, not straight on"
+
+
+@pytest.mark.parametrize("x", np.arange(24.0, 56.0, 4.0).tolist())
+def test_vehicle_that_passes_a_junction_straight_ahead_stays_in_its_lane(x: float) -> None:
+    """At 12 m/s it does not turn, and the lanes of turns that it overlaps do not lead it out of its own."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    found = Predictor(roads, TIMES).predict(known(KnownBox(x, 3.5, -12.0, yaw=math.pi)))
+    np.testing.assert_allclose(found.y, 3.5, atol=0.1)
+    np.testing.assert_allclose(found.x, np.tile(x - 12.0 * TIMES, (len(found.x), 1)), atol=0.2)
+
+
+def test_vehicle_that_turns_faster_than_usual_is_predicted_along_the_turn_once_that_shows() -> None:
+    """A car turns left across the opposite lanes at 8 m/s, with the heading of the lane 6 m behind its beginning."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    (entry,) = known(KnownBox(52.0, 3.5, -8.0, yaw=math.pi))
+    predictor = Predictor(roads, TIMES)
+    (courses,) = predictor.lanes([entry])
+    turn = next(course for course in courses if course.points[-1, 1] < -50.0)
+    x, y, heading = (float(values[0]) for values in turn.poses(np.array([turn.place(52.0, 3.5)[0] + 6.0]), 0.0))
+    box = KnownBox(x, y, 8.0 * math.cos(heading), 8.0 * math.sin(heading), yaw=heading)
+    found = predictor.predict(known(box))
+    assert (found.y[:, -1] < -20.0).any()
