@@ -25,6 +25,7 @@ class Goal(msgspec.Struct, frozen=True):
     path          (M, 3) points of the line to follow to its end [m], world frame
     lap           (M, 3) points that follow the end of the path, repeatedly [m]; its end is its start
     waypoints     (M, 3) points to pass if there is no path; the last is the destination [m]; the agent plans the route
+    is_route      whether the path is a route, whose lane changes the agent may make elsewhere in the same lanes
     """
 
     speed: float | None = None
@@ -32,6 +33,7 @@ class Goal(msgspec.Struct, frozen=True):
     path: Array | None = None
     waypoints: Array | None = None
     lap: Array | None = None
+    is_route: bool = False
 
 
 @dataclass(frozen=True)

@@ -182,7 +182,8 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
         onward = actor.motion.route.onward if actor.motion.route is not None else None
         lap = None if onward is None else onward.polyline(POINTS_APART)
         rest = _rest_of_route(actor)
-        actor.set_goal(Goal(speed=actor.motion.speed, path=lap if rest is None else rest, lap=lap))
+        path = lap if rest is None else rest
+        actor.set_goal(Goal(speed=actor.motion.speed, path=path, lap=lap, is_route=True))
 
 
 def _yielded_domains(lateral: bool | None, longitudinal: bool | None) -> tuple[bool | None, bool | None]:

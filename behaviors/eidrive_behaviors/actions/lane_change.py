@@ -285,7 +285,7 @@ class LaneChangeAction(ActionBehaviour):
         if self._path is not None:
             goal = self.actor.goal or Goal()
             lap = None if self.actor.motion.route is None else goal.lap
-            self.actor.set_goal(replace(goal, path=self._path.points, lap=lap))
+            self.actor.set_goal(replace(goal, path=self._path.points, lap=lap, is_route=False))
         return Status.RUNNING
 
     def _plan_path(self, here: LaneLocation) -> LanePath | None:

@@ -167,7 +167,7 @@ class RandomRouteAction(ActionBehaviour):
         here = self.context.location(actor.name)
         if actor.driven and here is not None:
             way = random_route(roads, here, RANDOM_ROUTE_LENGTH, choose)
-            actor.set_goal(replace(actor.goal or Goal(), path=way.polyline(POINTS_APART), lap=None))
+            actor.set_goal(replace(actor.goal or Goal(), path=way.polyline(POINTS_APART), lap=None, is_route=True))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -213,7 +213,8 @@ def assign_route(behaviour: ActionBehaviour, route: Route) -> None:
     if actor.driven:
         check_way(behaviour, route.length)
         lap = None if route.onward is None else route.onward.polyline(POINTS_APART)
-        actor.set_goal(replace(actor.goal or Goal(), path=route.polyline(POINTS_APART), lap=lap))
+        path = route.polyline(POINTS_APART)
+        actor.set_goal(replace(actor.goal or Goal(), path=path, lap=lap, is_route=True))
 
 
 def check_way(behaviour: ActionBehaviour, length: float) -> None:

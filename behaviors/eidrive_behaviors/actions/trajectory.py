@@ -78,7 +78,7 @@ class DrivenTrajectory:
 
     def goal(self, before: Goal | None, speed: float | None) -> Goal:
         """Return the goal with this path; a target speed [m/s] replaces that of the goal before."""
-        goal = replace(before or Goal(), path=self._path, lap=self._lap)
+        goal = replace(before or Goal(), path=self._path, lap=self._lap, is_route=False)
         return goal if speed is None else replace(goal, speed=speed, acceleration=0.0)
 
 

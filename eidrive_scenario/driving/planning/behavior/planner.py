@@ -137,8 +137,9 @@ class BehaviorPlanner(RoutePlanner):
             aside = change.offset
             self._stages = self._stages[1:]
         else:
-            has_goal = any(part is not None for part in self._way)
-            self._stages = stages(ReferenceLine(path, self.roads, z)) if has_goal else []
+            goal = self._goal
+            is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
+            self._stages = stages(ReferenceLine(path, self.roads, z)) if is_route else []
         line = self._line = ReferenceLine(path, self.roads, z, self._stages[0].offsets if self._stages else None)
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, line.path_limits, line.spacing, self.planner_settings)
