@@ -43,6 +43,8 @@ STAYING = 3.0
 NEARBY = 1.0
 """Maximum distance of an object from its mean place while it stays there [m]; one that sets off with 1 m/s² leaves it
 after 1.4 s."""
+CLASSIFYING = 1.0
+"""Time constant of the shares of observed classes [s]; detectors confuse those of distant objects for single frames."""
 CHANGING = 0.7
 """Time constant of the estimate of accelerations [s], which damps the noise of velocities."""
 
@@ -88,6 +90,8 @@ class KnownObject(msgspec.Struct):
     """Speed over about the last second [m/s]."""
     z: float = 0.0
     """Height of the lower side of its box [m]."""
+    kinds: dict[str, float] = {}
+    """Shares of the classes that were observed over about the last second; empty while there is only one."""
 
     @property
     def speed(self) -> float:
@@ -269,16 +273,17 @@ def _keep_course(known: KnownObject) -> None:
 
 
 class _Shares(NamedTuple):
-    """Weights of a new observation in the estimates of acceleration, mean speed and mean place."""
+    """Weights of a new observation in the estimates of acceleration, mean speed, mean place and class."""
 
     acceleration: float
     speed: float
     place: float
+    kind: float
 
     @classmethod
     def of(cls, step: float) -> _Shares:
         """Return the weights after a time step [s]."""
-        return cls(*[1.0 - math.exp(-step / time) for time in (CHANGING, LASTING, STAYING)])
+        return cls(*[1.0 - math.exp(-step / time) for time in (CHANGING, LASTING, STAYING, CLASSIFYING)])
 
 
 def _take_over(known: KnownObject, fresh: KnownObject, step: float, shares: _Shares) -> None:
@@ -301,10 +306,23 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float, shares: _Sha
     known.mean_speed += (speed - known.mean_speed) * (1.0 if before is None else shares.speed)
     known.has_velocity |= fresh.has_velocity or step > 0.0
     known.hidden_since = None
-    known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
+    _classify(known, fresh.kind, shares.kind)
+    known.row, known.seen = fresh.row, fresh.seen
     known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
     known.length, known.width = fresh.length, fresh.width
     known.z = fresh.z
     known.error, known.ellipse, known.existence = fresh.error, fresh.ellipse, fresh.existence
     x, y = known.mean_place
     known.mean_place = x + shares.place * (fresh.x - x), y + shares.place * (fresh.y - y)
+
+
+def _classify(known: KnownObject, kind: str, share: float) -> None:
+    """Set the class of an object to the one that was observed most, after a new observation with this weight."""
+    if kind == known.kind and not known.kinds:
+        return
+    shares = known.kinds or {known.kind: 1.0}
+    known.kinds = {name: value * (1.0 - share) for name, value in shares.items()}
+    known.kinds[kind] = known.kinds.get(kind, 0.0) + share
+    most = max(known.kinds.values())
+    if known.kinds.get(known.kind, 0.0) < most:
+        known.kind = max(known.kinds, key=lambda name: known.kinds[name])

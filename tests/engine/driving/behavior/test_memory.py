@@ -117,3 +117,21 @@ def test_time_since_an_object_stands() -> None:
         (known,) = objects.update(detections(now, KnownBox(4.0 * now - 2.0 * min(now, 1.0) ** 2, vx=speed)), now)
     assert known.still_since == pytest.approx(0.9)
     assert known.moving_since is None
+
+
+def test_class_changes_only_if_the_new_one_was_observed_most() -> None:
+    """The shares tend to the observations with a time constant of 1 s: they are equal after ln 2 s."""
+    objects = memory()
+    kinds = []
+    for tick in range(40):
+        now = 0.1 * tick
+        flickers = tick % 3 == 0 and 0 < tick < 20
+        kind = "bicycle" if flickers or tick >= 20 else "car"
+        (known,) = objects.update(detections(now, KnownBox(50.0, kind=kind)), now)
+        kinds.append(known.kind)
+    assert set(kinds[:20]) == {"car"}
+    steady = memory()
+    for tick in range(20):
+        now = 0.1 * tick
+        (known,) = steady.update(detections(now, KnownBox(50.0, kind="car" if tick == 0 else "bicycle")), now)
+        assert known.kind == ("car" if now < math.log(2.0) else "bicycle")
