@@ -240,19 +240,3 @@ def test_parked_vans_of_noisy_place_and_velocity_are_passed(roads: RoadNetwork, 
     for van in vans:
         beside = [y for x, y, _ in run.path if x - 1.0 < van.x + van.size[0] / 2.0 and x + FRONT > van.x - 2.95]
         assert min(beside) - CAR.size[1] / 2.0 > van.y + van.size[1] / 2.0, "no contact"
-
-
-def test_lead_that_is_confused_with_a_bicycle_in_single_frames_is_followed_as_a_car() -> None:
-    def lead(now: float, *, flickers: bool) -> list[KnownBox]:
-        kind = "bicycle" if flickers and round(now / 0.05) % 5 == 0 else "car"
-        return [KnownBox(50.0 + 7.0 * now, vx=7.0, kind=kind)]
-
-    roads = two_lane_road()
-    fronts = []
-    for flickers in (False, True):
-        run = PlannedDrive(behavior(roads, lane_changes=False), roads)
-        run.run(20.0, lambda now, flickers=flickers: lead(now, flickers=flickers))  # type: ignore[misc]
-        run.world.close()
-        fronts.append(run.front)
-        assert run.hardest_braking < 2.5
-    assert fronts[0] == pytest.approx(fronts[1], abs=0.01)
