@@ -6,6 +6,7 @@ has changed, its reference line continues in the lane before.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -27,7 +28,7 @@ DISTANCE, TIME = 295.0, 43.0
 """Distance [m] and time [s] before the end of the lane at which a change becomes desired, by LMRS (Schakel 2012)."""
 
 
-class Stage(NamedTuple):
+class RouteLane(NamedTuple):
     """Lane before one of the changes of a path, or that after the last one.
 
     offsets     distances of its center to the left of the points of the path (M,) [m]
@@ -57,7 +58,7 @@ class LaneChange(msgspec.Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """What the vehicle does."""
+        """Name of the maneuver."""
         return f"change lane to the {'left' if self.side > 0 else 'right'}"
 
     def profile(self, start: Start, lateral_acceleration: float) -> LateralProfile:
@@ -78,39 +79,53 @@ class LaneChange(msgspec.Struct, frozen=True):
         return min(max(1.0 - left / DISTANCE, 1.0 - left / (TIME * max(speed, 1.0)), 0.0), 1.0)
 
 
-def stages(line: ReferenceLine) -> list[Stage]:
+def route_lanes(line: ReferenceLine) -> list[RouteLane]:
     """Return the lanes of a path in their order; none if it changes no lane.
 
     line  reference line on the path
     """
     crossings = _crossings(line)
-    if not crossings:
-        return []
     last = len(line.points) - 1
-    before = [_followed(line, index, center) for index, center, _ in crossings]
-    lanes = [*before, _followed(line, crossings[-1][0] + STRIDE, crossings[-1][2])]
-    found = [Stage(lanes[-1].offsets, last, None)]
+    before = [_followed(line, index, own) for index, own, _ in crossings]
+    after = [_followed(line, index + STRIDE, own) for index, _, own in crossings]
+    lanes: list[RouteLane] = []
     limit = last
     for number in range(len(crossings) - 1, -1, -1):
-        lane, beside = lanes[number], lanes[number + 1]
-        end = max(min(lane.last, beside.last, limit), crossings[number][0])
-        on_path = np.abs(lane.offsets[: crossings[number][0]]) < OFF_CENTER
-        begin = int(np.flatnonzero(on_path)[-1]) if on_path.any() else 0
-        found.insert(0, Stage(lane.offsets, max(begin, beside.first), end))
+        index = crossings[number][0]
+        end = max(min(before[number].last, after[number].last, limit), index)
+        on_path = np.flatnonzero(np.abs(before[number].offsets[:index]) < OFF_CENTER)
+        begin = max(int(on_path[-1]) if on_path.size else 0, after[number].first)
+        earlier = None if number == 0 else (after[number - 1], crossings[number - 1][0])
+        lanes.insert(0, RouteLane(_joined(earlier, before[number], index), min(begin, index), end))
         limit = end - round(ROOM / line.spacing)
-    return found
+    return [*lanes, RouteLane(after[-1].offsets, last, None)] if crossings else []
+
+
+def _joined(earlier: tuple[_Lane, int] | None, lane: _Lane, index: int) -> Array:
+    """Return the offsets of a lane that is left at an index, up to where the path is in it those of the lane after the
+    earlier change, whose index is given: between both the path may follow other roads."""
+    if earlier is None:
+        return lane.offsets
+    before, change = earlier
+    centered = np.flatnonzero(np.abs(before.offsets[change:index]) < OFF_CENTER)
+    if not centered.size:
+        return lane.offsets
+    joint = change + int(centered[0])
+    return np.concatenate([before.offsets[:joint], lane.offsets[joint:]])
 
 
 def _crossings(line: ReferenceLine) -> list[tuple[int, float, float]]:
     """Return the last points of a path in each lane that it leaves for a neighboring one of the same direction, with
     the offsets of the centers of the lane there and of the next one behind [m]."""
     found = []
-    lanes, own = line.lanes_of_direction(0)
+    here = line.lanes_of_direction(0)
     for index in range(STRIDE, len(line.points), STRIDE):
-        then, here = line.lanes_of_direction(index)
-        if abs(here - own) > SAME_LANE and _nearest(then, own) is not None and _nearest(lanes, here) is not None:
-            found.append((index - STRIDE, own, here))
-        lanes, own = then, here
+        then = line.lanes_of_direction(index)
+        changes = then.section == here.section and then.lane != here.lane and abs(then.own - here.own) > SAME_LANE
+        lasts = changes and _nearest(then.centers, here.own) is not None
+        if lasts and _nearest(here.centers, then.own) is not None:
+            found.append((index - STRIDE, here.own, then.own))
+        here = then
     return found
 
 
@@ -129,7 +144,7 @@ def _followed(line: ReferenceLine, index: int, center: float) -> _Lane:
     for step, bound in ((-STRIDE, -1), (STRIDE, len(line.points))):
         here, value = index, center
         for there in range(index + step, bound, step):
-            onward = _nearest(line.lanes_of_direction(there)[0], value)
+            onward = _nearest(line.lanes_of_direction(there).centers, value)
             if onward is None:
                 break
             here, value = there, onward
@@ -140,7 +155,7 @@ def _followed(line: ReferenceLine, index: int, center: float) -> _Lane:
     return _Lane(filled, *ends)
 
 
-def _nearest(centers: list[float], offset: float) -> float | None:
+def _nearest(centers: Sequence[float], offset: float) -> float | None:
     """Return the center of the lane at an offset [m]; None without one."""
     nearest = min(centers, key=lambda center: abs(center - offset), default=None)
     return nearest if nearest is not None and abs(nearest - offset) < SAME_LANE else None

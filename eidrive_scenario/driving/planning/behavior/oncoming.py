@@ -46,6 +46,9 @@ SAMPLE = 2.0
 RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
 """Response time [s] and deceleration [m/s²] of traffic that comes into view while the vehicle is in its lane; those of
 RSS for a vehicle that keeps to its lane (Shalev-Shwartz et al. 2017)."""
+FIRM_RESPONSE = 4.0
+"""Deceleration that a vehicle expects of such traffic once its maneuver has begun [m/s²]: it is not given up for a lack
+of view that is smaller than its errors."""
 HARD_RESPONSE = 6.0
 """Deceleration that the vehicle expects of such traffic after the longest pause [m/s²]; a choice."""
 RESERVE = 1.5
@@ -218,16 +221,17 @@ class OncomingTraffic:
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
         free = self._free(outlook, here, end, now)
-        if self._suffices(free, here[0], until, end, beside, now):
+        response = FIRM_RESPONSE if is_current else RESPONSE_DECELERATION
+        if self._suffices(free, here[0], until, end, beside, now, response):
             return Verdict.GO
         step = min(max(last, 0), len(times) - 1)
         there = (float(viewpoints[step]), float(beside_line[step]))
         hidden = self.first_hidden(outlook, there, step)
-        if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
+        if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now, response):
             return refused
         # Until then the vehicle may have to return to its lane.
         returned, front = float(times[step] + duration[step]), there[0] + body.half_length
-        may_return = step <= first or self._suffices(free, here[0], returned, front, beside, now)
+        may_return = step <= first or self._suffices(free, here[0], returned, front, beside, now, response)
         return Verdict.GO if may_return else refused
 
     def yields(self, outlook: Outlook, viewpoint: tuple[float, float], now: float, *, is_last_place: bool) -> bool:
@@ -247,7 +251,14 @@ class OncomingTraffic:
         return self._others_yield
 
     def _suffices(
-        self, hidden: float, viewpoint: float, duration: float, end: float, beside: LanesBeside, now: float
+        self,
+        hidden: float,
+        viewpoint: float,
+        duration: float,
+        end: float,
+        beside: LanesBeside,
+        now: float,
+        response: float,
     ) -> bool:
         """Return whether traffic from a hidden place does not come to `end` in a time [s].
 
@@ -257,7 +268,7 @@ class OncomingTraffic:
         if self._is_patient(now) and self._is_in_view(hidden, viewpoint):
             return hidden >= end
         speed = self.hidden_speed(beside, now)
-        return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration)) >= end
+        return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration, response)) >= end
 
     def _is_in_view(self, hidden: float, viewpoint: float) -> bool:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""

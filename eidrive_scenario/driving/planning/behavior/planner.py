@@ -19,7 +19,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
-from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange, Stage, stages
+from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange, RouteLane, route_lanes
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
 from eidrive_scenario.driving.planning.behavior.occlusion import HiddenTraffic, Occluders
@@ -56,9 +56,9 @@ MARGIN_AHEAD = 40.0
 class BehaviorPlanner(RoutePlanner):
     """Follow the route, and react to objects: follow, give way, pass, brake.
 
-    In the manner of PDM-Closed (Dauner et al., CoRL 2023): proposals are rolled out by the Intelligent Driver Model
-    against predicted objects and scored. Beyond it: lane changes and passing, giving way at crossing ways, emergency
-    braking at any speed, and objects with covariance and existence probability.
+    In the manner of PDM-Closed (Dauner et al., CoRL 2023): proposals are rolled out by the improved Intelligent Driver
+    Model against predicted objects and scored. Beyond it: lane changes and passing, giving way at crossing ways,
+    emergency braking at any speed, and objects with covariance and existence probability.
     """
 
     settings_type: ClassVar[type[PlannerSettings]] = BehaviorSettings
@@ -76,7 +76,7 @@ class BehaviorPlanner(RoutePlanner):
         self._predictor = Predictor(roads, self._times, self._rules)
         self._passages: tuple[Passage, ...] = ()
         self._line: ReferenceLine | None = None
-        self._stages: list[Stage] = []
+        self._route_lanes: list[RouteLane] = []
         """Lanes of a path that changes lanes, from the current one on."""
         self._conflict_ways: ConflictWays | None = None
         self._ways: list[ConflictWay] = []
@@ -135,12 +135,14 @@ class BehaviorPlanner(RoutePlanner):
             if change is None or abs(self._place_on(before, x, y)[1] - change.offset) > abs(change.offset) / 2.0:
                 return before
             aside = change.offset
-            self._stages = self._stages[1:]
+            self._route_lanes = self._route_lanes[1:]
         else:
             goal = self._goal
             is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
-            self._stages = stages(ReferenceLine(path, self.roads, z)) if is_route else []
-        line = self._line = ReferenceLine(path, self.roads, z, self._stages[0].offsets if self._stages else None)
+            self._route_lanes = route_lanes(ReferenceLine(path, self.roads, z)) if is_route else []
+        line = self._line = ReferenceLine(
+            path, self.roads, z, self._route_lanes[0].offsets if self._route_lanes else None
+        )
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, line.path_limits, line.spacing, self.planner_settings)
         if self.observes_regions and self.roads is not None:
@@ -159,9 +161,9 @@ class BehaviorPlanner(RoutePlanner):
 
     def _change(self, line: ReferenceLine, s: float) -> LaneChange | None:
         """Return the lane change that the path requires next, at a distance along the line; None without one."""
-        if len(self._stages) < 2:
+        if len(self._route_lanes) < 2:
             return None
-        here, (offsets, _, _) = self._stages[:2]
+        here, (offsets, _, _) = self._route_lanes[:2]
         begin, end = (float(line.along[index]) for index in (here.begin, here.end or 0))
         index = line.index_at(min(max(s, begin), end))
         return LaneChange(begin, end, float(offsets[index] - here.offsets[index]))

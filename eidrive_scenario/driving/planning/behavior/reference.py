@@ -70,6 +70,19 @@ class LanesBeside(NamedTuple):
         )
 
 
+class LanesOfDirection(NamedTuple):
+    """Lanes of the direction of the line at one of its points.
+
+    centers  distances of their centers to the left [m], from left to right;  own  that of the lane at the point
+    section  road and index of the lane section;  lane  number of the lane at the point
+    """
+
+    centers: tuple[float, ...]
+    own: float
+    section: tuple[str, int]
+    lane: int
+
+
 class ReferenceLine:
     """Path of the route with distances along it (s) and to its left (d).
 
@@ -95,7 +108,7 @@ class ReferenceLine:
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}
         self._place: LaneLocation | None = None
-        self._directions: dict[int, tuple[list[float], float]] = {}
+        self._directions: dict[int, LanesOfDirection] = {}
 
     @property
     def path_limits(self) -> Array:
@@ -158,22 +171,23 @@ class ReferenceLine:
             lanes = self._beside[index] = self._lanes_at(index)
         return lanes
 
-    def lanes_of_direction(self, index: int) -> tuple[list[float], float]:
-        """Return the centers of the lanes of the direction of the line at a point, from left to right, and of that at
-        the point [m]. The result is empty outside of roads."""
+    def lanes_of_direction(self, index: int) -> LanesOfDirection:
+        """Return the lanes of the direction of the line at a point; none outside of roads."""
         known = self._directions.get(index)
         if known is None:
             known = self._directions[index] = self._centers_at(index)
         return known
 
-    def _centers_at(self, index: int) -> tuple[list[float], float]:
+    def _centers_at(self, index: int) -> LanesOfDirection:
         there = self._section_at(index)
         if there is None:
-            return [], math.nan
+            return LanesOfDirection((), math.nan, ("", 0), 0)
         lanes, own = there.lanes, there.own
         first = next((n + 1 for n in range(own - 1, -1, -1) if not _is_usable(lanes[n])), 0)
         last = next((n for n in range(own + 1, len(lanes)) if not _is_usable(lanes[n])), len(lanes))
-        return [lane.center for lane in lanes[first:last] if 2.0 * lane.half_width >= NARROWEST], lanes[own].center
+        centers = tuple([lane.center for lane in lanes[first:last] if 2.0 * lane.half_width >= NARROWEST])
+        section = self._roads.road(there.place.road).section_at(there.place.s).index if self._roads is not None else 0
+        return LanesOfDirection(centers, lanes[own].center, (there.place.road, section), lanes[own].number)
 
     def _section_at(self, index: int) -> _Section | None:
         """Return the lanes at a point of the line; None outside of roads."""

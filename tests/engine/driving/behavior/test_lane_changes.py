@@ -10,7 +10,7 @@ from opendrive_xml import lanes_xml, map_xml, road_xml
 from planned_drive import CAR, FRONT, LANE, KnownBox, PlannedDrive, behavior
 
 from eidrive_scenario.base.requests import Goal
-from eidrive_scenario.driving.planning.behavior.lane_changes import stages
+from eidrive_scenario.driving.planning.behavior.lane_changes import route_lanes
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.roads import RoadNetwork
@@ -66,13 +66,13 @@ def changed_at(run: PlannedDrive, y: float) -> tuple[float, float]:
     return tick * 0.05, run.path[tick][0]
 
 
-class TestStages:
+class TestLanesOfARoute:
     def test_path_in_one_lane_has_none(self) -> None:
-        assert stages(line_to(road(2), (20.0, LANE), (600.0, LANE))) == []
+        assert route_lanes(line_to(road(2), (20.0, LANE), (600.0, LANE))) == []
 
     def test_change_is_possible_until_the_lane_ends(self) -> None:
         line = line_to(road(2, end=300.0), (20.0, LANE - WIDTH), (600.0, LANE))
-        before, after = stages(line)
+        before, after = route_lanes(line)
         assert line.along[before.begin] < 10.0
         assert line.along[before.end] == pytest.approx(280.0, abs=2.0)
         # Both lanes at all points: the one before stays beside the path, the path stays in the one after.
@@ -80,11 +80,11 @@ class TestStages:
         assert after.offsets[0] == pytest.approx(WIDTH, abs=0.01)
         assert after.offsets[60:] == pytest.approx(0.0, abs=0.01)
 
-    def test_change_over_two_lanes_has_two_stages(self) -> None:
+    def test_change_over_two_lanes_has_two_route_lanes(self) -> None:
         line = line_to(road(3), (20.0, LANE), (600.0, LANE - 2.0 * WIDTH))
-        first, second, last = stages(line)
+        first, second, last = route_lanes(line)
         middle = 200
-        offsets = [stage.offsets[middle] for stage in (first, second, last)]
+        offsets = [lane.offsets[middle] for lane in (first, second, last)]
         assert offsets == pytest.approx([2.0 * WIDTH, WIDTH, 0.0], abs=0.01)
         assert first.end is not None
         assert second.end is not None
@@ -94,7 +94,7 @@ class TestStages:
     def test_lanes_of_a_curve_are_parallel(self, curvature: float) -> None:
         roads = RoadNetwork.parse(map_xml(road_xml(length=300.0, curvature=curvature, lanes=lanes_xml(1, 2))))
         start, end = (roads.lane_pose_at("1", lane, s) for lane, s in ((-2, 10.0), (-1, 290.0)))
-        before, after = stages(line_to(roads, (start.x, start.y), (end.x, end.y)))
+        before, after = route_lanes(line_to(roads, (start.x, start.y), (end.x, end.y)))
         assert before.offsets[100:] == pytest.approx(-WIDTH, abs=0.05)
         assert after.offsets[100:] == pytest.approx(0.0, abs=0.05)
 
@@ -146,7 +146,7 @@ def test_faster_car_from_behind_passes_first() -> None:
     assert run.hardest_braking < 1.0
 
 
-def test_vehicle_without_a_gap_waits_at_the_end_of_its_lane_and_changes_when_the_queue_is_gone() -> None:
+def test_vehicle_without_a_gap_waits_at_the_end_of_its_lane() -> None:
     queue = [KnownBox(-50.0 + 8.0 * number, LANE) for number in range(60)]
     run = drive(road(2, end=250.0), LANE - WIDTH, (600.0, LANE), lambda now: queue if now < 50.0 else [], 80.0)
     standing = run.path[round(49.0 / 0.05)]
@@ -170,7 +170,7 @@ def test_vehicle_changes_over_two_lanes_with_traffic() -> None:
     assert run.hardest_braking < 3.5
 
 
-def test_vehicle_changes_to_the_lane_of_its_exit_with_traffic_on_the_left() -> None:
+def test_vehicle_merges_with_traffic_on_the_left() -> None:
     traffic = column(-LANE, 14.0, 108.0, 32.0, 8)
     run = drive(road(2, end=310.0, rule="LHT"), WIDTH - LANE, (650.0, -LANE), traffic, 30.0, 15.0)
     assert changed_at(run, -LANE)[1] < 310.0

@@ -204,14 +204,14 @@ def test_vehicle_too_fast_for_its_only_lane_follows_it() -> None:
 
 @pytest.mark.parametrize("x", np.arange(24.0, 56.0, 4.0).tolist())
 def test_vehicle_that_passes_a_junction_straight_ahead_stays_in_its_lane(x: float) -> None:
-    """At 12 m/s it does not turn, and the lanes of turns that it overlaps do not lead it out of its own."""
+    """At 12 m/s it does not turn, and the lanes of turns that it overlaps do not lead it out of that."""
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
     found = Predictor(roads, TIMES).predict(known(KnownBox(x, 3.5, -12.0, yaw=math.pi)))
     np.testing.assert_allclose(found.y, 3.5, atol=0.1)
     np.testing.assert_allclose(found.x, np.tile(x - 12.0 * TIMES, (len(found.x), 1)), atol=0.2)
 
 
-def test_vehicle_that_turns_faster_than_usual_is_predicted_along_the_turn_once_that_shows() -> None:
+def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     """A car turns left across the opposite lanes at 8 m/s, with the heading of the lane 6 m behind its beginning."""
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
     (entry,) = known(KnownBox(52.0, 3.5, -8.0, yaw=math.pi))
