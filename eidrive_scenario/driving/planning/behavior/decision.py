@@ -410,9 +410,10 @@ class Decider:
         beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
         outlook = Outlook(situation.line, scene, beside)
         is_current = self._current is not None and self._current.name == profile.name
-        verdict = self._oncoming.verify(profile, motion, outlook, situation.now, is_current=is_current)
-        place = self._oncoming.waiting_place(profile, situation.s)
         has_begun = self._passes and is_current
+        now = situation.now
+        verdict = self._oncoming.verify(profile, motion, outlook, now, is_current=is_current, has_begun=has_begun)
+        place = self._oncoming.waiting_place(profile, situation.s)
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
             verdict = Verdict.WAIT
         start = Start(*situation.steered, situation.speed)

@@ -46,9 +46,6 @@ SAMPLE = 2.0
 RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
 """Response time [s] and deceleration [m/s²] of traffic that comes into view while the vehicle is in its lane; those of
 RSS for a vehicle that keeps to its lane (Shalev-Shwartz et al. 2017)."""
-FIRM_RESPONSE = 4.0
-"""Deceleration that a vehicle expects of such traffic once its maneuver has begun [m/s²]: it is not given up for a lack
-of view that is smaller than its errors."""
 HARD_RESPONSE = 6.0
 """Deceleration that the vehicle expects of such traffic after the longest pause [m/s²]; a choice."""
 RESERVE = 1.5
@@ -182,12 +179,20 @@ class OncomingTraffic:
         return float(s + first * SAMPLE)
 
     def verify(
-        self, profile: LateralProfile, motion: Motion, outlook: Outlook, now: float, *, is_current: bool
+        self,
+        profile: LateralProfile,
+        motion: Motion,
+        outlook: Outlook,
+        now: float,
+        *,
+        is_current: bool,
+        has_begun: bool = False,
     ) -> Verdict:
         """Return whether the vehicle may follow a profile that uses the oncoming lane.
 
         now         current time [s]
         is_current  whether it follows the profile already; then it needs no reserve
+        has_begun   whether it does so to pass, instead of waiting on it
         """
         _, scene, beside = outlook
         if math.isnan(beside.oncoming):
@@ -214,6 +219,8 @@ class OncomingTraffic:
         end, until = place + body.front, back if is_current else back + RESERVE
         if math.isinf(back) or self._meets(profile, motion, scene, first, until, end):
             return refused
+        if last < 0 and has_begun:
+            return Verdict.GO  # The point of no return has passed, and nothing is in view.
         self._others_yield &= is_current
         if self._others_yield:
             return Verdict.GO
@@ -221,17 +228,16 @@ class OncomingTraffic:
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
         free = self._free(outlook, here, end, now)
-        response = FIRM_RESPONSE if is_current else RESPONSE_DECELERATION
-        if self._suffices(free, here[0], until, end, beside, now, response):
+        if self._suffices(free, here[0], until, end, beside, now):
             return Verdict.GO
         step = min(max(last, 0), len(times) - 1)
         there = (float(viewpoints[step]), float(beside_line[step]))
         hidden = self.first_hidden(outlook, there, step)
-        if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now, response):
+        if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
             return refused
         # Until then the vehicle may have to return to its lane.
         returned, front = float(times[step] + duration[step]), there[0] + body.half_length
-        may_return = step <= first or self._suffices(free, here[0], returned, front, beside, now, response)
+        may_return = step <= first or self._suffices(free, here[0], returned, front, beside, now)
         return Verdict.GO if may_return else refused
 
     def yields(self, outlook: Outlook, viewpoint: tuple[float, float], now: float, *, is_last_place: bool) -> bool:
@@ -251,14 +257,7 @@ class OncomingTraffic:
         return self._others_yield
 
     def _suffices(
-        self,
-        hidden: float,
-        viewpoint: float,
-        duration: float,
-        end: float,
-        beside: LanesBeside,
-        now: float,
-        response: float,
+        self, hidden: float, viewpoint: float, duration: float, end: float, beside: LanesBeside, now: float
     ) -> bool:
         """Return whether traffic from a hidden place does not come to `end` in a time [s].
 
@@ -268,7 +267,7 @@ class OncomingTraffic:
         if self._is_patient(now) and self._is_in_view(hidden, viewpoint):
             return hidden >= end
         speed = self.hidden_speed(beside, now)
-        return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration, response)) >= end
+        return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration)) >= end
 
     def _is_in_view(self, hidden: float, viewpoint: float) -> bool:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""
