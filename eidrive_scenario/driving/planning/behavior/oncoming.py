@@ -85,7 +85,7 @@ class Motion(NamedTuple):
 
 
 class Outlook(NamedTuple):
-    """What the vehicle has before it: its line, the objects, and the lanes beside the line."""
+    """View of a vehicle: its line, the objects, and the lanes beside the line."""
 
     line: ReferenceLine
     scene: Surroundings

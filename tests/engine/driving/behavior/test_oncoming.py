@@ -58,7 +58,12 @@ def traffic(view: float) -> OncomingTraffic:
 
 
 def verdict(
-    *objects: tuple[float, float, float], view: float = 150.0, now: float = 0.0, s: float = -30.0, current: bool = False
+    *objects: tuple[float, float, float],
+    view: float = 150.0,
+    now: float = 0.0,
+    s: float = -30.0,
+    current: bool = False,
+    begun: bool = False,
 ) -> Verdict:
     """Return the verdict on PASSING at 10 m/s from `s` on, past a car of 5 m that stands at 40 m, and other objects.
 
@@ -68,7 +73,8 @@ def verdict(
     """
     motion = Motion(s + 10.0 * TIMES, np.full(len(TIMES), 10.0))
     there = scene(*(objects or ((40.0, 0.0, 0.0),)))
-    return traffic(view).verify(PASSING, motion, Outlook(LINE, there, BESIDE), now, is_current=current)
+    outlook = Outlook(LINE, there, BESIDE)
+    return traffic(view).verify(PASSING, motion, outlook, now, is_current=current, has_begun=begun)
 
 
 def test_free_view_ends_at_its_range() -> None:
@@ -142,6 +148,13 @@ def test_moving_object_is_followed_until_the_view_suffices() -> None:
 def test_vehicle_that_cannot_return_any_more_goes_on() -> None:
     """30 m along the line, the front is 3.7 m behind the car, and the vehicle 3 m beside its lane."""
     assert verdict((40.0, 0.0, 0.0), (100.0, 3.5, -10.0), s=30.0, current=True) is Verdict.GO
+
+
+def test_vehicle_past_the_point_of_no_return_goes_on() -> None:
+    """At -12 m the stop from 10 m/s would end at 7.7 m, beyond the border at 4.4 m."""
+    assert verdict(view=100.0, s=-12.0, current=True) is Verdict.WAIT
+    assert verdict(view=100.0, s=-12.0, current=True, begun=True) is Verdict.GO
+    assert verdict((40.0, 0.0, 0.0), (90.0, 3.5, -10.0), s=-12.0, current=True, begun=True) is Verdict.WAIT
 
 
 def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
