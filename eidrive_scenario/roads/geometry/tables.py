@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.roads.geometry.poses import BEYOND, LEAST_STRETCH, lane_height, off_road
+from eidrive_scenario.roads.geometry.poses import AT_END, BEYOND, LEAST_STRETCH, STEP, lane_height, off_road
 from eidrive_scenario.roads.model.curve_table import CurveTable
 from eidrive_scenario.roads.model.location import LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model.polynomials import PolynomialTable
@@ -207,9 +207,15 @@ class RoadTables:
             yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
-        """Return t of the center lines of lanes and its derivative."""
+        """Return t of the center lines of lanes and its derivative, as `poses.lane_t`."""
         section = self.lane_section[row]
-        t, slope = self.lane_offset.value_and_slope(self.section_road[section], s)
+        road = self.section_road[section]
+        t, slope = self.lane_offset.value_and_slope(road, s)
+        at_end = s >= self.section_start[section] + self.section_length[section] - AT_END
+        if at_end.any():
+            before, slope_before = self.lane_offset.value_and_slope(road, s - AT_END)
+            steps = at_end & (np.abs(before - t) > STEP)
+            t, slope = np.where(steps, before, t), np.where(steps, slope_before, slope)
         center, center_slope = self.center.value_and_slope(row, s - self.section_start[section])
         side = np.sign(self.lane_id[row])
         return t + side * center, slope + side * center_slope

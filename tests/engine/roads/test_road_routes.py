@@ -256,3 +256,21 @@ def test_cheapest_path_has_cost_of_networkx(seed: int) -> None:
     assert bounded is not None
     assert nx.path_weight(graph, found, "weight") == nx.path_weight(graph, bounded, "weight") == costs[keys[1]]
     assert squared == nx.dijkstra_path(graph, keys[0], keys[1], weight=lambda one, other, data: data["weight"] ** 2)
+
+
+@pytest.mark.parametrize("step", [3.5, -3.5])
+def test_route_is_straight_where_lanes_are_numbered_anew_with_a_step_of_the_offset(step: float) -> None:
+    """At 60 m a lane is added on the left and the lane offset increases by its width, as in maps of CARLA; or the other
+    way around. The lane that goes on stays where it is."""
+    few = section_xml("", lane_xml(-1, link='<successor id="-2"/>' if step > 0.0 else '<predecessor id="-2"/>'), s=0)
+    many_link = '<predecessor id="-1"/>' if step > 0.0 else '<successor id="-1"/>'
+    many = section_xml("", lane_xml(-1, kind="none") + lane_xml(-2, link=many_link), s=0)
+    first, second = (few, many) if step > 0.0 else (many, few)
+    offsets = f'<laneOffset s="0" a="{max(-step, 0.0)}" b="0" c="0" d="0"/>'
+    offsets += f'<laneOffset s="60" a="{max(step, 0.0)}" b="0" c="0" d="0"/>'
+    lanes = offsets + first + second.replace('laneSection s="0"', 'laneSection s="60"')
+    roads = RoadNetwork.parse(map_xml(road_xml(length=100.0, lanes=lanes)))
+    start, end = (-1, -2) if step > 0.0 else (-2, -1)
+    route = roads.route(roads.location("1", start, 10.0), roads.location("1", end, 90.0))
+    np.testing.assert_allclose(route.polyline(1.0)[:, 1], -1.75, atol=1e-9)
+    assert route.length == pytest.approx(80.0)
