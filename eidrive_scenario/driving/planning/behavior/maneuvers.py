@@ -198,9 +198,11 @@ def passing_profiles(
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
     moves = obstacle is not None and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
-    # The vehicle has to return to its lane before the end of its route.
-    returns = obstacle is None or not moves or obstacle.end < situation.end
-    may_change = not math.isnan(faster) and situation.change is None and returns
+    # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
+    change = situation.change
+    last = situation.end if change is None else change.begin
+    returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
+    may_change = not math.isnan(faster) and returns
     if may_change and has_gap_now(scene, faster, situation.motion, body):
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = Start(*situation.steered, situation.speed)

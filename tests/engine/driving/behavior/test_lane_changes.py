@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
-from planned_drive import CAR, FRONT, LANE, KnownBox, PlannedDrive, behavior
+from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior
+from signal_street import CAR
 
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.lane_changes import route_lanes
@@ -185,6 +186,16 @@ def test_time_gap_increases_after_a_merge() -> None:
     gaps = [leader(time)[0].x - 2.25 - run.path[round(time / 0.05)][0] - FRONT for time in (15.0, 99.0)]
     assert gaps[0] < 2.0 + 1.0 * 12.0
     assert gaps[1] == pytest.approx(2.0 + 1.2 * 12.0, abs=1.5), "rolling resistance and drag add to it"
+
+
+def test_slow_car_is_overtaken_well_before_a_later_lane_change_of_the_route() -> None:
+    roads = road(2, 1200.0)
+    run = PlannedDrive(behavior(roads, 14.0), roads, speed=14.0, y=LANE - WIDTH)
+    way = np.array([[600.0, LANE - WIDTH, 0.0], [1100.0, LANE, 0.0]])
+    run.run(35.0, lambda now: [KnownBox(80.0 + 5.0 * now, LANE - WIDTH, vx=5.0)], goal=Goal(waypoints=way))
+    run.world.close()
+    assert run.front > 80.0 + 5.0 * 35.0 + 50.0
+    assert min(run.speeds) > 8.0
 
 
 def test_moving_car_is_not_overtaken_on_the_right() -> None:
