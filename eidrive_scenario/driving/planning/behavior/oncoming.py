@@ -33,7 +33,8 @@ PAUSE = 6.0
 did, or as the vehicle wants to, instead of at the speed limit [s]; of the order of the critical gaps of the Highway
 Capacity Manual (4.1 to 7.5 s)."""
 LONGEST_PAUSE = 2.0 * PAUSE
-"""Time of waiting without oncoming traffic after which the vehicle relies on others to respond [s]; a choice."""
+"""Time of waiting without oncoming traffic after which the vehicle relies on others to respond [s]; a choice. Behind a
+standing object without a place to see from, it begins after twice this time: it would wait forever."""
 SLOWEST = 0.5
 """Share of the wanted speed that traffic out of view is expected to drive at least."""
 FREE_TIME = 1.0
@@ -253,7 +254,8 @@ class OncomingTraffic:
         if has_waited_long:
             way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
         is_patient = has_waited_long or (is_last_place and self._is_patient(now))
-        self._others_yield = is_patient and place - way >= front
+        waits_in_vain = is_last_place and self._is_patient(now, 2.0 * LONGEST_PAUSE)
+        self._others_yield = waits_in_vain or (is_patient and place - way >= front)
         return self._others_yield
 
     def _suffices(

@@ -176,3 +176,12 @@ def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
     length = 7.0 * math.sqrt(10.0 / math.sqrt(3.0) * 2.35 / SETTINGS.lateral_acceleration)
     assert profile.waits_at == profile.places[-4] == pytest.approx(20.0 - length)
     assert with_view(PASSING, Start(12.0, 0.0, 0.0, 2.0), SETTINGS, sufficient) is None, "there is not enough space"
+
+
+@pytest.mark.parametrize("is_last_place", [True, False])
+def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bool) -> None:
+    """A truck 2.4 m ahead hides the lane near it; traffic at 10 m/s needs 10 + 100 / 12 m to stop."""
+    waiting = traffic(100.0)
+    outlook = Outlook(LINE, scene((6.3 + 2.5, 0.0, 0.0)), BESIDE)
+    for now, expected in ((13.0, False), (23.9, False), (24.0, is_last_place)):
+        assert waiting.yields(outlook, (1.4, 0.0), now, is_last_place=is_last_place) is expected
