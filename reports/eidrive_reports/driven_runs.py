@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from eidrive_scenario.api.common import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
+from eidrive_scenario.api.common import Array, ConstraintError, Diagnostic, EidriveError, InputError, SettingError
 from eidrive_scenario.api.criteria import Criterion, Frame
 from eidrive_scenario.api.experiments import Job, definition, run_jobs
 from eidrive_scenario.api.run import (
@@ -31,6 +31,8 @@ CONTACT = "contact"
 """Name of the criterion that judges the contacts of the vehicle."""
 WINDOW = 0.5
 """Length of the average of the accelerations [s]."""
+HARD = 4.05
+"""Deceleration above which braking is hard [m/s²]: the limit of comfort of nuPlan."""
 STANDING = 0.1
 """Maximum speed of a standing vehicle [m/s]."""
 DISPLACED = 5.0
@@ -135,13 +137,23 @@ class DrivenMotion:
     @property
     def hardest_braking(self) -> float:
         """Maximum mean deceleration over `WINDOW` before the first contact [m/s²]."""
+        return float(max(self._braking().max(initial=0.0), 0.0))
+
+    @property
+    def hard_brakings(self) -> int:
+        """Number of times that the mean deceleration over `WINDOW` exceeds `HARD`."""
+        hard = self._braking() > HARD
+        return int(np.count_nonzero(np.diff(hard.astype(int), prepend=0) > 0))
+
+    def _braking(self) -> Array:
+        """Return the mean decelerations over `WINDOW` before the first contact (N,) [m/s²]."""
         times, speeds = np.array(self._times), np.array(self._speeds)
         if self.contacts:
             speeds = speeds[times < self.contacts[0][0]]
         steps = round(WINDOW / (times[1] - times[0])) if len(times) > 1 else 0
         if not 0 < steps < len(speeds):
-            return 0.0
-        return float(max((speeds[:-steps] - speeds[steps:]).max() / WINDOW, 0.0))
+            return np.empty(0)
+        return np.asarray((speeds[:-steps] - speeds[steps:]) / WINDOW)
 
 
 def observed_run(

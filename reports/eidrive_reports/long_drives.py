@@ -296,7 +296,8 @@ LONG_STOP = 20.0
 
 @dataclass(frozen=True)
 class LongDrive:
-    """Outcome of a drive: simulated time [s], distance [m], contacts, completed share of the route, and stops."""
+    """Outcome of a drive: simulated time [s], distance [m], contacts, completed share of the route, stops, and the
+    number of hard brakings."""
 
     scenario: str
     seed: int
@@ -307,6 +308,7 @@ class LongDrive:
     completed: float
     red_lights: int
     stops: tuple[Stop, ...]
+    hard_brakings: int = 0
 
 
 def run_of(job: Job) -> LongDrive:
@@ -322,6 +324,7 @@ def run_of(job: Job) -> LongDrive:
         completed=result.metrics.get(f"route_completion.{EGO}", 0.0),
         red_lights=int(result.metrics.get("running_red_light.count", 0.0)),
         stops=tuple(motion.stops),
+        hard_brakings=motion.hard_brakings,
     )
 
 
@@ -331,6 +334,8 @@ def table(drives: Sequence[LongDrive]) -> str:
         "drive",
         "simulated time [s]",
         "distance [m]",
+        "mean speed [m/s]",
+        "hard brakings",
         "collisions",
         "by own fault",
         "red lights passed",
@@ -345,6 +350,8 @@ def table(drives: Sequence[LongDrive]) -> str:
             drive.scenario,
             f"{drive.duration:.0f}",
             f"{drive.distance:.0f}",
+            f"{drive.distance / max(drive.duration, 1.0):.1f}",
+            drive.hard_brakings,
             int(drive.collided),
             int(drive.at_fault),
             drive.red_lights,
