@@ -76,7 +76,7 @@ def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
 def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, spacing: float) -> Line:
     """Return the center line of a lane in the direction of s, with the height of the lane above the road."""
     stations = equidistant(section.s, section.end, spacing)
-    aside = [lane.side * lane.center.value(s - section.s) + road.lane_offset.value(s) for s in stations]
+    aside = [lane.side * lane.center.value(s - section.s) + road.lane_offset_in(section, s)[0] for s in stations]
     points = _line(roads, road, stations, aside)
     return [[x, y, z + _height(lane, s - section.s)] for s, (x, y, z) in zip(stations, points, strict=True)]
 
@@ -84,7 +84,7 @@ def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane
 def edge_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, edge: LaneEdge, spacing: float) -> Line:
     """Return an outer edge of a lane on the surface of the road, in the direction of s."""
     stations = equidistant(edge.start, edge.end, spacing)
-    aside = [lane.side * lane.outer.value(s - section.s) + road.lane_offset.value(s) for s in stations]
+    aside = [lane.side * lane.outer.value(s - section.s) + road.lane_offset_in(section, s)[0] for s in stations]
     return _line(roads, road, stations, aside)
 
 

@@ -308,7 +308,7 @@ class LongDrive:
     completed: float
     red_lights: int
     stops: tuple[Stop, ...]
-    hard_brakings: int = 0
+    hard_brakings: int
 
 
 def run_of(job: Job) -> LongDrive:

@@ -288,7 +288,7 @@ def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *
     points = []
     for s in stations:
         x, y, heading, curvature, _ = road.reference.at(s)
-        t = road.lane_offset.value(s) + lane.side * width.value(s - section.s)
+        t = road.lane_offset_in(section, s)[0] + lane.side * width.value(s - section.s)
         if t * curvature > 1.0:
             t = 1.0 / curvature
         ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))

@@ -15,8 +15,6 @@ from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 
 BEYOND = 0.1
 """Maximum distance beyond an end of a road at which a position counts as that end [m]."""
-AT_END, STEP = 1e-6, 1e-3
-"""Distance before the end of a lane section at which its lanes end, and least step of a lane offset there [m]."""
 LEAST_STRETCH = 0.05
 """Minimum path length per meter of s. Inside the center of a bend, a lane has no length and no heading."""
 
@@ -143,17 +141,11 @@ def lane_height(lane: Lane, ds: float, offset: float) -> float:
 
 
 def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[float, float]:
-    """Return t of the center line of a lane at s, and its derivative.
-
-    A step of the lane offset at the end of the section belongs to the next one, whose lanes it numbers anew.
-    """
+    """Return t of the center line of a lane at s, and its derivative."""
     steady, steady_center = road.lane_offset.constant_value, lane.center.constant_value
     if steady is not None and steady_center is not None and lane.id:
         return (steady + steady_center if lane.id > 0 else steady - steady_center), 0.0
-    t, slope = road.lane_offset.value_and_slope(s)
-    if s >= section.end - AT_END:
-        before = road.lane_offset.value_and_slope(s - AT_END)
-        t, slope = before if abs(before[0] - t) > STEP else (t, slope)
+    t, slope = road.lane_offset_in(section, s)
     if lane.id == 0:
         return t, slope
     center, center_slope = lane.center.value_and_slope(s - section.s)

@@ -9,11 +9,11 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.roads.geometry.poses import AT_END, BEYOND, LEAST_STRETCH, STEP, lane_height, off_road
+from eidrive_scenario.roads.geometry.poses import BEYOND, LEAST_STRETCH, lane_height, off_road
 from eidrive_scenario.roads.model.curve_table import CurveTable
 from eidrive_scenario.roads.model.location import LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model.polynomials import PolynomialTable
-from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+from eidrive_scenario.roads.model.road_map import AT_END, STEP, Lane, LaneSection, Road
 
 
 class RoadTables:
@@ -207,7 +207,7 @@ class RoadTables:
             yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
-        """Return t of the center lines of lanes and its derivative, as `poses.lane_t`."""
+        """Return t of the center lines of lanes and its derivative, as `poses.lane_t` and `Road.lane_offset_in`."""
         section = self.lane_section[row]
         road = self.section_road[section]
         t, slope = self.lane_offset.value_and_slope(road, s)

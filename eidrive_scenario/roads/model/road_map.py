@@ -17,6 +17,9 @@ from eidrive_scenario.roads.model.curves import ReferenceLine
 from eidrive_scenario.roads.model.map_warnings import MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
 
+AT_END, STEP = 1e-6, 1e-3
+"""Distance before the end of a lane section at which its lanes end, and least step of a lane offset there [m]."""
+
 
 class Corner(msgspec.Struct, frozen=True):
     """Corner of the outline of an object: (s, t, dz) on the road, or (u, v, z) in the frame of the object."""
@@ -228,6 +231,17 @@ class Road:
     def section_at(self, s: float) -> LaneSection:
         """Return the lane section at s."""
         return self.sections[bisect_right(self.section_starts, s, 1) - 1]
+
+    def lane_offset_in(self, section: LaneSection, s: float) -> tuple[float, float]:
+        """Return the lane offset in a section at s, and its derivative.
+
+        A step at the end of the section belongs to the next one, in which the lanes have other numbers.
+        """
+        offset, slope = self.lane_offset.value_and_slope(s)
+        if s >= section.end - AT_END:
+            before = self.lane_offset.value_and_slope(s - AT_END)
+            return before if abs(before[0] - offset) > STEP else (offset, slope)
+        return offset, slope
 
 
 class Connection(msgspec.Struct, frozen=True):

@@ -18,6 +18,7 @@ from opendrive_xml import (
     successor_xml,
 )
 
+from eidrive_scenario.export.geometry import center_line
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, RouteError
 from eidrive_scenario.roads.routing.graph import cheapest_path
 
@@ -259,7 +260,7 @@ def test_cheapest_path_has_cost_of_networkx(seed: int) -> None:
 
 
 @pytest.mark.parametrize("step", [3.5, -3.5])
-def test_route_is_straight_where_lanes_are_numbered_anew_with_a_step_of_the_offset(step: float) -> None:
+def test_route_is_straight_at_a_step_of_the_lane_offset(step: float) -> None:
     """At 60 m a lane is added on the left and the lane offset increases by its width, as in maps of CARLA; or the other
     way around. The lane that goes on stays where it is."""
     few = section_xml("", lane_xml(-1, link='<successor id="-2"/>' if step > 0.0 else '<predecessor id="-2"/>'), s=0)
@@ -274,3 +275,6 @@ def test_route_is_straight_where_lanes_are_numbered_anew_with_a_step_of_the_offs
     route = roads.route(roads.location("1", start, 10.0), roads.location("1", end, 90.0))
     np.testing.assert_allclose(route.polyline(1.0)[:, 1], -1.75, atol=1e-9)
     assert route.length == pytest.approx(80.0)
+    section = roads.road("1").sections[0]
+    line = center_line(roads, roads.road("1"), section, section.lanes[start], 5.0)
+    np.testing.assert_allclose(np.array(line)[:, 1], -1.75, atol=1e-9)

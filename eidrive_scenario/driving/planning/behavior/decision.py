@@ -37,6 +37,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     inside_way,
     leading,
     proposals_for,
+    to_lane,
     towards,
     with_view,
 )
@@ -161,10 +162,6 @@ class Decider:
         self._brakes = False
         """Whether the last decision was emergency braking."""
 
-    @property
-    def _current_name(self) -> str:
-        return ROUTE if self._current is None else self._current.name
-
     def line_changed(self, shift: float | None, aside: float = 0.0) -> None:
         """Move the current maneuver to another line.
 
@@ -186,14 +183,14 @@ class Decider:
         """Return the best proposal."""
         settings = self._settings
         scene = self._scene(situation, settings)
-        merges = situation.change is not None and self._current_name == situation.change.name
-        self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
         current = self._continued(situation)
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._towards(situation, ROUTE, 0.0))
         change = situation.change
-        if change is not None and current.name == change.name:
+        merges = change is not None and current.name == change.name
+        self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
+        if change is not None and merges:
             scene = with_followers(scene, change.offset, situation.motion, self._body)
         elif change is not None and (motion := self._required_change(situation, scene, change)) is not None:
             profiles.append(motion)
@@ -319,6 +316,7 @@ class Decider:
         here = (self._front, situation.s, situation.speed)
         stops = [situation.stop] if situation.stop is not None else []
         change = situation.change
+        end = None if change is None else change.wall(self._front, self._settings.lateral_acceleration)
         for number, profile in enumerate(profiles):
             holds: list[Wall] = []
             if profile.uses_oncoming:
@@ -329,10 +327,10 @@ class Decider:
                     holds.append(Wall(place, math.inf, "wait for a free oncoming lane"))
                 if verdict is Verdict.GIVE_UP:
                     refused.add(number)
-            changes = change is not None and profile.name == change.name
-            sought = change if change is not None and situation.s >= change.begin and not changes else None
-            if change is not None and not changes:
-                holds.append(change.wall(self._front, self._settings.lateral_acceleration))
+            merges = change is not None and profile.name == change.name
+            if end is not None and not merges:
+                holds.append(end)
+            seeks_gap = change is not None and situation.s >= change.begin and not merges
             way = inside_way(scene, profile, self._half_width)
             for hold in holds:
                 way &= scene.rear < hold.s + self._front
@@ -344,28 +342,28 @@ class Decider:
                 self._settings,
                 emergency=self._emergency,
                 is_current=number == 0,
-                seeks_gap=sought is not None,
+                seeks_gap=seeks_gap,
             ):
                 kind = proposal.precedence
                 if kind not in reactions:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
-                time_gap = MERGING_TIME_GAP if changes else self._time_gap.value
+                time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
                 options.append(Option(proposal, profile, way, *reactions[kind], time_gap))
-            if sought is not None:
+            if change is not None and seeks_gap:
                 walls, leads = reactions["all"]
                 comfortable = self._settings.comfortable_deceleration
-                leads = leads | gap_leader(scene, sought.offset, situation.motion, self._body, comfortable)
+                leads = leads | gap_leader(scene, change.offset, situation.motion, self._body, comfortable)
                 gently = Proposal(number, 1.0, "all", comfortable)
                 options.append(Option(gently, profile, way, walls, leads, MERGING_TIME_GAP))
         start, body = (situation.s, situation.speed), (self._front, self._center)
         rolled = self._roller.roll(options, course, start, body, scene)
         late = None
-        if change is not None and situation.s >= change.begin:
+        if change is not None and end is not None and situation.s >= change.begin:
             desire = change.desire(situation.s, situation.wanted)
-            last = change.wall(self._front, self._settings.lateral_acceleration).s
-            ends = (last, situation.end)
-            late = costs_of_waiting(change, options, rolled, scene, self._times, desire, self._body, ends)
+            ends = (end.s, situation.end)
+            stays = np.array([option.profile.name != change.name for option in options])
+            late = stays * costs_of_waiting(change.offset, rolled, scene, self._times, desire, self._body, ends)
         evaluation = evaluate(
             options,
             rolled,
@@ -452,7 +450,9 @@ class Decider:
             scene, change.offset, situation.motion, body, MERGING_TIME_GAP
         ):
             return None
-        profile = change.profile(Start(*situation.steered, situation.speed), self._settings.lateral_acceleration)
+        profile = to_lane(
+            change.offset, Start(*situation.steered, situation.speed), self._settings.lateral_acceleration
+        )
         stops = [situation.stop] if situation.stop is not None else []
         s = self._motion(situation, scene, profile, stops, MERGING_TIME_GAP).s
         has_room = leaves_room(scene, change.offset, s[None], body, len(self._times))[0, 0]

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Start, Wall, change_length, towards
+from eidrive_scenario.driving.planning.behavior.proposals import Wall, change_length, lane_change_name
 from eidrive_scenario.driving.planning.behavior.reference import NARROWEST, ReferenceLine
 
 STRIDE = 2
@@ -32,12 +32,12 @@ class RouteLane(NamedTuple):
     """Lane before one of the changes of a path, or that after the last one.
 
     offsets     distances of its center to the left of the points of the path (M,) [m]
-    begin, end  indices of the points between which the vehicle may leave it; none after the last change
+    begin, end  indices of the points between which the vehicle may leave it; the last one after the last change
     """
 
     offsets: Array
     begin: int
-    end: int | None
+    end: int
 
 
 class LaneChange(msgspec.Struct, frozen=True):
@@ -52,18 +52,9 @@ class LaneChange(msgspec.Struct, frozen=True):
     offset: float
 
     @property
-    def side(self) -> int:
-        """1 to the left, -1 to the right."""
-        return 1 if self.offset > 0.0 else -1
-
-    @property
     def name(self) -> str:
         """Name of the maneuver."""
-        return f"change lane to the {'left' if self.side > 0 else 'right'}"
-
-    def profile(self, start: Start, lateral_acceleration: float) -> LateralProfile:
-        """Return the motion into the other lane."""
-        return towards(self.name, self.offset, start, lateral_acceleration, self.side)
+        return lane_change_name(self.offset)
 
     def wall(self, front: float, lateral_acceleration: float) -> Wall:
         """Return the place at which the vehicle stops if it finds no gap, with enough space to change from there.
@@ -98,7 +89,7 @@ def route_lanes(line: ReferenceLine) -> list[RouteLane]:
         earlier = None if number == 0 else (after[number - 1], crossings[number - 1][0])
         lanes.insert(0, RouteLane(_joined(earlier, before[number], index), min(begin, index), end))
         limit = end - round(ROOM / line.spacing)
-    return [*lanes, RouteLane(after[-1].offsets, last, None)] if crossings else []
+    return [*lanes, RouteLane(after[-1].offsets, last, last)] if crossings else []
 
 
 def _joined(earlier: tuple[_Lane, int] | None, lane: _Lane, index: int) -> Array:
@@ -117,16 +108,15 @@ def _joined(earlier: tuple[_Lane, int] | None, lane: _Lane, index: int) -> Array
 def _crossings(line: ReferenceLine) -> list[tuple[int, float, float]]:
     """Return the last points of a path in each lane that it leaves for a neighboring one of the same direction, with
     the offsets of the centers of the lane there and of the next one behind [m]."""
-    found = []
+    crossings = []
     here = line.lanes_of_direction(0)
     for index in range(STRIDE, len(line.points), STRIDE):
         then = line.lanes_of_direction(index)
-        changes = then.section == here.section and then.lane != here.lane and abs(then.own - here.own) > SAME_LANE
-        lasts = changes and _nearest(then.centers, here.own) is not None
-        if lasts and _nearest(here.centers, then.own) is not None:
-            found.append((index - STRIDE, here.own, then.own))
+        changes = then.key != here.key and then.key[:2] == here.key[:2] and abs(then.own - here.own) > SAME_LANE
+        if changes and None not in (_nearest(then.centers, here.own), _nearest(here.centers, then.own)):
+            crossings.append((index - STRIDE, here.own, then.own))
         here = then
-    return found
+    return crossings
 
 
 class _Lane(NamedTuple):

@@ -25,7 +25,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     Wall,
     change_length,
     passing,
-    towards,
+    to_lane,
 )
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
@@ -204,9 +204,7 @@ def passing_profiles(
     returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
     may_change = not math.isnan(faster) and returns
     if may_change and has_gap_now(scene, faster, situation.motion, body):
-        name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
-        start = Start(*situation.steered, situation.speed)
-        profiles.append(towards(name, faster, start, settings.lateral_acceleration, side=overtaking))
+        profiles.append(to_lane(faster, Start(*situation.steered, situation.speed), settings.lateral_acceleration))
     if obstacle is not None:
         # A moving vehicle is overtaken on one side only. With several lanes of its direction that is a change of lane:
         # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
@@ -247,9 +245,8 @@ def _evasions(
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
         if not (math.isnan(offset) or math.isnan(beyond)) and has_gap_now(scene, offset, situation.motion, body):
-            name = f"change lane to the {'left' if side > 0 else 'right'}"
             start = Start(*situation.steered, situation.speed)
-            evasions.append(towards(name, offset, start, settings.lateral_acceleration, side=side))
+            evasions.append(to_lane(offset, start, settings.lateral_acceleration))
     return evasions
 
 

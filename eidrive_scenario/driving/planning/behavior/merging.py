@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
-from eidrive_scenario.driving.planning.behavior.proposals import Body, Option
+from eidrive_scenario.driving.planning.behavior.oncoming import STOPPING_ERROR
+from eidrive_scenario.driving.planning.behavior.proposals import Body
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import WEIGHTS
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -25,15 +24,13 @@ ENTRY = 1.0
 """Time that a vehicle needs to the border of the lane to which it changes, in which a gap may become larger [s]."""
 BESIDE_LANE = 1.0
 """Distance from the center of a lane within which a body is in it [m]: half the width of a vehicle."""
-HARD_RESPONSE = 3.0
+REAR_RESPONSE = 3.0
 """Deceleration that the vehicle expects of traffic behind in the lane to which it changes [m/s²]."""
 MERGING_TIME_GAP, RELAXATION = 0.56, 25.0
 """Time gap at which a vehicle merges, and time constant of its return to its own [s], by LMRS (Schakel et al. 2012)."""
 LEAST_TIME_GAP, NEARLY = 0.2, 0.05
 """Time gap of a vehicle that has merged as long as another follows it closer than it follows itself, and difference to
 its own time gap at which it has that again [s]; choices."""
-OVERRUN = 0.5
-"""Distance by which the vehicle may stop too late at the end of its lane [m]."""
 BEYOND = np.arange(1.0, 17.0)
 """Times after the horizon at which a gap is expected where all keep their speeds [s]."""
 
@@ -95,7 +92,7 @@ def with_followers(scene: Surroundings, offset: float, motion: tuple[float, floa
     s, speed = motion
     gap = s - body.rear - scene.front[:, 0]
     closing = np.maximum(scene.speed[:, 0] - speed, 0.0)
-    follows = in_lane(scene, offset)[:, 0] & (gap > closing**2 / (2.0 * HARD_RESPONSE))
+    follows = in_lane(scene, offset)[:, 0] & (gap > closing**2 / (2.0 * REAR_RESPONSE))
     return msgspec.structs.replace(scene, behind=scene.behind | follows)
 
 
@@ -117,8 +114,7 @@ def gap_leader(
 
 
 def costs_of_waiting(
-    change: LaneChange,
-    options: Sequence[Option],
+    offset: float,
     rolled: Rollout,
     scene: Surroundings,
     times: Array,
@@ -128,6 +124,7 @@ def costs_of_waiting(
 ) -> Array:
     """Return the costs (P,) of the lane that the route leaves, which increase with the time until a gap is beside.
 
+    offset  distance of the center of the other lane to the left [m]
     desire  how urgent the change is, in [0, 1]
     ends    places at which the vehicle has to change at the latest, and at which the route ends [m]
     """
@@ -138,14 +135,13 @@ def costs_of_waiting(
     s = np.hstack([rolled.s[:, steps], np.minimum(rolled.s[:, -1:] + rolled.speed[:, -1:] * BEYOND, end)])
     speed = np.pad(rolled.speed[:, steps], ((0, 0), (0, len(BEYOND))), mode="edge")
     ahead = later(scene, steps, BEYOND)
-    gap = has_gap(ahead, change.offset, s, speed, body, MERGING_TIME_GAP) & (s <= last)
-    gap &= leaves_room(ahead, change.offset, s, body, horizon)
+    gap = has_gap(ahead, offset, s, speed, body, MERGING_TIME_GAP) & (s <= last)
+    gap &= leaves_room(ahead, offset, s, body, horizon)
     # A gap that passes by, faster or slower than the vehicle, is none: it has to last for some time.
     lasts = gap[:, :-1] & gap[:, 1:]
     first = np.where(lasts.any(axis=1), seconds[lasts.argmax(axis=1)], seconds[-1])
-    stays = np.array([option.profile.name != change.name for option in options])
-    overruns = rolled.s.max(axis=1) > last + OVERRUN
-    return np.asarray(stays * (WEIGHTS.stays + WEIGHTS.gap * desire * first / seconds[-1] + WEIGHTS.refused * overruns))
+    overruns = rolled.s.max(axis=1) > last + STOPPING_ERROR
+    return np.asarray(WEIGHTS.stays + WEIGHTS.gap * desire * first / seconds[-1] + WEIGHTS.refused * overruns)
 
 
 class TimeGap:

@@ -127,22 +127,21 @@ class BehaviorPlanner(RoutePlanner):
 
     def _line_of(self, path: PlannedPath, ego: EgoState) -> ReferenceLine:
         """Return the reference line of the path; the current maneuver continues on an extended path."""
-        before = self._line
+        before, aside = self._line, 0.0
         x, y, z = ego.position.tolist()
-        aside = 0.0
         if before is not None and before.path is path:
-            change = self._change(before, self._place_on(before, x, y)[0])
-            if change is None or abs(self._place_on(before, x, y)[1] - change.offset) > abs(change.offset) / 2.0:
+            aside = self._changed_by(before, x, y)
+            if not aside:
                 return before
-            aside = change.offset
             self._route_lanes = self._route_lanes[1:]
+            line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
         else:
-            goal = self._goal
+            line, goal = ReferenceLine(path, self.roads, z), self._goal
             is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
-            self._route_lanes = route_lanes(ReferenceLine(path, self.roads, z)) if is_route else []
-        line = self._line = ReferenceLine(
-            path, self.roads, z, self._route_lanes[0].offsets if self._route_lanes else None
-        )
+            self._route_lanes = route_lanes(line) if is_route else []
+            if self._route_lanes:
+                line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
+        self._line = line
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, line.path_limits, line.spacing, self.planner_settings)
         if self.observes_regions and self.roads is not None:
@@ -163,10 +162,18 @@ class BehaviorPlanner(RoutePlanner):
         """Return the lane change that the path requires next, at a distance along the line; None without one."""
         if len(self._route_lanes) < 2:
             return None
-        here, (offsets, _, _) = self._route_lanes[:2]
-        begin, end = (float(line.along[index]) for index in (here.begin, here.end or 0))
+        here, after = self._route_lanes[:2]
+        begin, end = (float(line.along[index]) for index in (here.begin, here.end))
         index = line.index_at(min(max(s, begin), end))
-        return LaneChange(begin, end, float(offsets[index] - here.offsets[index]))
+        return LaneChange(begin, end, float(after.offsets[index] - here.offsets[index]))
+
+    def _changed_by(self, line: ReferenceLine, x: float, y: float) -> float:
+        """Return the distance to the lane of the next change, to the left [m], if the vehicle is in it now; else 0."""
+        if len(self._route_lanes) < 2:
+            return 0.0
+        s, d = self._place_on(line, x, y)
+        change = self._change(line, s)
+        return change.offset if change is not None and abs(d - change.offset) < abs(change.offset) / 2.0 else 0.0
 
     def _caution(
         self, ego: EgoState, objects: Detections, line: ReferenceLine, s: float, wanted: float, now: float

@@ -153,6 +153,16 @@ def towards(name: str, value: float, start: Start, lateral_acceleration: float, 
     return LateralProfile(name, (s, s + length), (offset, value), slope, side)
 
 
+def to_lane(offset: float, start: Start, lateral_acceleration: float) -> LateralProfile:
+    """Return the change to the lane with its center at an offset."""
+    return towards(lane_change_name(offset), offset, start, lateral_acceleration, 1 if offset > 0.0 else -1)
+
+
+def lane_change_name(offset: float) -> str:
+    """Return the name of the change to a lane with its center at an offset."""
+    return f"change lane to the {'left' if offset > 0.0 else 'right'}"
+
+
 def passing(
     name: str,
     value: float,

@@ -11,7 +11,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.path import PlannedPath, path_heights
-from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
 
 NARROWEST = 2.5
@@ -73,14 +73,13 @@ class LanesBeside(NamedTuple):
 class LanesOfDirection(NamedTuple):
     """Lanes of the direction of the line at one of its points.
 
-    centers  distances of their centers to the left [m], from left to right;  own  that of the lane at the point
-    section  road and index of the lane section;  lane  number of the lane at the point
+    centers  distances of their centers to the left [m], from left to right
+    key, own  lane at the point, and the distance of its center
     """
 
-    centers: tuple[float, ...]
-    own: float
-    section: tuple[str, int]
-    lane: int
+    centers: tuple[float, ...] = ()
+    key: LaneKey = LaneKey("", 0, 0)
+    own: float = math.nan
 
 
 class ReferenceLine:
@@ -108,7 +107,7 @@ class ReferenceLine:
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}
         self._place: LaneLocation | None = None
-        self._directions: dict[int, LanesOfDirection] = {}
+        self._of_direction: dict[int, LanesOfDirection] = {}
 
     @property
     def path_limits(self) -> Array:
@@ -131,10 +130,12 @@ class ReferenceLine:
 
     def along_of(self, place: float) -> float:
         """Return the distance along the line at a distance along its path [m]."""
-        if self.points is self.path.points:
-            return place
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.path.points, axis=0).T))])
-        return float(np.interp(place, along, self.along))
+        return place if self.points is self.path.points else float(np.interp(place, self._along_path, self.along))
+
+    @cached_property
+    def _along_path(self) -> Array:
+        """Distances of the points along the path (M,) [m]."""
+        return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.path.points, axis=0).T))])
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""
@@ -173,21 +174,20 @@ class ReferenceLine:
 
     def lanes_of_direction(self, index: int) -> LanesOfDirection:
         """Return the lanes of the direction of the line at a point; none outside of roads."""
-        known = self._directions.get(index)
+        known = self._of_direction.get(index)
         if known is None:
-            known = self._directions[index] = self._centers_at(index)
+            known = self._of_direction[index] = self._centers_at(index)
         return known
 
     def _centers_at(self, index: int) -> LanesOfDirection:
         there = self._section_at(index)
         if there is None:
-            return LanesOfDirection((), math.nan, ("", 0), 0)
+            return LanesOfDirection()
         lanes, own = there.lanes, there.own
         first = next((n + 1 for n in range(own - 1, -1, -1) if not _is_usable(lanes[n])), 0)
         last = next((n for n in range(own + 1, len(lanes)) if not _is_usable(lanes[n])), len(lanes))
         centers = tuple([lane.center for lane in lanes[first:last] if 2.0 * lane.half_width >= NARROWEST])
-        section = self._roads.road(there.place.road).section_at(there.place.s).index if self._roads is not None else 0
-        return LanesOfDirection(centers, lanes[own].center, (there.place.road, section), lanes[own].number)
+        return LanesOfDirection(centers, there.key, lanes[own].center)
 
     def _section_at(self, index: int) -> _Section | None:
         """Return the lanes at a point of the line; None outside of roads."""
@@ -214,13 +214,14 @@ class ReferenceLine:
             center = (lane_t(road, section, lane, place.s)[0] - place.t) * sense
             half = lane.width.value(place.s - section.s) / 2.0
             lanes.append(_Lane(number, center, half, lane.drivable, roads.driving_direction(road.id, number) == sense))
-        return _Section(place, lanes, order.index(place.lane), road.rule == "LHT")
+        key = LaneKey(road.id, section.index, place.lane)
+        return _Section(place, key, lanes, order.index(place.lane), road.rule == "LHT")
 
     def _lanes_at(self, index: int) -> LanesBeside:
         there = self._section_at(index)
         if there is None or self._roads is None:
             return LanesBeside()
-        place, lanes, own, keeps_left = there
+        place, _, lanes, own, keeps_left = there
         if keeps_left:
             mirrored = [lane._replace(center=-lane.center) for lane in reversed(lanes)]
             beside = _beside(mirrored, len(lanes) - 1 - own).mirrored()
@@ -248,6 +249,7 @@ class _Section(NamedTuple):
     """Lanes at a point of the line from left to right, the index of that at the point, and the side of the traffic."""
 
     place: LaneLocation
+    key: LaneKey
     lanes: list[_Lane]
     own: int
     keeps_left: bool

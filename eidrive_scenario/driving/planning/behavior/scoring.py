@@ -43,7 +43,7 @@ class Weights(msgspec.Struct, frozen=True):
     gentle           of a stop for an uncertain object, which is only chosen for such an object
     refused          for an oncoming lane that is not free, or beyond the end of a lane; above any progress
     stays            for a lane that the route leaves, where the vehicle may change; above those of the change
-    gap              of the time until it may change, at its most urgent; below the progress of the whole horizon
+    gap              of the time until it may change, at its most urgent; as that of all progress
     view             in favor of a place with a view into the oncoming lane; above the progress to the obstacle
     crash            of a collision, above all other terms
     """

@@ -53,12 +53,12 @@ def drive(
 
 def clearance(run: PlannedDrive, traffic: Traffic) -> float:
     """Return the minimum distance from others along or across the road [m], negative after a contact."""
-    found = []
+    gaps = []
     for tick, (x, y, _) in enumerate(run.path):
         for box in traffic(tick * 0.05):
             along = abs(x + CAR.offset[0] - box.x) - (CAR.size[0] + box.size[0]) / 2.0
-            found.append(max(along, abs(y - box.y) - (CAR.size[1] + box.size[1]) / 2.0))
-    return min(found)
+            gaps.append(max(along, abs(y - box.y) - (CAR.size[1] + box.size[1]) / 2.0))
+    return min(gaps)
 
 
 def changed_at(run: PlannedDrive, y: float) -> tuple[float, float]:
@@ -188,7 +188,7 @@ def test_time_gap_increases_after_a_merge() -> None:
     assert gaps[1] == pytest.approx(2.0 + 1.2 * 12.0, abs=1.5), "rolling resistance and drag add to it"
 
 
-def test_slow_car_is_overtaken_well_before_a_later_lane_change_of_the_route() -> None:
+def test_slow_car_is_overtaken_before_a_later_lane_change() -> None:
     roads = road(2, 1200.0)
     run = PlannedDrive(behavior(roads, 14.0), roads, speed=14.0, y=LANE - WIDTH)
     way = np.array([[600.0, LANE - WIDTH, 0.0], [1100.0, LANE, 0.0]])

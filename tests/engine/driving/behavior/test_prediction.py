@@ -206,9 +206,9 @@ def test_vehicle_too_fast_for_its_only_lane_follows_it() -> None:
 def test_vehicle_that_passes_a_junction_straight_ahead_stays_in_its_lane(x: float) -> None:
     """At 12 m/s it does not turn, and the lanes of turns that it overlaps do not lead it out of that."""
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
-    found = Predictor(roads, TIMES).predict(known(KnownBox(x, 3.5, -12.0, yaw=math.pi)))
-    np.testing.assert_allclose(found.y, 3.5, atol=0.1)
-    np.testing.assert_allclose(found.x, np.tile(x - 12.0 * TIMES, (len(found.x), 1)), atol=0.2)
+    prediction = Predictor(roads, TIMES).predict(known(KnownBox(x, 3.5, -12.0, yaw=math.pi)))
+    np.testing.assert_allclose(prediction.y, 3.5, atol=0.1)
+    np.testing.assert_allclose(prediction.x, np.tile(x - 12.0 * TIMES, (len(prediction.x), 1)), atol=0.2)
 
 
 def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
@@ -220,5 +220,5 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     turn = next(course for course in courses if course.points[-1, 1] < -50.0)
     x, y, heading = (float(values[0]) for values in turn.poses(np.array([turn.place(52.0, 3.5)[0] + 6.0]), 0.0))
     box = KnownBox(x, y, 8.0 * math.cos(heading), 8.0 * math.sin(heading), yaw=heading)
-    found = predictor.predict(known(box))
-    assert (found.y[:, -1] < -20.0).any()
+    prediction = predictor.predict(known(box))
+    assert (prediction.y[:, -1] < -20.0).any()
