@@ -10,7 +10,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
-from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, may_pass, passing_profiles
+from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, extended, may_pass, passing_profiles
 from eidrive_scenario.driving.planning.behavior.merging import (
     MERGING_TIME_GAP,
     TimeGap,
@@ -115,6 +115,9 @@ CRUISE = Proposal(0, 1.0, "all", 4.0)
 """Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
 AT_REST, NEAR_PLACE = 0.1, 1.0
 """Speed of a vehicle that waits [m/s], and distance from its place of waiting [m]."""
+VIEW_TIME_GAP = 2.0
+"""Time gap behind a slower object at the border of the lane, from where the vehicle sees past it [s]: the two-second
+rule of the Highway Code (rule 126)."""
 HARDER = 0.3
 """Difference to a comfortable deceleration from which on braking is hard [m/s²]."""
 
@@ -183,7 +186,7 @@ class Decider:
         """Return the best proposal."""
         settings = self._settings
         scene = self._scene(situation, settings)
-        current = self._continued(situation)
+        current = extended(situation, scene, settings, self._body, self._continued(situation))
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._towards(situation, ROUTE, 0.0))
@@ -319,6 +322,7 @@ class Decider:
         end = None if change is None else change.wall(self._front, self._settings.lateral_acceleration)
         for number, profile in enumerate(profiles):
             holds: list[Wall] = []
+            verdict = Verdict.GO
             if profile.uses_oncoming:
                 profile, verdict, place = self._verified(situation, scene, profile, stops)
                 if verdict in (Verdict.WAIT, Verdict.FOLLOW):
@@ -349,6 +353,8 @@ class Decider:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
+                if verdict is Verdict.FOLLOW:
+                    time_gap = max(self._settings.time_gap, VIEW_TIME_GAP)
                 options.append(Option(proposal, profile, way, *reactions[kind], time_gap))
             if change is not None and seeks_gap:
                 walls, leads = reactions["all"]

@@ -217,6 +217,28 @@ def passing_profiles(
     return profiles
 
 
+def extended(
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, profile: LateralProfile
+) -> LateralProfile:
+    """Return a profile past standing objects with its end behind those that have come into view behind them.
+
+    It is the same if there are none, if they need more clearance to its side, or if the vehicle returns already.
+    """
+    side, end = profile.side, profile.places[-2] if len(profile.places) > 2 else -math.inf
+    blocker = _blocker(situation, scene, body)
+    if blocker is None or profile.last != 0.0 or not situation.steered[0] < end or blocker.rear > end + TOGETHER:
+        return profile
+    obstacle = _obstacle(situation, scene, settings, blocker, body)
+    if obstacle is None or obstacle.end <= end or max(one.speed for one in obstacle.objects) > ONCOMING_SPEED:
+        return profile
+    value = side * profile.values[-2]
+    outer, every = _sides(obstacle, side)
+    if outer + _clearance(situation, settings, obstacle) > value - body.half_width or value + body.half_width > every:
+        return profile
+    places = (*profile.places[:-2], obstacle.end, obstacle.end + profile.places[-1] - end)
+    return msgspec.structs.replace(profile, places=places)
+
+
 def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
     """Return the nearest hypothesis that comes towards the vehicle in the lane of its route."""
     center = situation.s + body.center
@@ -405,12 +427,10 @@ def _around(
     situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle, body: Body, side: int
 ) -> LateralProfile | None:
     """Return the motion past an obstacle on one side; None if that is too narrow."""
-    vulnerable = any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
-    clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
-    outer = max([side * one.d + one.half_width for one in obstacle.objects])
-    every = min(lanes.room(side)[1] for lanes in obstacle.beside)
+    clearance = _clearance(situation, settings, obstacle)
+    outer, every = _sides(obstacle, side)
     room = every - outer - 2.0 * body.half_width
-    if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
+    if room < (clearance + SPARE if _is_vulnerable(situation, obstacle) else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
     # As far beside the obstacle as it should be, else in the middle of the gap, else at the least clearance.
     beside = (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
@@ -431,6 +451,22 @@ def _around(
     border = min(_border(lanes, side, body) for lanes in obstacle.beside)
     fastest = max(one.speed for one in obstacle.objects)
     return msgspec.structs.replace(profile, border=border, overtakes=0.0 if stands else max(fastest, 0.0))
+
+
+def _is_vulnerable(situation: Situation, obstacle: _Obstacle) -> bool:
+    """Return whether a pedestrian or cyclist is among the objects."""
+    return any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
+
+
+def _clearance(situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle) -> float:
+    """Return the clearance that an obstacle should have [m]."""
+    return settings.pedestrian_margin if _is_vulnerable(situation, obstacle) else settings.lateral_margin
+
+
+def _sides(obstacle: _Obstacle, side: int) -> tuple[float, float]:
+    """Return the offsets of the side of an obstacle, and of the border of the road beside it, to one side [m]."""
+    outer = max(side * one.d + one.half_width for one in obstacle.objects)
+    return outer, min(lanes.room(side)[1] for lanes in obstacle.beside)
 
 
 def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:

@@ -32,16 +32,21 @@ PAUSE = 6.0
 """Time of waiting without oncoming traffic after which traffic out of view is expected to drive as fast as that in view
 did, or as the vehicle wants to, instead of at the speed limit [s]; of the order of the critical gaps of the Highway
 Capacity Manual (4.1 to 7.5 s)."""
-LONGEST_PAUSE = 2.0 * PAUSE
-"""Time of waiting without oncoming traffic after which the vehicle relies on others to respond [s]; a choice. Behind a
-standing object without a place to see from, it begins after twice this time: it would wait forever."""
+LONG, LONGEST = 2, 4
+"""Number of pauses without oncoming traffic after which the vehicle relies on others to respond; and after which it
+begins behind a standing object without a place to see from: it would wait forever. A choice."""
+HEADWAYS = 4.0 / 3.0
+"""Time since the last oncoming vehicle over the longest headway that was observed, up to which the traffic may go on; a
+choice."""
+LEAST_HEADWAY = 1.0
+"""Difference between expected arrivals that belong to different vehicles [s]."""
 SLOWEST = 0.5
 """Share of the wanted speed that traffic out of view is expected to drive at least."""
 FREE_TIME = 1.0
 """Time without an obstruction after which the vehicle does not wait any more [s]."""
 FARTHEST = 150.0
-"""Distance up to which a view into the oncoming lane is of use [m]: traffic at 50 km/h needs 11 s for it, about the
-duration of a maneuver from standstill."""
+"""Distance of the view into the oncoming lane for which the vehicle waits farther behind an object [m]: traffic at
+50 km/h needs 11 s for it, about the duration of a maneuver from standstill."""
 SAMPLE = 2.0
 """Spacing of the places on the oncoming lane that are checked for a view [m]."""
 RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
@@ -100,7 +105,7 @@ class OncomingTraffic:
     """
 
     def __init__(self, view: float, times: Array, body: Body, settings: BehaviorSettings) -> None:
-        self._ahead: Array = np.arange(SAMPLE, min(view, FARTHEST) + SAMPLE, SAMPLE)
+        self._ahead: Array = np.arange(SAMPLE, view + SAMPLE, SAMPLE)
         """Distances of the places that are checked for a view [m]."""
         self._times = times
         self._body = body
@@ -111,6 +116,10 @@ class OncomingTraffic:
         self._others_yield = False
         """Whether the current maneuver began without a sufficient view."""
         self._last = -math.inf
+        self._arrival = -math.inf
+        """Time at which the next oncoming vehicle in view is beside the vehicle, if this stands [s]."""
+        self._longest_headway = 0.0
+        """Longest time between the arrivals of oncoming vehicles [s]."""
         self._held_up_since: float | None = None
         self._held_up_until = -math.inf
         self._free_to, self._free_at = -math.inf, 0.0
@@ -129,6 +138,11 @@ class OncomingTraffic:
             self._last = now
             self._free_to = -math.inf if math.isinf(self._free_to) else self._free_to
             self._fastest = max(self._fastest, -float(scene.speed[is_oncoming, 0].min()))
+            arrival = now + float(((scene.front[is_oncoming, 0] - center) / -scene.speed[is_oncoming, 0]).min())
+            headway = arrival - self._arrival
+            if LEAST_HEADWAY < headway < math.inf:
+                self._longest_headway = max(self._longest_headway, headway)
+            self._arrival = arrival
         self._wanted = wanted
         self._usual = max(self._fastest, SLOWEST * wanted) if self._fastest else wanted
         if held_up:
@@ -143,10 +157,14 @@ class OncomingTraffic:
             return self._usual
         return max(beside.oncoming_limit, self._usual)
 
-    def _is_patient(self, now: float, pause: float = PAUSE) -> bool:
-        """Return whether the vehicle has waited for a pause [s], and no oncoming traffic came into view."""
+    def _is_patient(self, now: float, pauses: int = 1) -> bool:
+        """Return whether the vehicle has waited for a number of pauses, and no oncoming traffic came into view.
+
+        A pause is longer after sparse traffic, whose next vehicle may still be beyond the range of the sensors.
+        """
         since = max(self._last, now if self._held_up_since is None else self._held_up_since)
-        return now - since >= pause
+        in_view = float(self._ahead[-1]) / max(self._usual, ONCOMING_SPEED)
+        return now - since >= pauses * max(PAUSE, HEADWAYS * self._longest_headway - in_view)
 
     def line_changed(self, shift: float | None) -> None:
         """Move what is known to be free to another line, or forget it; `shift` as for `Decider.line_changed`."""
@@ -236,10 +254,17 @@ class OncomingTraffic:
         hidden = self.first_hidden(outlook, there, step)
         if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
             return refused
-        # Until then the vehicle may have to return to its lane.
-        returned, front = float(times[step] + duration[step]), there[0] + body.half_length
-        may_return = step <= first or self._suffices(free, here[0], returned, front, beside, now)
-        return Verdict.GO if may_return else refused
+        # Until then the vehicle may have to return to its lane for traffic that comes into view on its way out.
+        known, since, observer = free, 0.0, here[0]
+        for number in range(first, step + 1 if step > first else first):
+            time, s = float(times[number]), float(viewpoints[number])
+            returned = time + float(duration[number]) - since
+            if not self._suffices(known, observer, returned, s + body.half_length, beside, now):
+                return refused
+            hidden = self.first_hidden(outlook, (s, float(beside_line[number])), number)
+            known = max(hidden, known - self.hidden_speed(beside, now) * (time - since))
+            since, observer = time, s
+        return Verdict.GO
 
     def yields(self, outlook: Outlook, viewpoint: tuple[float, float], now: float, *, is_last_place: bool) -> bool:
         """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
@@ -249,12 +274,12 @@ class OncomingTraffic:
         """
         place = self.first_hidden(outlook, viewpoint)
         front = viewpoint[0] + self._body.half_length
-        has_waited_long = self._is_patient(now, LONGEST_PAUSE)
+        has_waited_long = self._is_patient(now, LONG)
         way = approach(self._usual, math.inf)
         if has_waited_long:
             way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
         is_patient = has_waited_long or (is_last_place and self._is_patient(now))
-        waits_in_vain = is_last_place and self._is_patient(now, 2.0 * LONGEST_PAUSE)
+        waits_in_vain = is_last_place and self._is_patient(now, LONGEST)
         self._others_yield = waits_in_vain or (is_patient and place - way >= front)
         return self._others_yield
 
@@ -290,7 +315,7 @@ class OncomingTraffic:
 
     def place_with_view(self, profile: LateralProfile, scene: Surroundings, oncoming: float, s: float) -> float:
         """Return the place of the front axle nearest to the passed objects from which the vehicle, at the edge of its
-        lane, sees the oncoming lane up to the range of its sensors [m].
+        lane, sees the oncoming lane up to the range of its sensors, at most `FARTHEST` [m].
 
         oncoming  center of the oncoming lane [m];  s  place of the reference point [m]
         """
@@ -298,7 +323,7 @@ class OncomingTraffic:
         edge = profile.border - 2.0 * AT_OFFSET  # with the error of the lateral control
         covered = float((profile.side * scene.d[rows, 0] + scene.half_width[rows, 0]).max(initial=edge)) - edge
         # The line of sight past the nearer corner of an object reaches the center of the lane at the range.
-        gap = float(self._ahead[-1]) * covered / max(profile.side * oncoming - edge, AT_OFFSET)
+        gap = min(float(self._ahead[-1]), FARTHEST) * covered / max(profile.side * oncoming - edge, AT_OFFSET)
         return float(scene.rear[rows, 0].min(initial=math.inf)) - gap + self._body.wheelbase - self._body.center
 
     def waiting_place(self, profile: LateralProfile, s: float) -> float:
