@@ -113,6 +113,25 @@ def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> No
     assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
 
 
+def test_pause_is_longer_after_vehicles_with_long_headways() -> None:
+    """Cars at 10 m/s are in view for 8 s before they pass. After headways of 12 s the next one may come within 16 s:
+    none has come into view for 8 s then."""
+    observed = traffic(80.0)
+    for now in np.arange(0.0, 20.05, 0.1):
+        cars = [(80.0 - 10.0 * (now - start), 3.5, -10.0) for start in (0.0, 12.0) if start <= now < start + 8.0]
+        observed.observe(scene(*cars), 0.0, 10.0, float(now), held_up=True)
+    assert observed.hidden_speed(BESIDE, 20.0 + PAUSE + 1.5) == 15.0
+    assert observed.hidden_speed(BESIDE, 20.0 + PAUSE + 2.5) == 10.0
+
+
+def test_column_with_short_headways_does_not_lengthen_the_pause() -> None:
+    observed = traffic(80.0)
+    for now in np.arange(0.0, 12.05, 0.1):
+        cars = [(80.0 - 10.0 * (now - start), 3.5, -10.0) for start in (0.0, 2.0, 4.0) if start <= now < start + 8.0]
+        observed.observe(scene(*cars), 0.0, 10.0, float(now), held_up=True)
+    assert observed.hidden_speed(BESIDE, 12.0 + PAUSE + 0.1) == 10.0
+
+
 @pytest.mark.parametrize(("start", "expected"), [(185.0, Verdict.GO), (175.0, Verdict.WAIT), (-40.0, Verdict.GO)])
 def test_traffic_in_view_must_not_meet_the_vehicle_before_its_return(start: float, expected: Verdict) -> None:
     """At -10 m/s, 1.5 s after the return at 9.5 s, its front 2.5 m ahead of its center is at that of the vehicle, at

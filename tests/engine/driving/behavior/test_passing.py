@@ -37,6 +37,25 @@ def test_row_of_parked_cars_longer_than_the_horizon_is_passed() -> None:
     assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
 
 
+def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
+    """Each car of a row of 36 m is visible from 25 m before the rear of the one before it. A car that comes at 10 m/s
+    is beside the vehicle 12 s after the start, and the next one 20 s later: enough for the whole row."""
+    row = [KnownBox(80.0 + 8.0 * number, LANE - 0.8) for number in range(5)]
+    roads = two_lane_road(600.0)
+    run = PlannedDrive(behavior(roads), roads)
+
+    def objects(now: float) -> list[KnownBox]:
+        x = run.path[-1][0] if run.path else 20.0
+        oncoming = [KnownBox(start - 10.0 * now, 1.75, vx=-10.0, yaw=math.pi) for start in (180.0, 380.0)]
+        return [*(car for number, car in enumerate(row) if not number or x > car.x - 33.0), *oncoming]
+
+    run.run(32.0, objects)
+    run.world.close()
+    assert run.front > 130.0
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
+    assert min(speed for place, _, speed in run.path if 80.0 < place < 112.0) > 3.0
+
+
 def test_standing_motorbike_is_passed() -> None:
     """The vehicle stops `passing_gap` farther away than the standstill gap of 2 m, and then passes."""
     bike = KnownBox(70.0, kind="motorbike", size=(2.2, 0.8))
