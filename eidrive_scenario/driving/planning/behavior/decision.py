@@ -162,8 +162,8 @@ class Decider:
         self._held_up = False
         self._passes = False
         """Whether the last decision was to pass in the oncoming lane, instead of waiting for it."""
-        self._brakes = False
-        """Whether the last decision was emergency braking."""
+        self._braking = 0.0
+        """Deceleration of emergency braking if that was the last decision [m/s²], else 0."""
 
     def line_changed(self, shift: float | None, aside: float = 0.0) -> None:
         """Move the current maneuver to another line.
@@ -254,12 +254,14 @@ class Decider:
 
     def _with_brake(self, options: Options, best: int) -> int:
         """Return the best proposal, or emergency braking if it was active and the best one still brakes hard."""
-        if self._brakes:
+        emergencies = {options.options[row].proposal.deceleration: row for row in options.emergencies}
+        if self._braking in emergencies and not options.options[best].proposal.is_emergency:
             steps = np.diff(options.rolled.speed[best]) / np.diff(self._times)
             hardest = float(steps[: round(URGENT / self._times[1])].min())
             if hardest < -RELEASE * self._settings.hard_deceleration:
-                best = options.emergency
-        self._brakes = options.options[best].proposal.is_emergency
+                best = emergencies[self._braking]
+        proposal = options.options[best].proposal
+        self._braking = proposal.deceleration if proposal.is_emergency else 0.0
         return best
 
     def _without_hard_braking(

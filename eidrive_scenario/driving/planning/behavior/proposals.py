@@ -231,6 +231,8 @@ def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings,
 Precedence = Literal["all", "earlier", "none"]
 """Crossing and merging traffic to which a proposal gives way: all of it, what arrives earlier, or none."""
 
+LEAST_EMERGENCY = 5.0
+"""Least deceleration of emergency braking [m/s²] (UN Regulation 152: 5 m/s² at least)."""
 SPEED_SHARES = (1.0, 0.7, 0.4)
 """Target speeds of proposals, as shares of the wanted speed."""
 TOWARDS_GAP = (0.95, 0.85, 0.7, 0.5, 0.3)
@@ -373,7 +375,8 @@ def proposals_for(
     if is_current:
         made.append(Proposal(profile, 0.0, "all", hard))
         made.append(Proposal(profile, 0.0, "all", settings.comfortable_deceleration, is_gentle=True))
-        made.append(Proposal(profile, 0.0, "all", emergency, is_emergency=True))
+        brakes = sorted({min(max(hard, LEAST_EMERGENCY), emergency), emergency})
+        made += [Proposal(profile, 0.0, "all", deceleration, is_emergency=True) for deceleration in brakes]
     return made
 
 

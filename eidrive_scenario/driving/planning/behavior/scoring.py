@@ -281,9 +281,9 @@ class Options(msgspec.Struct, frozen=True):
         return next(row for row, option in enumerate(self.options) if option.proposal.is_gentle)
 
     @property
-    def emergency(self) -> int:
-        """Index of emergency braking on the current course."""
-        return next(row for row, option in enumerate(self.options) if option.proposal.is_emergency)
+    def emergencies(self) -> list[int]:
+        """Indices of emergency braking on the current course, by deceleration."""
+        return [row for row, option in enumerate(self.options) if option.proposal.is_emergency]
 
     def name_of(self, row: int) -> str:
         """Return the maneuver of an option."""
@@ -298,12 +298,13 @@ class Options(msgspec.Struct, frozen=True):
         count = len(self.options) if profiles is None else profiles
         counts = [option.proposal.profile < count and name in (None, option.profile.name) for option in self.options]
         score = np.where(counts, self.evaluation.score, -math.inf)
-        brake = self.emergency
-        with_brake, score[brake] = float(score[brake]), -math.inf
+        brake = max(self.emergencies, key=score.__getitem__)
+        with_brake = float(score[brake])
+        score[self.emergencies] = -math.inf
         best = int(np.argmax(score))
         collision, risk = float(self.evaluation.collision[best]), float(self.evaluation.risk[best])
         is_urgent = collision < URGENT or risk > 1.0 - FARTHER * URGENT / self.horizon
-        return brake if is_urgent and with_brake > float(score[best]) else best
+        return brake if is_urgent and with_brake > score[best] else best
 
     def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int:
         """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard; -1 without one.
