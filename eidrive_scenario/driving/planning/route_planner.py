@@ -175,11 +175,16 @@ class RoutePlanner(Planner):
             return goal.speed
         if self.settings.target_speed is not None:
             return self.settings.target_speed
-        if self.settings.follow_speed_limit and self.roads is not None:
+        if self._follows_speed_limits(goal) and self.roads is not None:
             return self._speed_limit(ego, self.roads)
         if self._first_speed is None:
             self._first_speed = max(ego.speed, 0.0)
         return self._first_speed
+
+    def _follows_speed_limits(self, goal: Goal | None) -> bool:
+        """Return whether the speed limits of the road determine the target speed."""
+        is_given = self.settings.target_speed is not None or (goal is not None and goal.speed is not None)
+        return self.settings.follow_speed_limit and not is_given
 
     def _speed_limit(self, ego: EgoState, roads: RoadNetwork) -> float:
         """Return the speed limit of the lane at the vehicle [m/s], within the limit of the vehicle."""

@@ -75,9 +75,9 @@ def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, t
     if proposal.share < 1.0:
         return f"{maneuver}{chosen.walls[0].reason if chosen.walls else 'curve or end of route ahead'}", ()
     if LIMIT in causes and causes[0] != FREE:
-        hidden = situation.hidden_at(float(options.rolled.s[best, causes.index(LIMIT) + 1]))
-        if hidden:
-            return f"{maneuver}caution before a hidden {hidden}", ()
+        if situation.is_lowered_at(float(options.rolled.s[best, causes.index(LIMIT) + 1])):
+            lower = f"caution before a hidden {situation.hidden}" if situation.hidden else "lower speed limit ahead"
+            return f"{maneuver}{lower}", ()
         return f"{maneuver}curve or end of route ahead", ()
     return f"{maneuver}keep speed", ()
 

@@ -92,13 +92,13 @@ class Situation(msgspec.Struct, frozen=True):
         along = known.vx * math.cos(heading[0]) + known.vy * math.sin(heading[0])
         return bool(along < -ONCOMING_SPEED)
 
-    def hidden_at(self, s: float) -> str:
-        """Return the kind of the hidden way if such ways limit the speed at a distance along the line more than curves
-        and the end of the route; else an empty text."""
+    def is_lowered_at(self, s: float) -> bool:
+        """Return whether hidden ways or speed limits of the road limit the speed at a distance along the line more than
+        curves and the end of the route."""
         if self.road_limits is None:
-            return ""
+            return False
         limit, by_road = (float(np.interp(s, self.line.along, limits)) for limits in (self.limits, self.road_limits))
-        return self.hidden if limit < by_road else ""
+        return limit < by_road
 
     def rows_of(self, owner: int | None) -> tuple[int, ...]:
         """Return the row of an object among the fused objects; none if it is lost."""

@@ -86,6 +86,9 @@ class BehaviorPlanner(RoutePlanner):
         """Whether the last traffic light in sight was lit."""
         self._regions: Sequence[PerceptionRegion] = ()
         self._limits: Array = np.empty(0)
+        self._curve_limits: Array = np.empty(0)
+        self._limited: tuple[ReferenceLine | None, bool] = (None, False)
+        """Line of the limits, and whether they contain the speed limits of its lanes."""
         self._decision: Decision | None = None
         self._decided = -math.inf
         self._reasons: Array = np.empty((0, 2))
@@ -109,6 +112,7 @@ class BehaviorPlanner(RoutePlanner):
         x, y, _ = ego.position.tolist()
         path = self._advanced_path(ego, goal)
         line = self._line_of(path, ego)
+        self._limit(line, follows_signs=self._follows_speed_limits(goal))
         place = self._place_on(line, x, y)
         wanted = self._target_speed(ego, goal)
         if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
@@ -143,7 +147,6 @@ class BehaviorPlanner(RoutePlanner):
                 line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
         self._line = line
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
-        self._limits = speed_limits(line.curvature, line.path_limits, line.spacing, self.planner_settings)
         if self.observes_regions and self.roads is not None:
             if self._conflict_ways is None:
                 self._conflict_ways = ConflictWays(
@@ -157,6 +160,17 @@ class BehaviorPlanner(RoutePlanner):
         self._decision = None
         self._decider.line_changed(shift, aside)
         return line
+
+    def _limit(self, line: ReferenceLine, *, follows_signs: bool) -> None:
+        """Set the speed limits along a line; the vehicle slows down before lower ones."""
+        if self._limited == (line, follows_signs):
+            return
+        self._limited = line, follows_signs
+        own, curvature, spacing = self.planner_settings, line.curvature, line.spacing
+        self._limits = self._curve_limits = speed_limits(curvature, line.path_limits, spacing, own)
+        if follows_signs:
+            limits = np.minimum(line.path_limits, line.speed_limits)
+            self._limits = speed_limits(curvature, limits, spacing, own)
 
     def _change(self, line: ReferenceLine, s: float) -> LaneChange | None:
         """Return the lane change that the path requires next, at a distance along the line; None without one."""
@@ -254,7 +268,7 @@ class BehaviorPlanner(RoutePlanner):
             now=now,
             gives_way=self._gives_way(s),
             hidden=hidden,
-            road_limits=self._limits if hidden else None,
+            road_limits=self._curve_limits if hidden or self._limited[1] else None,
             change=self._change(line, s),
         )
         return self._decider.decide(situation)

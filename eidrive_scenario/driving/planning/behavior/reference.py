@@ -13,6 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.path import PlannedPath, path_heights
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
+from eidrive_scenario.roads.routing.graph import assumed_speed
 
 NARROWEST = 2.5
 """Minimum width of a lane to which the vehicle changes [m]."""
@@ -116,6 +117,20 @@ class ReferenceLine:
             return self.path.limits
         limits = np.full(len(self.points), np.inf)
         limits[-1] = self.path.limits[-1]
+        return limits
+
+    @cached_property
+    def speed_limits(self) -> Array:
+        """Speeds that the limits of the lanes at the points allow (M,) [m/s]; inf outside of roads."""
+        limits = np.full(len(self.points), np.inf)
+        roads = self._roads
+        if roads is None:
+            return limits
+        place = None
+        for index, (x, y) in enumerate(self.points.tolist()):
+            place = roads.locate_at(x, y, place, reach=5.0)
+            if place is not None:
+                limits[index] = assumed_speed(roads.speed_limit(place.road, place.s, place.lane))
         return limits
 
     @property

@@ -212,8 +212,8 @@ def test_reason_is_what_limits_the_speed() -> None:
         road_limits=curve,
     )
     # At 20 m the curve allows √(9 + 4 · 30) = 11.4 m/s, the lane √(25 + 4 · 10) = 8.1 m/s.
-    assert [situation.hidden_at(s) for s in (0.0, 20.0, 31.0, 60.0)] == ["lane", "lane", "", ""]
-    assert msgspec.structs.replace(situation, road_limits=None).hidden_at(20.0) == ""
+    assert [situation.is_lowered_at(s) for s in (0.0, 20.0, 31.0, 60.0)] == [True, True, False, False]
+    assert not msgspec.structs.replace(situation, road_limits=None).is_lowered_at(20.0)
 
 
 @cache
