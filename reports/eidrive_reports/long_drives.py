@@ -310,6 +310,11 @@ class LongDrive:
     stops: tuple[Stop, ...]
     hard_brakings: int
 
+    @property
+    def mean_speed(self) -> float:
+        """Mean speed, with the stops [m/s]."""
+        return self.distance / max(self.duration, 1.0)
+
 
 def run_of(job: Job) -> LongDrive:
     """Run a job and return its outcome."""
@@ -328,13 +333,17 @@ def run_of(job: Job) -> LongDrive:
     )
 
 
-def table(drives: Sequence[LongDrive]) -> str:
-    """Return the drives as a Markdown table, and a list of their long stops with the reason of the plan."""
+def table(drives: Sequence[LongDrive], free: Sequence[LongDrive]) -> str:
+    """Return the drives as a Markdown table, and a list of their long stops with the reason of the plan.
+
+    free  the same drives without background traffic
+    """
     columns = (
         "drive",
         "simulated time [s]",
         "distance [m]",
         "mean speed [m/s]",
+        "without traffic [m/s]",
         "hard brakings",
         "collisions",
         "by own fault",
@@ -344,13 +353,14 @@ def table(drives: Sequence[LongDrive]) -> str:
         "completed route",
     )
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
-    for drive in drives:
+    for drive, alone in zip(drives, free, strict=True):
         longest = max((stop.duration for stop in drive.stops), default=0.0)
         cells = (
             drive.scenario,
             f"{drive.duration:.0f}",
             f"{drive.distance:.0f}",
-            f"{drive.distance / max(drive.duration, 1.0):.1f}",
+            f"{drive.mean_speed:.1f}",
+            f"{alone.mean_speed:.1f}",
             drive.hard_brakings,
             int(drive.collided),
             int(drive.at_fault),
@@ -378,8 +388,8 @@ def minutes(text: str) -> float:
     return value
 
 
-def _jobs(options: argparse.Namespace, folder: Path, settings: RunSettings) -> list[Job]:
-    """Write the scenario of each map and seed and return its run."""
+def _jobs(options: argparse.Namespace, folder: Path) -> list[Job]:
+    """Write the scenario of each map and seed, and return its runs with and without background traffic."""
     jobs = []
     for road_map in options.maps:
         roads = RoadNetwork.load(road_map)
@@ -387,7 +397,13 @@ def _jobs(options: argparse.Namespace, folder: Path, settings: RunSettings) -> l
             path = folder / f"{road_map.stem}_{seed}.xosc"
             size = {"vehicles": options.vehicles, "minutes": options.minutes}
             write_town_drive(roads, path, road_map=road_map, seed=seed, **size)
-            jobs.append(Job(str(path), options.planner, seed, settings))
+            for traffic in (options.vehicles, 0):
+                settings = RunSettings(
+                    parameters={"Planner": options.planner, "Traffic": str(traffic)},
+                    criteria={"collision": {"of": EGO, "name": CONTACT}},
+                    time_limit=max(180.0 * options.minutes, 60.0),
+                )
+                jobs.append(Job(str(path), f"{traffic} vehicles", seed, settings))
     return jobs
 
 
@@ -403,17 +419,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     folder = options.out / "long_drives"
     folder.mkdir(parents=True, exist_ok=True)
-    settings = RunSettings(
-        parameters={"Planner": options.planner},
-        criteria={"collision": {"of": EGO, "name": CONTACT}},
-        time_limit=max(180.0 * options.minutes, 60.0),
-    )
     try:
-        jobs = _jobs(options, folder, settings)
+        jobs = _jobs(options, folder)
         drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
     except EidriveError as error:
         parser.error(str(error))
-    result = table(drives)
+    result = table(drives[::2], drives[1::2])
     with write_atomically(options.out / "long_drives.md") as stream:
         stream.write(result.encode())
     sys.stdout.write(result)

@@ -87,8 +87,9 @@ def test_signal_groups_are_green_one_after_the_other() -> None:
 def test_table_lists_long_stops_with_their_reason() -> None:
     stops = (Stop(10.0, 5.0, 1.0, 2.0, "follow car"), Stop(60.0, 25.0, 30.0, 40.0, "stop at traffic light 7"))
     drive = LongDrive("ring_1", 1, 600.0, 3000.0, True, False, 0.995, 0, stops, 3)
-    assert table([drive]).splitlines()[2:] == [
-        "| ring_1 | 600 | 3000 | 5.0 | 3 | 1 | 0 | 0 | 2 | 25 | 99.5 % |",
+    alone = LongDrive("ring_1", 1, 400.0, 3000.0, False, False, 1.0, 0, (), 0)
+    assert table([drive], [alone]).splitlines()[2:] == [
+        "| ring_1 | 600 | 3000 | 5.0 | 7.5 | 3 | 1 | 0 | 0 | 2 | 25 | 99.5 % |",
         "",
         "Stops of at least 20 s:",
         "",
@@ -104,9 +105,9 @@ def test_main_drives_a_ring_with_traffic_to_the_end(tmp_path: Path, capsys: pyte
     (row,) = capsys.readouterr().out.splitlines()[2:3]
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[0] == "ring_1"
-    assert cells[4:7] == ["0", "0", "0"]
+    assert cells[5:8] == ["0", "0", "0"]
     assert 180.0 < float(cells[2]) < 600.0
-    assert float(cells[10].rstrip(" %")) > 95.0
+    assert float(cells[11].rstrip(" %")) > 95.0
 
 
 @pytest.mark.parametrize(
