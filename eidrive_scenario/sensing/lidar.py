@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.sensing.crossing import crossing, starts_behind_bodies, turned
+from eidrive_scenario.sensing.ray_fan import FanHits, RayFan
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
-from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.view import NOTHING, WorldView
+from eidrive_scenario.world.actor import ActorSpec, Vector3
+from eidrive_scenario.world.surfaces import Surfaces
+from eidrive_scenario.world.view import GROUND, NOTHING, WorldView
 from eidrive_scenario.world.weather import Weather
 
 WAVELENGTH = 0.905
@@ -35,7 +37,7 @@ REFLECTIVITY: Mapping[str, float] = {
 """Diffuse reflectivity of bodies by class: values for car paint, metal, clothes and plastic within the measurements of
 Muckenhuber et al. (Automotive lidar modeling approach based on material properties and lidar capabilities, Sensors 20,
 2020)."""
-GROUND, WET_GROUND = 0.17, 0.06
+ASPHALT, WET_ASPHALT = 0.17, 0.06
 """Reflectivity of asphalt, buildings and other static objects, and of asphalt under water."""
 PULSE_LENGTH = 0.75
 """Half the distance that light travels during a pulse of 5 ns [m]: the depth of air whose light returns simultaneously.
@@ -80,7 +82,7 @@ def extinction(weather: Weather) -> float:
 
 def reflectivity(rows: NDArray[np.int64], categories: Sequence[str], wetness: float) -> Array:
     """Return the reflectivity (M,) of hit objects: rows of actors, negative for others."""
-    ground = GROUND + min(2.0 * wetness, 1.0) * (WET_GROUND - GROUND)
+    ground = ASPHALT + min(2.0 * wetness, 1.0) * (WET_ASPHALT - ASPHALT)
     table = np.array([*(REFLECTIVITY.get(category, REFLECTIVITY["misc"]) for category in categories), ground])
     return table[np.where(rows < 0, len(categories), rows)]
 
@@ -159,30 +161,22 @@ class Lidar(Sensor):
 
     def directions(self, time: float) -> Array:
         """Return unit vectors (M, 3) in the sensor frame of the rays since the last reading, and advance the head."""
-        return self._rays(self._columns(time))[0]
+        return self._directions(self._columns(time))
 
     def read(self, scene: Scene, view: WorldView, row: int) -> LidarReading:
         """Return a point cloud from the actor in this row."""
         settings = self.settings
         pose = self.mounting.pose(view, row)
-        directions, ring, azimuth = self._rays(self._columns(view.time))
-        rays = directions @ pose[:3, :3].T
-        origin = np.broadcast_to(pose[:3, 3], directions.shape)
-        targets = origin + settings.range * rays
-        clear, starts, near = self._beyond_own_body(origin, targets, view, row)
-        sensor_name = {"sensor": self.name} if view.unseen_by else {}
-        hits = scene.scan(row, pose[:3, 3], starts, targets[clear], near, **sensor_name)
-        rows = hits.rows
-        hit = rows != NOTHING
-        begin = np.linalg.norm(starts - pose[:3, 3], axis=1) if self._on_mast else 0.0
-        distance = np.where(hit, begin + hits.fraction * (settings.range - begin), np.inf)
-        weather = scene.weather
-        facing = np.abs(np.einsum("mi,mi->m", hits.normal, rays[clear]))
+        columns = self._columns(view.time)
+        hits = self._hits(columns, pose, scene, view, row)
+        rays = np.flatnonzero(hits.rows != row)
+        rows = hits.rows.ravel()[rays]
         seed, *key = self._key
         draws = generator(seed, *key, view.tick)
+        weather = scene.weather
         back = returns(
-            distance,
-            reflectivity(rows, view.categories, weather.wetness) * facing,
+            np.where(rows == NOTHING, np.inf, hits.distance.ravel()[rays]),
+            reflectivity(rows, view.categories, weather.wetness) * hits.facing.ravel()[rays],
             weather if settings.weather else _CLEAR,
             attenuation=settings.attenuation,
             ten_percent_range=settings.ten_percent_range,
@@ -192,45 +186,45 @@ class Lidar(Sensor):
         length = back.distance[kept]
         if settings.range_noise > 0.0:
             length = np.maximum(length + settings.range_noise * draws.standard_normal(len(kept)), 0.0)
-        selected = clear[kept]
+        selected = rays[kept]
+        column, ring = np.divmod(selected, len(self._elevations))
         return LidarReading(
-            directions[selected] * length[:, None], back.intensity[kept], pose, ring[selected], azimuth[selected]
+            self._directions(columns)[selected] * length[:, None],
+            back.intensity[kept],
+            pose,
+            ring.astype(np.int32),
+            self._azimuths(columns)[column],
         )
 
-    def _beyond_own_body(
-        self, origin: Array, targets: Array, view: WorldView, row: int
-    ) -> tuple[Integers, Array, NDArray[np.bool_]]:
-        """Return the rows (K,) of rays that do not hit the ego body, their starts, and whether they pass near it."""
-        if self._on_mast:
-            starts = starts_behind_bodies(origin[None], targets[None], view, np.array([row]))[0]
-            return np.arange(len(origin)), starts, np.zeros(len(origin), dtype=bool)
-        own, rows = view.boxes[row], np.array([row])
-        begin, end = (turned(points[None], view, rows, upright=True)[0] for points in (origin, targets))
-        around = own + np.array([0.0, 0.0, 0.0, *(2.0 * _NEAR,) * 3, 0.0])
-        near = np.flatnonzero(_meets(begin, end, around))
-        hit = near[_meets(begin[near], end[near], own)]
-        passes = np.zeros(len(origin), dtype=bool)
-        passes[near] = True
-        clear = np.delete(np.arange(len(origin)), hit)
-        return clear, origin[clear], passes[clear]
+    def _hits(self, columns: Integers, pose: Array, scene: Scene, view: WorldView, row: int) -> FanHits:
+        """Return the first hits of the rays of some columns."""
+        hits = FanHits(self._fan, columns % self._columns_per_turn, pose, self.settings.range)
+        hits.meet(scene.surfaces(), GROUND, np.eye(3), np.zeros(3))
+        extent = np.linalg.norm(view.offset, axis=1) + np.linalg.norm(view.size, axis=1) / 2.0
+        near = np.linalg.norm(view.position - pose[:3, 3], axis=1) < self.settings.range + extent
+        near[view.hidden_rows(self.name)] = False
+        near[row] = not self._on_mast
+        others = np.flatnonzero(near)
+        turns = rotation_matrix(view.yaw[others], view.pitch[others], view.roll[others])
+        for other, turn in zip(others.tolist(), turns, strict=True):
+            body = _body(tuple(view.size[other].tolist()), tuple(view.offset[other].tolist()))
+            hits.meet(body, other, turn, view.position[other])
+        return hits
 
-    def _columns(self, time: float) -> NDArray[np.int64]:
-        """Return the numbers of the columns since the last reading."""
+    def _columns(self, time: float) -> Integers:
+        """Return the numbers of the columns in the field of view since the last reading."""
         end = round(time * self._columns_per_second) + 1
         first = end - self._columns_per_turn if self._next is None else max(self._next, end - self._columns_per_turn)
         self._next = end
-        return np.arange(first, end)
-
-    def _rays(self, columns: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32], Array]:
-        """Return directions (M, 3) in the sensor frame, rings (M,) and azimuths (M,) in (-pi, pi] of the rays of
-        columns."""
-        azimuths = self._azimuths(columns)
+        columns = np.arange(first, end)
         if self.settings.field_of_view < 360.0:
-            inside = np.abs(azimuths) <= math.radians(self.settings.field_of_view) / 2.0 + 1e-9
-            columns, azimuths = columns[inside], azimuths[inside]
-        directions = self._turn.take(columns % self._columns_per_turn, axis=0).reshape(-1, 3)
-        rings = len(self._elevations)
-        return directions, np.tile(np.arange(rings, dtype=np.int32), len(azimuths)), np.repeat(azimuths, rings)
+            half = math.radians(self.settings.field_of_view) / 2.0 + 1e-9
+            columns = columns[np.abs(self._azimuths(columns)) <= half]
+        return columns
+
+    def _directions(self, columns: Integers) -> Array:
+        """Return directions (M, 3) in the sensor frame of the rays of columns."""
+        return self._turn.take(columns % self._columns_per_turn, axis=0).reshape(-1, 3)
 
     def _azimuths(self, columns: NDArray[np.int64]) -> Array:
         """Return the azimuths (C,) of columns in (-pi, pi]."""
@@ -245,6 +239,10 @@ class Lidar(Sensor):
         flat, up = np.cos(elevation), np.sin(elevation)
         return np.stack(np.broadcast_arrays(flat * np.cos(azimuth), flat * np.sin(azimuth), up), axis=-1)
 
+    @cached_property
+    def _fan(self) -> RayFan:
+        return RayFan(self._azimuths(np.arange(self._columns_per_turn)), self._elevations)
+
     def _not_dropped(self, intensity: Array, draws: np.random.Generator) -> NDArray[np.bool_]:
         settings = self.settings
         lost = np.full(len(intensity), settings.dropoff)
@@ -256,12 +254,11 @@ class Lidar(Sensor):
         return np.asarray(draws.random(len(intensity)) >= lost)
 
 
-def _meets(origins: Array, targets: Array, box: Array) -> NDArray[np.bool_]:
-    """Return whether rays (M, 3) meet a box (7,)."""
-    enter, leave = crossing(origins[None], targets[None], box[None])
-    return np.asarray(((enter < leave) & (leave > 0.0))[0])
+@lru_cache(maxsize=256)
+def _body(size: Vector3, offset: Vector3) -> Surfaces:
+    """Return the box of an actor in its frame."""
+    x, y, z = offset
+    return Surfaces.of_boxes(np.array([(x, y, z - size[2] / 2.0, *size, 0.0)]))
 
 
-_NEAR = 0.02
-"""Distance from the ego body within which only ray casts tell whether a ray hits it [m]."""
 _CLEAR = Weather(visual_range=1e12)

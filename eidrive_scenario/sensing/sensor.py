@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Protocol, Self
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import ViewSector
@@ -19,6 +18,7 @@ from eidrive_scenario.extensions.settings import settings_type_of, validate_by_k
 from eidrive_scenario.sensing.settings import CameraSettings, Mount, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.camera import Pinhole, Radiance, UndrawnImage
+from eidrive_scenario.world.surfaces import Surfaces
 from eidrive_scenario.world.view import RayHits, WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -114,13 +114,8 @@ class Scene(Protocol):
     def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHits:
         """Cast rays from (M, 3) to (M, 3) [m] for the sensor of this name, from which some actors may be hidden."""
 
-    def scan(
-        self, own: int, apex: Array, origins: Array, targets: Array, near: NDArray[np.bool_], *, sensor: str = ""
-    ) -> RayHits:
-        """Return the same as `raycast` for many rays on lines through one point (3,) of the actor in the row `own`.
-
-        near  (M,) rays that may hit this actor
-        """
+    def surfaces(self) -> Surfaces:
+        """Return the surfaces of the ground and of all static objects."""
 
     def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> Sequence[int]:
         """Return the same rows as `raycast`, for a few rays in scalar arithmetic."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import box_distance
@@ -29,9 +29,10 @@ from eidrive_scenario.world.physics.bullet import connect, disconnect
 from eidrive_scenario.world.physics.contacts import ContactTracker, Couplings
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.free_space import FreeSpace
-from eidrive_scenario.world.physics.rays import Crossings, cast_rays, cast_some, find_crossings, first_hits
+from eidrive_scenario.world.physics.rays import Crossings, cast_rays, find_crossings, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, signal_heads
+from eidrive_scenario.world.surfaces import Surfaces
 from eidrive_scenario.world.view import FEW, GROUND, NOTHING, Contact, RayHits, WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -262,14 +263,9 @@ class World:
         passed = [*map(self.view().row, ignore), *self.view().hidden_rows(sensor)]
         return cast_rays(self._client, origins, targets, self._actors.row_of_handle, passed)
 
-    def scan(
-        self, own: int, apex: Array, origins: Array, targets: Array, near: NDArray[np.bool_], *, sensor: str = ""
-    ) -> RayHits:
-        """Return the same as `raycast` for many rays on lines through one point of the actor `own`; see `Scene`."""
-        self._refresh()
-        view, table = self.view(), self._actors.row_of_handle
-        cast = near | self._free_space.may_meet(view, own, apex, targets)
-        return cast_some(self._client, origins, targets, table, view.hidden_rows(sensor), cast)
+    def surfaces(self) -> Surfaces:
+        """Return the surfaces of the ground and of all static objects."""
+        return self._scenery.surfaces()
 
     def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> list[int]:
         """Return the rows of the first hits of rays as `raycast` does, but faster for up to a thousand rays."""

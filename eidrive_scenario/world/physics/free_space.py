@@ -1,4 +1,4 @@
-"""Free space between two actors and along many rays from one point, found in plan view without rays."""
+"""Free space between two actors, found in plan view without rays."""
 
 from __future__ import annotations
 
@@ -6,59 +6,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import WorldView
 
-_BINS = 720
-"""Number of directions in plan view in which objects are searched."""
 MARGIN = 0.1
-"""Minimum distance of an object from free space, or from a ray that does not meet it [m]."""
-
-
-def may_meet(apex: Array, targets: Array, circles: Array) -> NDArray[np.bool_]:
-    """Return whether rays from a point (3,) above the plane z = 0 to targets (M, 3) may meet an object.
-
-    circles  (4, K) circles around the objects in plan view: center x, y and radius, and the top of the object [m]
-
-    A ray meets nothing above the tops of all objects in its direction, and nothing that is behind its end or the point
-    at which it meets the plane.
-    """
-    near, top = _nearest_and_highest(apex, circles)
-    x, y, rise = (targets - apex).T
-    length = np.hypot(x, y)
-    direction = ((np.arctan2(y, x) + math.pi) * (_BINS / (2.0 * math.pi))).astype(np.int64).clip(0, _BINS - 1)
-    near, top = near[direction], top[direction]
-    # Height of the ray at the nearest object in its direction
-    height = apex[2] + rise * np.minimum(near / np.maximum(length, 1e-9), 1.0)
-    met: NDArray[np.bool_] = (near <= length + MARGIN) & (height >= -MARGIN) & ((rise <= 0.0) | (height <= top))
-    met |= length < MARGIN
-    return met
-
-
-def _nearest_and_highest(apex: Array, circles: Array) -> tuple[Array, Array]:
-    """Return the distance of the nearest object in each direction, infinite without one, and the top of the highest."""
-    x, y, radius, top = circles
-    x, y, radius, top = x - apex[0], y - apex[1], radius + MARGIN, top + MARGIN
-    away = np.hypot(x, y)
-    half = np.where(away > radius, np.arcsin(np.minimum(radius / np.maximum(away, radius), 1.0)), math.pi)
-    center, scale = np.arctan2(y, x) + math.pi, _BINS / (2.0 * math.pi)
-    # Each circle covers the bins of the angles between its tangents, and one more on both sides for rounding.
-    first = np.floor((center - half) * scale).astype(np.int64) - 1
-    count = np.minimum(np.floor((center + half) * scale).astype(np.int64) + 2 - first, _BINS)
-    of = np.arange(len(count)).repeat(count)
-    bins = (first[of] + np.arange(len(of)) - (count.cumsum() - count)[of]) % _BINS
-    near, high = np.full(_BINS, np.inf), np.full(_BINS, -np.inf)
-    np.minimum.at(near, bins, np.maximum(away - radius, 0.0)[of])
-    np.maximum.at(high, bins, top[of])
-    return near, high
-
-
-FEW = 500
-"""Number of rays below which a search for objects in their directions takes longer than to cast them."""
+"""Minimum distance of an object from free space [m]."""
 APART = 1.0
 """Minimum distance between two actors with free space between them [m]."""
 
@@ -117,19 +72,6 @@ class FreeSpace:
             if not _is_separate(x, y, other, box):
                 return False
         return True
-
-    def may_meet(self, view: WorldView, own: int, apex: Array, targets: Array) -> NDArray[np.bool_]:
-        """Return whether rays from a point (3,) to targets (M, 3) may meet anything but the plane z = 0.
-
-        own  row of an actor that is ignored
-
-        All are True if few rays are given, if roads are not in the plane, or if an actor is not upright.
-        """
-        if len(targets) < FEW or apex[2] <= 0.0 or not (self._scenery.level and view.is_upright):
-            return np.ones(len(targets), dtype=bool)
-        x, y, z, length, width, height, _ = np.delete(view.boxes, own, axis=0).T
-        actors = np.stack([x, y, np.hypot(length, width) / 2.0, z + height / 2.0])
-        return may_meet(apex, targets, np.concatenate([actors, self._static()], axis=1))
 
     def _static(self) -> Array:
         if self._circles is None:

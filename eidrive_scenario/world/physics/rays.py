@@ -8,13 +8,13 @@ from operator import itemgetter
 
 import msgspec
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.world.physics.bullet import STATIC, TERRAIN, bullet
 from eidrive_scenario.world.physics.scenery import Scenery
-from eidrive_scenario.world.view import GROUND, NOTHING, RayHits, WorldView
+from eidrive_scenario.world.view import RayHits, WorldView
 
 _HANDLE, _FRACTION, _NORMAL = itemgetter(0), itemgetter(2), itemgetter(4)
 _BATCH = 16_000
@@ -55,43 +55,6 @@ def cast_rays(
             fraction[again] = np.where(handles < 0, 1.0, start + further * (1.0 - start))
     position = origins + fraction[:, None] * (targets - origins)
     return RayHits(rows, fraction, position, normal)
-
-
-def cast_some(
-    client: int,
-    origins: Array,
-    targets: Array,
-    row_of_handle: Integers,
-    passed: Sequence[int],
-    cast: NDArray[np.bool_],
-) -> RayHits:
-    """Return the same as `cast_rays` if all rays except those in `cast` (M,) meet the plane z = 0 or nothing."""
-    some = np.flatnonzero(cast)
-    found = cast_rays(client, origins[some], targets[some], row_of_handle, passed)
-    if len(some) == len(cast):
-        return found
-    rows, fraction = np.full(len(cast), NOTHING, dtype=found.rows.dtype), np.ones(len(cast))
-    normal = np.zeros((len(cast), 3))
-    rows[some], fraction[some], normal[some] = found.rows, found.fraction, found.normal
-    down = np.flatnonzero(~cast & (origins[:, 2] > 0.0) & (targets[:, 2] < 0.0))
-    rows[down] = GROUND
-    fraction[down], normal[down, 2] = plane_hits(origins[down], targets[down])
-    return RayHits(rows, fraction, origins + fraction[:, None] * (targets - origins), normal)
-
-
-def plane_hits(origins: Array, targets: Array) -> tuple[Array, Array]:
-    """Return the shares at which rays (M, 3) to (M, 3) meet the plane z = 0, and the z of the normals there.
-
-    All rays begin above the plane and end below it. The results have the rounding of pybullet, which meets a triangle
-    around the ray in the plane (`btStaticPlaneShape` and `btTriangleRaycastCallback` of Bullet 3).
-    """
-    low, high = np.minimum(origins, targets), np.maximum(origins, targets)
-    half, center = (high - low) * 0.5, (high + low) * 0.5
-    radius = np.sqrt((half[:, 0] * half[:, 0] + half[:, 1] * half[:, 1]) + half[:, 2] * half[:, 2])
-    x, y = center[:, 0], center[:, 1]
-    normal = ((x + radius) - (x - radius)) * ((y + radius) - (y - radius))
-    above, below = normal * origins[:, 2], normal * targets[:, 2]
-    return above / (above - below), normal * (1.0 / np.sqrt(normal * normal))
 
 
 def first_hits(

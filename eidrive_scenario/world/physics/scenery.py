@@ -27,6 +27,7 @@ from eidrive_scenario.world.physics.bullet import (
     create_triangle_shape,
 )
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
+from eidrive_scenario.world.surfaces import BOX_FACES, LEVEL_GROUND, Surfaces, box_corners
 
 Thing = TypeVar("Thing")
 Cell = tuple[int, int]
@@ -78,12 +79,6 @@ FOLIAGE = 0.8
 """Share of the extents of a crown or bush that is opaque."""
 CROWN = 0.3
 """Height of the lower end of a crown as a share of the height of the tree."""
-_SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
-_FACES = np.array(
-    [(0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6),
-     (3, 0, 4), (3, 4, 7)]
-)  # fmt: skip
-"""Faces of a box: four corners of the bottom, then four of the top."""
 
 
 class Obstacles:
@@ -173,21 +168,11 @@ def _foliage(piece: RoadObjectBody) -> Box:
 
 
 def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterator[int]:
-    for start in range(0, len(boxes), MAX_FACES // len(_FACES)):
-        table = np.array(boxes[start : start + MAX_FACES // len(_FACES)])
-        vertices = _corners(table)
-        faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
+    for start in range(0, len(boxes), MAX_FACES // len(BOX_FACES)):
+        vertices = box_corners(np.array(boxes[start : start + MAX_FACES // len(BOX_FACES)]))
+        faces = (BOX_FACES[None] + 8 * np.arange(len(vertices))[:, None, None]).reshape(-1, 3)
         shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
         yield create_static_body(client, shape, group, meets)
-
-
-def _corners(boxes: Array) -> Array:
-    """Return the corners (N, 8, 3) of boxes (N, 7)."""
-    along, lateral = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
-    cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
-    x, y = boxes[:, 0:1] + cos * along - sin * lateral, boxes[:, 1:2] + sin * along + cos * lateral
-    low = np.stack([x, y, np.broadcast_to(boxes[:, 2:3], x.shape)], axis=2)
-    return np.concatenate([low, low + boxes[:, None, 5:6] * (0.0, 0.0, 1.0)], axis=1)
 
 
 def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
@@ -217,6 +202,8 @@ _SPACING = 4.0
 """Distance of the points of the ground along a road [m]."""
 _SHORTEST = 4.0
 """Minimum length of a part of a body that has a separate circle [m]."""
+_NEIGHBORS = 32
+"""Number of triangles of the ground in a group of surfaces."""
 _MAX_KEPT = 2
 """Maximum number of road networks whose objects stay in the process."""
 
@@ -249,9 +236,21 @@ class RoadScenery:
     @cached_property
     def circles(self) -> Array:
         """Circles (4, K) in plan view that cover all bodies: center x, y, radius, and top of the body [m]."""
-        return covering_circles(
-            [*self.obstacles.solid_boxes, *self.obstacles.soft_boxes, *map(standing_box, self.buildings)]
-        )
+        return covering_circles(self._boxes)
+
+    @property
+    def _boxes(self) -> list[Box]:
+        return [*self.obstacles.solid_boxes, *self.obstacles.soft_boxes, *map(standing_box, self.buildings)]
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """Surfaces of the ground and of all bodies."""
+        if self._roads.is_level:
+            ground = LEVEL_GROUND
+        else:
+            triangles = [vertices[faces] for vertices, faces in self.ground]
+            ground = Surfaces.grouped(np.concatenate(triangles), _NEIGHBORS)
+        return Surfaces.joined(ground, Surfaces.of_boxes(np.array(self._boxes)))
 
     @cached_property
     def ground(self) -> Sequence[tuple[Array, Integers]]:
@@ -309,6 +308,7 @@ class Scenery:
         self.roads = roads
         self._of_roads = _shared_scenery(roads, frozenset(entities)) if roads is not None else None
         self.buildings: list[Building] = []
+        self._surfaces: Surfaces | None = None
         self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
         """Center and radius of each building in plan view [m]."""
         self._client = client
@@ -324,6 +324,7 @@ class Scenery:
 
     def add_buildings(self, buildings: Sequence[Building]) -> None:
         """Add buildings, which block vehicles and rays."""
+        self._surfaces = None
         for building in buildings:
             self.buildings.append(building)
             x, y, radius = building.center[0], building.center[1], math.hypot(building.size[0], building.size[1]) / 2
@@ -374,10 +375,21 @@ class Scenery:
 
     def circles(self) -> Array:
         """Return circles (4, K) in plan view that cover all static objects: center x, y, radius, and top [m]."""
-        if self._of_roads is None:
-            return covering_circles([standing_box(building) for building in self.buildings])
-        added = [standing_box(building) for building in self.buildings[len(self._of_roads.buildings) :]]
-        return np.concatenate([self._of_roads.circles, covering_circles(added)], axis=1)
+        added = covering_circles(self._added_boxes())
+        return added if self._of_roads is None else np.concatenate([self._of_roads.circles, added], axis=1)
+
+    def surfaces(self) -> Surfaces:
+        """Return the surfaces of the ground and of all static objects."""
+        if self._surfaces is None:
+            of_roads = LEVEL_GROUND if self._of_roads is None else self._of_roads.surfaces
+            added = self._added_boxes()
+            self._surfaces = Surfaces.joined(of_roads, Surfaces.of_boxes(np.array(added))) if added else of_roads
+        return self._surfaces
+
+    def _added_boxes(self) -> list[Box]:
+        """Return the buildings that the road network does not have."""
+        first = 0 if self._of_roads is None else len(self._of_roads.buildings)
+        return [standing_box(building) for building in self.buildings[first:]]
 
     def name_of(self, handle: int, position: Vector3) -> str:
         """Return the name of the object with this body in pybullet at a point of contact."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.camera import Pinhole, Radiance
+from eidrive_scenario.world.surfaces import LEVEL_GROUND, Surfaces
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -54,8 +55,10 @@ class BoxScene:
             normals.append(normal)
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
 
-    def scan(self, own: int, apex: Array, origins: Array, targets: Array, near: Array) -> Hits:
-        return self.raycast(origins, targets)
+    def surfaces(self) -> Surfaces:
+        standing = np.reshape(self.walls, (-1, 7)).astype(float)
+        standing[:, 2] -= standing[:, 5] / 2.0
+        return Surfaces.joined(*[LEVEL_GROUND] * self.ground, Surfaces.of_boxes(standing))
 
     def first_hit(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
         rows: list[int] = self.raycast(np.array(origins), np.array(targets)).rows.tolist()

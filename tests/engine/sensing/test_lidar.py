@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from eidrive_scenario.sensing.lidar import BACKSCATTER, CONTRAST, GROUND, REFLECTIVITY, Lidar, extinction, returns
+from eidrive_scenario.sensing.lidar import ASPHALT, BACKSCATTER, CONTRAST, REFLECTIVITY, Lidar, extinction, returns
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.world.weather import Weather
@@ -73,7 +73,7 @@ def test_intensity_is_reflectivity_times_cosine_times_attenuation(boxes: Any) ->
     points = found.points + found.pose[:3, 3]
     distance = np.linalg.norm(found.points, axis=1)
     ground = np.abs(points[:, 2]) < 1e-9
-    expected = GROUND * 1.9 / distance[ground] * np.exp(-0.01 * distance[ground])
+    expected = ASPHALT * 1.9 / distance[ground] * np.exp(-0.01 * distance[ground])
     np.testing.assert_allclose(found.intensity[ground], expected, rtol=1e-6)
     # The rear of the car, whose normal points back along its yaw of 0.6 rad; rays at angle c to the normal.
     normal = np.array([-math.cos(0.6), -math.sin(0.6)])
