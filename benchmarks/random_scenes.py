@@ -57,9 +57,10 @@ def random_scenes(count: int, seed: int) -> Iterator[Scene]:
             specs = []
             for row, (kind, box) in enumerate(objects):
                 shape = kind if row else "rsu" if station == "mast" else "car"
-                wheels = 0.0 if shape in ("rsu", "motorbike", "pedestrian") else 2.8
-                body = (box[3], box[4], box[5])
-                specs.append(ActorSpec(str(row), shape, kind, body, (0.0, 0.0, box[2]), wheelbase=wheels))
-                world.add(specs[-1], Placement(box[0], box[1], yaw=box[6]))
+                wheelbase = 0.0 if shape in ("rsu", "motorbike", "pedestrian") else 0.6 * box[3]
+                back, body = wheelbase / 2.0, (box[3], box[4], box[5])
+                specs.append(ActorSpec(str(row), shape, kind, body, (back, 0.0, box[2]), wheelbase=wheelbase))
+                x, y = box[0] - back * math.cos(box[6]), box[1] - back * math.sin(box[6])
+                world.add(specs[-1], Placement(x, y, yaw=box[6]))
             readings = Rig(specs[0], {"lidar": LidarSettings()}, seed=seed).read(world, world.view())
         yield Scene(readings, tuple(kind for kind, _ in objects[1:]), np.array([box for _, box in objects[1:]]))

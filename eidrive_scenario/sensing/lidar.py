@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import ClassVar, NamedTuple
 
@@ -13,30 +12,17 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.sensing.bodies import body_surfaces
 from eidrive_scenario.sensing.ray_fan import FanHits, RayFan
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
-from eidrive_scenario.world.actor import ActorSpec, Vector3
-from eidrive_scenario.world.surfaces import Surfaces
+from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import GROUND, NOTHING, WorldView
 from eidrive_scenario.world.weather import Weather
 
 WAVELENGTH = 0.905
 """Wavelength [µm]."""
-REFLECTIVITY: Mapping[str, float] = {
-    "car": 0.45,
-    "truck": 0.50,
-    "bus": 0.50,
-    "van": 0.50,
-    "motorbike": 0.25,
-    "bicycle": 0.20,
-    "pedestrian": 0.35,
-    "misc": 0.40,
-}
-"""Diffuse reflectivity of bodies by class: values for car paint, metal, clothes and plastic within the measurements of
-Muckenhuber et al. (Automotive lidar modeling approach based on material properties and lidar capabilities, Sensors 20,
-2020)."""
 ASPHALT, WET_ASPHALT = 0.17, 0.06
 """Reflectivity of asphalt, buildings and other static objects, and of asphalt under water."""
 PULSE_LENGTH = 0.75
@@ -78,13 +64,6 @@ def extinction(weather: Weather) -> float:
     else:
         power = 0.585 * kilometers ** (1.0 / 3.0)
     return float(weather.fog_extinction * (WAVELENGTH / 0.55) ** -power + weather.precipitation_extinction)
-
-
-def reflectivity(rows: NDArray[np.int64], categories: Sequence[str], wetness: float) -> Array:
-    """Return the reflectivity (M,) of hit objects: rows of actors, negative for others."""
-    ground = ASPHALT + min(2.0 * wetness, 1.0) * (WET_ASPHALT - ASPHALT)
-    table = np.array([*(REFLECTIVITY.get(category, REFLECTIVITY["misc"]) for category in categories), ground])
-    return table[np.where(rows < 0, len(categories), rows)]
 
 
 def returns(
@@ -174,9 +153,10 @@ class Lidar(Sensor):
         seed, *key = self._key
         draws = generator(seed, *key, view.tick)
         weather = scene.weather
+        static = ASPHALT + min(2.0 * weather.wetness, 1.0) * (WET_ASPHALT - ASPHALT)
         back = returns(
             np.where(rows == NOTHING, np.inf, hits.distance.ravel()[rays]),
-            reflectivity(rows, view.categories, weather.wetness) * hits.facing.ravel()[rays],
+            np.where(rows == GROUND, static, 1.0) * hits.brightness.ravel()[rays],
             weather if settings.weather else _CLEAR,
             attenuation=settings.attenuation,
             ten_percent_range=settings.ten_percent_range,
@@ -207,8 +187,8 @@ class Lidar(Sensor):
         others = np.flatnonzero(near)
         turns = rotation_matrix(view.yaw[others], view.pitch[others], view.roll[others])
         for other, turn in zip(others.tolist(), turns, strict=True):
-            body = _body(tuple(view.size[other].tolist()), tuple(view.offset[other].tolist()))
-            hits.meet(body, other, turn, view.position[other])
+            name = view.names[other]
+            hits.meet(body_surfaces(scene.spec(name), scene.motion(name)), other, turn, view.position[other])
         return hits
 
     def _columns(self, time: float) -> Integers:
@@ -252,13 +232,6 @@ class Lidar(Sensor):
         elif settings.dropoff == 0.0:
             return np.ones(len(intensity), dtype=bool)
         return np.asarray(draws.random(len(intensity)) >= lost)
-
-
-@lru_cache(maxsize=256)
-def _body(size: Vector3, offset: Vector3) -> Surfaces:
-    """Return the box of an actor in its frame."""
-    x, y, z = offset
-    return Surfaces.of_boxes(np.array([(x, y, z - size[2] / 2.0, *size, 0.0)]))
 
 
 _CLEAR = Weather(visual_range=1e12)

@@ -47,7 +47,7 @@ class FanHits:
 
     rows      (C, R) row of the hit, NOTHING without one
     distance  (C, R) distance of the hit, `reach` without one [m]
-    facing    (C, R) cosine of the angle between ray and normal
+    brightness  (C, R) reflectivity of the surface times the cosine of the angle between ray and normal
     """
 
     def __init__(self, fan: RayFan, columns: Integers, pose: Array, reach: float) -> None:
@@ -59,26 +59,29 @@ class FanHits:
         shape = len(columns), len(fan.order)
         self.rows = np.full(shape, NOTHING)
         self.distance = np.full(shape, reach)
-        self.facing = np.zeros(shape)
+        self.brightness = np.zeros(shape)
 
     def meet(self, surfaces: Surfaces, row: int, rotation: Array, position: Array) -> None:
         """Add the hits on surfaces with this rotation (3, 3) and position (3,) in the world."""
         fan = self._fan
         _meet(
-            surfaces.triangles, surfaces.first, surfaces.spheres, np.ascontiguousarray(self._to_sensor @ rotation),
+            surfaces.triangles, surfaces.first, surfaces.spheres, surfaces.reflectivity, surfaces.closed,
+            np.ascontiguousarray(self._to_sensor @ rotation),
             self._to_sensor @ (position - self._origin), row, self._reach, fan.columns, fan.table, self._slots,
-            fan.rings, fan.order, self.rows, self.distance, self.facing,
+            fan.rings, fan.order, self.rows, self.distance, self.brightness,
         )  # fmt: skip
 
 
 @kernel(
-    "void(f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[::1], i8, f8, f8[:,::1], i8[::1], i8[::1], f8[:,::1], "
-    "i8[::1], i8[:,::1], f8[:,::1], f8[:,::1])"
+    "void(f8[:,:,::1], i8[::1], f8[:,::1], f8[::1], b1, f8[:,::1], f8[::1], i8, f8, f8[:,::1], i8[::1], i8[::1], "
+    "f8[:,::1], i8[::1], i8[:,::1], f8[:,::1], f8[:,::1])"
 )
 def _meet(
     triangles: Array,
     first: Integers,
     spheres: Array,
+    reflectivity: Array,
+    closed: bool,
     rotation: Array,
     shift: Array,
     row: int,
@@ -90,7 +93,7 @@ def _meet(
     order: Integers,
     rows: Integers,
     distance: Array,
-    facing: Array,
+    brightness: Array,
 ) -> None:
     """Replace hits by nearer ones on triangles, which `rotation` and `shift` move into the frame of the sensor.
 
@@ -106,10 +109,12 @@ def _meet(
             ax, ay, az = _moved(triangles[triangle, 0], rotation, shift)
             bx, by, bz = _moved(triangles[triangle, 1], rotation, shift)
             cx, cy, cz = _moved(triangles[triangle, 2], rotation, shift)
-            # Normals of the planes through the origin and an edge, whose sum is normal to the triangle. Seen from the
-            # other side, all are reversed.
+            # Normals of the planes through the origin and an edge, whose sum is normal to the triangle. Seen from
+            # inside, all are reversed: the volume is positive.
             ux, uy, uz = _cross(bx, by, bz, cx, cy, cz)
             volume = ax * ux + ay * uy + az * uz
+            if volume > 0.0 and closed:
+                continue
             if volume < 0.0:
                 bx, by, bz, cx, cy, cz = cx, cy, cz, bx, by, bz
                 ux, uy, uz, volume = -ux, -uy, -uz, -volume
@@ -148,7 +153,7 @@ def _meet(
                     if ahead > 0.0 and volume < ahead * distance[slot, place]:
                         rows[slot, place] = row
                         distance[slot, place] = volume / ahead
-                        facing[slot, place] = ahead / math.sqrt(square)
+                        brightness[slot, place] = reflectivity[triangle] * ahead / math.sqrt(square)
                     ring += 1
 
 

@@ -114,6 +114,12 @@ class Scene(Protocol):
     def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHits:
         """Cast rays from (M, 3) to (M, 3) [m] for the sensor of this name, from which some actors may be hidden."""
 
+    def spec(self, name: str) -> ActorSpec:
+        """Return the specification of an actor."""
+
+    def motion(self, name: str) -> str:
+        """Return the motion of a pedestrian by the standard; empty if it is not specified."""
+
     def surfaces(self) -> Surfaces:
         """Return the surfaces of the ground and of all static objects."""
 

@@ -21,39 +21,47 @@ class Surfaces(msgspec.Struct, frozen=True):
     triangles  (K, 3, 3) corners [m]
     first      (G + 1,) first triangle of each group, and K
     spheres    (G, 4) sphere around each group: center and radius [m]
+    reflectivity  (K,) share of light that is reflected diffusely, relative to other surfaces of the same kind
+    closed     whether the triangles form closed skins, counter-clockwise seen from outside
     """
 
     triangles: Array
     first: Integers
     spheres: Array
+    reflectivity: Array
+    closed: bool = False
 
     @classmethod
-    def grouped(cls, triangles: Array, size: int) -> Surfaces:
+    def group(cls, triangles: Array, size: int, reflectivity: Array | None = None, *, closed: bool = False) -> Surfaces:
         """Return triangles (K, 3, 3) in groups of `size` in their order."""
+        if reflectivity is None:
+            reflectivity = np.ones(len(triangles))
         first = np.append(np.arange(0, len(triangles), size), len(triangles))
         if not len(triangles):
-            return cls(triangles, np.zeros(1, dtype=np.int64), np.zeros((0, 4)))
+            return cls(triangles, np.zeros(1, dtype=np.int64), np.zeros((0, 4)), reflectivity, closed)
         low = np.minimum.reduceat(triangles.min(axis=1), first[:-1])
         high = np.maximum.reduceat(triangles.max(axis=1), first[:-1])
         center = (low + high) / 2.0
         away = np.linalg.norm(triangles - center.repeat(np.diff(first), axis=0)[:, None], axis=2).max(axis=1)
         radius = np.maximum.reduceat(away, first[:-1])
-        return cls(np.ascontiguousarray(triangles), first, np.column_stack([center, radius]))
+        spheres = np.column_stack([center, radius])
+        return cls(np.ascontiguousarray(triangles), first, spheres, reflectivity, closed)
 
     @classmethod
     def of_boxes(cls, boxes: Array) -> Surfaces:
         """Return the surfaces of boxes (N, 7): center of the bottom x, y, z, length, width, height [m], heading."""
-        return cls.grouped(box_corners(boxes)[:, BOX_FACES].reshape(-1, 3, 3), len(BOX_FACES))
+        return cls.group(box_corners(boxes)[:, BOX_FACES].reshape(-1, 3, 3), len(BOX_FACES))
 
     @classmethod
-    def joined(cls, *parts: Surfaces) -> Surfaces:
-        """Return the surfaces of all parts."""
+    def join(cls, *parts: Surfaces) -> Surfaces:
+        """Return the surfaces of all parts, none of which counts as closed."""
         start = np.cumsum([0, *(len(part.triangles) for part in parts)])
         first = [part.first[:-1] + begin for part, begin in zip(parts, start[:-1], strict=True)]
         return cls(
             np.concatenate([part.triangles for part in parts]),
             np.concatenate([*first, start[-1:]]),
             np.concatenate([part.spheres for part in parts]),
+            np.concatenate([part.reflectivity for part in parts]),
         )
 
 
@@ -68,7 +76,7 @@ def box_corners(boxes: Array) -> Array:
 
 
 _FAR = 1e7
-LEVEL_GROUND = Surfaces.grouped(
+LEVEL_GROUND = Surfaces.group(
     np.array([(-_FAR, -_FAR, 0.0), (_FAR, -_FAR, 0.0), (_FAR, _FAR, 0.0), (-_FAR, _FAR, 0.0)])[[(0, 1, 2), (0, 2, 3)]],
     2,
 )

@@ -140,6 +140,11 @@ class World:
         """Return the specification of an actor. Raise SimulationError if it is not present."""
         return self._body(name).spec
 
+    def motion(self, name: str) -> str:
+        """Return the motion of a pedestrian by the standard; empty if it is not specified."""
+        appearance = self._appearances.get(name)
+        return appearance.motion if appearance is not None else ""
+
     def add(self, spec: ActorSpec, placement: Placement, *, driven: bool = False) -> None:
         """Add an actor. Raise SimulationError if an actor with this name is present."""
         if spec.name in self._bodies:

@@ -18,8 +18,8 @@ from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
 HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
 """Tested headings of the first axis [rad]."""
 _COS, _SIN = np.cos(HEADINGS), np.sin(HEADINGS)
-CLOSEST = 0.03
-"""Minimum distance from an edge that counts [m]."""
+CLOSEST = 0.2
+"""Minimum distance from an edge that counts [m]: the sides of bodies are not flat."""
 MOST_POINTS = 300
 """Maximum number of points in the search for the heading; the extent uses all points."""
 AS_GOOD = 0.9
@@ -144,8 +144,8 @@ def complete_span(span: Span, mean: float, deviation: float) -> tuple[float, flo
     return size, middle, spread / 4.0 + RANGE_NOISE**2
 
 
-THIN = 3.0 * RANGE_NOISE
-"""Maximum extent of points that may be those of a surface across the axis [m]."""
+THIN = 0.4
+"""Maximum extent of points that may be those of one side across the axis [m]: of a rounded end or a sloping window."""
 SHAPELESS = 0.4
 """Maximum size of a rectangle around points that show no heading [m]."""
 FEW_COLUMNS = 1.6
@@ -160,6 +160,9 @@ POOR_FIT = 9.0
 three sizes, three in a hundred objects of the class exceed it."""
 ABOVE_TOP = 0.3
 """Height of a sensor above an object from which its top is visible [m]."""
+DROP, TRUNK = 0.35, 1.0
+"""Height of the top above the lower ends of an object, as a share, and maximum length of these [m]: a roof hides the
+trunk or the hood behind it."""
 
 
 @dataclass(frozen=True)
@@ -338,7 +341,9 @@ def _spans(
             outwards = abs(ax * x + ay * y) / distance
             rings = pattern.elevation * (distance**2 + over**2) / over
             columns = pattern.azimuth * distance
-            spacing = min(spacing, outwards * rings + math.sqrt(1.0 - min(outwards**2, 1.0)) * columns)
+            lower_end = min(DROP * top * distance / over, TRUNK)
+            across = math.sqrt(1.0 - min(outwards**2, 1.0))
+            spacing = min(spacing, outwards * (rings + lower_end) + across * columns)
         open_low, open_high = not low > 0.0, not high < 0.0
         ends = _hidden_ends(points[:, :2], (ax, ay), low, high, hidden)
         depth = shape.high[1 - axis] - shape.low[1 - axis]

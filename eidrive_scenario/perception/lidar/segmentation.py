@@ -123,8 +123,8 @@ def _plane(plan: Array, rise: Array) -> Array:
 
 CELL = 0.1
 """Size of the cells in plan view whose points are merged beforehand [m]."""
-NEAREST = 0.5
-"""Maximum distance of points that always belong to one cluster [m]."""
+NEAREST = 0.8
+"""Maximum distance of points that always belong to one cluster [m]: windows, which return nothing, leave such gaps."""
 COLUMNS = 2.0
 """Maximum number of gaps between neighboring columns of rays within a cluster, at larger distances."""
 NEXT_COLUMN = 1.5

@@ -33,11 +33,12 @@ def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
     """Return triangles (K, 3, 3) of an actor by material: origin at the center of its box on the ground, x forward [m].
 
     A truck without a front axle is a trailer. A pedestrian stands, walks or lies by its motion, a value of the
-    standard.
+    standard. Axles beyond the ends of the box are moved so that their wheels are in it.
     """
     length, width, height = spec.size
     if spec.wheelbase > 0.0:
-        rear, front, radius = -spec.offset[0], spec.wheelbase - spec.offset[0], spec.wheel_radius
+        radius, most = spec.wheel_radius, length / 2 - spec.wheel_radius
+        rear, front = max(-spec.offset[0], -most), min(spec.wheelbase - spec.offset[0], most)
     else:
         rear, front, radius = -0.3 * length, 0.3 * length, min(0.35, 0.3 * height)
     shape, extra = spec.shape, tuple(replace(axle, x=axle.x - spec.offset[0]) for axle in spec.extra_axles)

@@ -249,8 +249,8 @@ class RoadScenery:
             ground = LEVEL_GROUND
         else:
             triangles = [vertices[faces] for vertices, faces in self.ground]
-            ground = Surfaces.grouped(np.concatenate(triangles), _NEIGHBORS)
-        return Surfaces.joined(ground, Surfaces.of_boxes(np.array(self._boxes)))
+            ground = Surfaces.group(np.concatenate(triangles), _NEIGHBORS)
+        return Surfaces.join(ground, Surfaces.of_boxes(np.array(self._boxes)))
 
     @cached_property
     def ground(self) -> Sequence[tuple[Array, Integers]]:
@@ -383,7 +383,7 @@ class Scenery:
         if self._surfaces is None:
             of_roads = LEVEL_GROUND if self._of_roads is None else self._of_roads.surfaces
             added = self._added_boxes()
-            self._surfaces = Surfaces.joined(of_roads, Surfaces.of_boxes(np.array(added))) if added else of_roads
+            self._surfaces = Surfaces.join(of_roads, Surfaces.of_boxes(np.array(added))) if added else of_roads
         return self._surfaces
 
     def _added_boxes(self) -> list[Box]:

@@ -70,12 +70,12 @@ def test_detect_car_at_distance_has_small_position_error(street: Any, distance: 
     """The far side is not visible.
 
     The center error is half of the excess of the car over the usual 4.6 m, of which three standard deviations are 0.5
-    m.
+    m, and up to half of the gap between the columns of rays, of which there are 156.
     """
     car = street.thing("Car", distance, 2.0, math.radians(degrees))
     found = detect(street.readings([street.thing("Ego", 0, 0), car], {"roof": LidarSettings()}))
     row = nearest(found, car.box)
-    assert math.dist(found.boxes[row, :2], car.box[:2]) < 0.5
+    assert math.dist(found.boxes[row, :2], car.box[:2]) < math.hypot(0.5, distance * math.pi / 156)
 
 
 def test_detect_empty_street_returns_no_objects(street: Any) -> None:
@@ -160,12 +160,13 @@ def test_detect_rotated_scene_returns_rotated_boxes(street: Any, detector: Any, 
 
 @pytest.mark.parametrize("detector", [LidarDetector, OracleDetector])
 def test_detect_mirrored_scene_returns_mirrored_boxes(street: Any, detector: Any) -> None:
+    """The triangles of meshes are not mirrored: uneven faces have one diagonal, which is off the other by 2 mm."""
     objects = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
     sensors = {"roof": CLEAN, "truth": TruthSettings()}
     before = detector().detect(street.readings(objects, sensors))
     after = detector().detect(street.readings([thing.mirrored() for thing in objects], sensors))
     assert len(before) == 4
-    assert_same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 1e-9)
+    assert_same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 2e-3)
     assert sorted(after.classes) == sorted(before.classes)
 
 

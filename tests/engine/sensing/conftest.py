@@ -55,10 +55,18 @@ class BoxScene:
             normals.append(normal)
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
 
+    def spec(self, name: str) -> ActorSpec:
+        row = self.view.row(name)
+        size, offset = self.view.size[row].tolist(), self.view.offset[row].tolist()
+        return ActorSpec(name, "box", self.view.categories[row], tuple(size), tuple(offset))
+
+    def motion(self, name: str) -> str:
+        return ""
+
     def surfaces(self) -> Surfaces:
         standing = np.reshape(self.walls, (-1, 7)).astype(float)
         standing[:, 2] -= standing[:, 5] / 2.0
-        return Surfaces.joined(*[LEVEL_GROUND] * self.ground, Surfaces.of_boxes(standing))
+        return Surfaces.join(*[LEVEL_GROUND] * self.ground, Surfaces.of_boxes(standing))
 
     def first_hit(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
         rows: list[int] = self.raycast(np.array(origins), np.array(targets)).rows.tolist()

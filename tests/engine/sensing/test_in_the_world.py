@@ -67,12 +67,13 @@ def test_truth_excludes_car_behind_building(world: World) -> None:
 
 
 def test_lidar_measures_rear_of_truck(world: World) -> None:
+    """Bumper, lamps and doors are within 3 cm of the end of the box."""
     settings = LidarSettings(channels=16, points_per_second=16 * 360 * 20, range_noise=0.0)
     cloud = Rig(spec("Ego"), {"lidar": settings}).read(world, world.view()).lidars["lidar"]
     points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
     ahead = points[(np.abs(points[:, 1]) < 1.4) & (points[:, 2] > 0.1) & (points[:, 0] > 5)]
     assert len(ahead) > 20
-    np.testing.assert_allclose(ahead[:, 0], 15 - 4.234, atol=0.02)
+    np.testing.assert_allclose(ahead[:, 0], 15 - 4.234, atol=0.03)
 
 
 def test_camera_depth_and_segmentation_show_truck(world: World) -> None:
@@ -100,7 +101,7 @@ def test_actor_hidden_from_named_sensor_is_transparent_to_it(world: World) -> No
         cloud = readings.lidars["roof"]
         points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
         ahead = points[(np.abs(points[:, 1]) < 0.9) & (points[:, 2] > 0.1) & (points[:, 0] > 5)]
-        assert ahead[:, 0].min() == pytest.approx(30 - 2.446 if sensor == "roof" else 15 - 4.234, abs=0.02)
+        assert ahead[:, 0].min() == pytest.approx(30 - 2.446 if sensor == "roof" else 15 - 4.234, abs=0.1)
         visible = "Hidden" if sensor == "front" else "Truck"
         assert readings.cameras["front"].segmentation[24, 32] == world.view().rows[visible]
     world.set_display_state(

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from eidrive_scenario.sensing.lidar import ASPHALT, BACKSCATTER, CONTRAST, REFLECTIVITY, Lidar, extinction, returns
+from eidrive_scenario.sensing.bodies import REFLECTIVITY
+from eidrive_scenario.sensing.lidar import ASPHALT, BACKSCATTER, CONTRAST, Lidar, extinction, returns
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.world.weather import Weather
@@ -75,13 +76,13 @@ def test_intensity_is_reflectivity_times_cosine_times_attenuation(boxes: Any) ->
     ground = np.abs(points[:, 2]) < 1e-9
     expected = ASPHALT * 1.9 / distance[ground] * np.exp(-0.01 * distance[ground])
     np.testing.assert_allclose(found.intensity[ground], expected, rtol=1e-6)
-    # The rear of the car, whose normal points back along its yaw of 0.6 rad; rays at angle c to the normal.
+    # Battens at the rear of a crate, whose normal points back along its yaw of 0.6 rad; rays at angle c to the normal.
     normal = np.array([-math.cos(0.6), -math.sin(0.6)])
     rear = ~ground & (np.abs((points[:, :2] - (20.0, 0.0)) @ -normal + 4.892 / 2) < 1e-6) & (points[:, 2] < 1.48)
     assert rear.sum() > 3
     cosine = np.abs(found.points[rear][:, :2] @ normal) / distance[rear]
     np.testing.assert_allclose(
-        found.intensity[rear], REFLECTIVITY["car"] * cosine * np.exp(-0.01 * distance[rear]), rtol=1e-6
+        found.intensity[rear], REFLECTIVITY["plastic"] * cosine * np.exp(-0.01 * distance[rear]), rtol=1e-6
     )
 
 

@@ -47,6 +47,17 @@ def roads(rng: np.random.Generator, profiles: str = "") -> RoadNetwork:
     return RoadNetwork.parse(map_xml(road_xml(length=200.0, extra=extra, profiles=profiles)))
 
 
+@pytest.fixture
+def bodies_are_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let lidars see the boxes of actors, as pybullet does, instead of their meshes."""
+
+    def box(spec: ActorSpec, _: str) -> Surfaces:
+        (x, y, z), size = spec.offset, spec.size
+        return Surfaces.of_boxes(np.array([(x, y, z - size[2] / 2.0, *size, 0.0)]))
+
+    monkeypatch.setattr("eidrive_scenario.sensing.lidar.body_surfaces", box)
+
+
 def compare(world: World, own: str, sensor: str = "lidar", **settings: Any) -> set[int]:
     """Compare the hits of a lidar of an actor with those of pybullet, and return the hit rows."""
     view, row = world.view(), world.view().row(own)
@@ -55,7 +66,7 @@ def compare(world: World, own: str, sensor: str = "lidar", **settings: Any) -> s
     columns = lidar._columns(view.time)
     hits = lidar._hits(columns, pose, world, view, row)
     rays = lidar._directions(columns) @ pose[:3, :3].T
-    rows, distance, facing = hits.rows.ravel(), hits.distance.ravel(), hits.facing.ravel()
+    rows, distance, facing = hits.rows.ravel(), hits.distance.ravel(), hits.brightness.ravel()
     ignore = () if world.spec(own).has_wheels else (own,)
 
     def cast(directions: Array) -> tuple[Integers, Array, Array]:
@@ -90,6 +101,7 @@ PROFILES = {
 }
 
 
+@pytest.mark.usefixtures("bodies_are_boxes")
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("seed", range(3))
 def test_hits_equal_ray_casts_of_pybullet(profile: str, seed: int) -> None:
@@ -109,6 +121,7 @@ def test_hits_equal_ray_casts_of_pybullet(profile: str, seed: int) -> None:
     assert all(-1 in rows and NOTHING in rows and max(rows) > 0 for rows in hit.values())
 
 
+@pytest.mark.usefixtures("bodies_are_boxes")
 @pytest.mark.parametrize("mount", [Mount(x=0.0, y=0.0, z=30.0, pitch=25.0), Mount(x=4.0, y=1.0, z=0.3, yaw=70.0)])
 def test_hits_from_tilted_and_low_mounts_equal_ray_casts(mount: Mount) -> None:
     with World() as world:
@@ -119,6 +132,7 @@ def test_hits_from_tilted_and_low_mounts_equal_ray_casts(mount: Mount) -> None:
         assert compare(world, "A", mount=mount, field_of_view=250.0, upper_fov=60.0, lower_fov=-90.0) >= {-1, 0}
 
 
+@pytest.mark.usefixtures("bodies_are_boxes")
 def test_actors_hidden_from_the_sensor_are_not_hit() -> None:
     with World() as world:
         for number in range(4):
@@ -161,7 +175,7 @@ def test_kernel_equals_formula_for_random_triangles(seed: int) -> None:
     pose[:3, :3], pose[:3, 3] = rotation_matrix(*rng.uniform(-3.0, 3.0, 3)), rng.normal(0.0, 3.0, 3)
     turn, shift = rotation_matrix(*rng.uniform(-3.0, 3.0, 3)), rng.normal(0.0, 3.0, 3)
     hits = FanHits(RayFan(azimuths, elevations), np.arange(columns), pose, 20.0)
-    hits.meet(Surfaces.grouped(triangles, 7), 5, turn, shift)
+    hits.meet(Surfaces.group(triangles, 7), 5, turn, shift)
     flat, up = np.cos(elevations), np.sin(elevations)
     rays = np.stack(
         np.broadcast_arrays(flat * np.cos(azimuths)[:, None], flat * np.sin(azimuths)[:, None], up), axis=-1
@@ -169,7 +183,7 @@ def test_kernel_equals_formula_for_random_triangles(seed: int) -> None:
     local = (triangles @ turn.T + shift - pose[:3, 3]) @ pose[:3, :3]
     distance, cosine = by_formula(local, rays.reshape(-1, 3), 20.0)
     np.testing.assert_allclose(hits.distance.ravel(), distance, rtol=1e-9)
-    np.testing.assert_allclose(hits.facing.ravel(), cosine, atol=1e-9)
+    np.testing.assert_allclose(hits.brightness.ravel(), cosine, atol=1e-9)
     assert 0.3 < (hits.rows == 5).mean() < 1.0
     assert np.array_equal(hits.rows.ravel() == NOTHING, distance == 20.0)
 

@@ -39,10 +39,10 @@ def roads(request: pytest.FixtureRequest) -> RoadNetwork:
 
 @pytest.fixture(params=[BUS, dataclasses.replace(CAR, name="Ego")], ids=["bus", "car"])
 def world(request: pytest.FixtureRequest, roads: RoadNetwork) -> Iterator[World]:
-    """An ego at 100 m and a car 30 m ahead, in one lane."""
+    """An ego at 100 m and a car 20 m ahead, in one lane."""
     ego: ActorSpec = request.param
     with World(roads) as created:
-        for spec, s in ((ego, 100.0), (dataclasses.replace(CAR, name="Car"), 130.0)):
+        for spec, s in ((ego, 100.0), (dataclasses.replace(CAR, name="Car"), 120.0)):
             pose = roads.lane_pose_at("1", -1, s)
             created.add(spec, Placement(pose.x, pose.y, pose.z, pose.h, pose.p, pose.r))
         yield created
