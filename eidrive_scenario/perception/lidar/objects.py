@@ -30,6 +30,8 @@ COVERED = 0.8
 """Minimum share of the points of such a cluster in the parts that are road users."""
 TOUCHING = 0.2
 """Distance below which boxes are assumed to touch [m]."""
+NEAR = 1.5
+"""Distance of boxes up to which their points may be those of one surface at grazing incidence [m]."""
 
 
 class FittedObject(NamedTuple):
@@ -101,15 +103,21 @@ def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
     """Return the objects, with overlapping boxes merged if one box fits the points of both.
 
     Two bodies cannot overlap, and hardly ever touch. Such boxes are parts of one object that something nearer divides,
-    or that the rays graze so that its points are far apart.
+    or that the rays graze so that its points are far apart. The same applies to boxes near each other whose points are
+    one cluster.
     """
     merged = list(found)
     again = True
     while again:
         again = False
         for one, other in combinations(merged, 2):
-            if overlap(_enlarge(one.fit.box), other.fit.box):
-                rows = np.concatenate([one.rows, other.rows])
+            if not overlap(_enlarge(one.fit.box, NEAR), other.fit.box):
+                continue
+            rows = np.concatenate([one.rows, other.rows])
+            if (
+                overlap(_enlarge(one.fit.box, TOUCHING), other.fit.box)
+                or len(clusters(scan.points[rows], scan.pattern.azimuth)) == 1
+            ):
                 fit = scan.fit(rows, tuple(PRIORS))
                 if fit is not None and fit.deviation <= POOR_FIT:
                     merged = [kept for kept in merged if kept is not one and kept is not other]
@@ -119,6 +127,6 @@ def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
     return merged
 
 
-def _enlarge(box: Sequence[float]) -> Sequence[float]:
+def _enlarge(box: Sequence[float], margin: float) -> Sequence[float]:
     x, y, z, length, width, height, yaw = box
-    return x, y, z, length + 2.0 * TOUCHING, width + 2.0 * TOUCHING, height, yaw
+    return x, y, z, length + 2.0 * margin, width + 2.0 * margin, height, yaw

@@ -125,6 +125,8 @@ CELL = 0.1
 """Size of the cells in plan view whose points are merged beforehand [m]."""
 NEAREST = 0.8
 """Maximum distance of points that always belong to one cluster [m]: windows, which return nothing, leave such gaps."""
+NEAREST_PART = 0.5
+"""The same for the parts of an object, or of several that are close to each other [m]."""
 COLUMNS = 2.0
 """Maximum number of gaps between neighboring columns of rays within a cluster, at larger distances."""
 NEXT_COLUMN = 1.5
@@ -150,7 +152,7 @@ def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> lis
     counts = np.bincount(cell)
     x, y = np.bincount(cell, plan[:, 0]) / counts, np.bincount(cell, plan[:, 1]) / counts
     distance = np.hypot(x, y)
-    reach = np.maximum(NEAREST, COLUMNS * azimuth_step * distance)
+    reach = np.maximum(NEAREST if grazing else NEAREST_PART, COLUMNS * azimuth_step * distance)
     of_cell = np.arange(len(x))
     _connect(x, y, distance, reach, azimuth_step, grazing, of_cell)
     label = np.unique(of_cell, return_inverse=True)[1][cell]

@@ -120,13 +120,13 @@ def test_clusters_are_the_connected_components_of_near_cells() -> None:
     members = [[row for row in range(400) if tuple(np.floor(points[row] / 0.1)) == cell] for cell in cells]
     centers = np.array([points[rows].mean(axis=0) for rows in members])
     gap = np.linalg.norm(centers[:, None] - centers, axis=-1)
-    reach = np.maximum(0.8, 2.0 * 0.04 * np.linalg.norm(centers, axis=1))
+    reach = np.maximum(0.5, 2.0 * 0.04 * np.linalg.norm(centers, axis=1))
     near = gap <= np.minimum(reach[:, None], reach)
     label = np.arange(len(cells))
     for _ in range(len(cells)):
         label = np.where(near, label, len(cells)).min(axis=1)
     expected = [sorted(row for cell in np.flatnonzero(label == first) for row in members[cell]) for first in set(label)]
-    assert 10 < len(expected) < 300
+    assert 20 < len(expected) < 300
     assert groups(points, 0.04, grazing=False) == sorted(expected)
 
 
