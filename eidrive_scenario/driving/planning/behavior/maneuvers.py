@@ -139,6 +139,8 @@ SWUNG = 0.3
 """Offset from the route from which on the vehicle is beside it [m]."""
 SPARE = 0.2
 """Clearance beside a passed obstacle in addition to the lateral margin [m], so that rounding does not block it."""
+BESIDE_BUS = 1.0
+"""Clearance beside a standing bus, from behind which passengers may come [m]; a choice."""
 LEAST_CLEARANCE = 0.25
 """Minimum clearance in a narrow place [m]."""
 BEFORE_OBSTACLE = 2.0
@@ -460,7 +462,9 @@ def _is_vulnerable(situation: Situation, obstacle: _Obstacle) -> bool:
 
 def _clearance(situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle) -> float:
     """Return the clearance that an obstacle should have [m]."""
-    return settings.pedestrian_margin if _is_vulnerable(situation, obstacle) else settings.lateral_margin
+    clearance = settings.pedestrian_margin if _is_vulnerable(situation, obstacle) else settings.lateral_margin
+    stops = any(situation.kind_of(one.owner) == "bus" and one.speed < WAITING for one in obstacle.objects)
+    return max(clearance, BESIDE_BUS) if stops else clearance
 
 
 def _sides(obstacle: _Obstacle, side: int) -> tuple[float, float]:

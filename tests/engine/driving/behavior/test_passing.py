@@ -6,6 +6,7 @@ import math
 
 import pytest
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
+from signal_street import CAR
 
 from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
 
@@ -54,6 +55,18 @@ def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
     assert run.front > 130.0
     assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
     assert min(speed for place, _, speed in run.path if 80.0 < place < 112.0) > 3.0
+
+
+def test_standing_bus_is_passed_with_one_meter_between() -> None:
+    """Its side is 1.25 m left of the middle of the lane; the car is half as wide as its box."""
+    bus = KnownBox(120.0, kind="bus", size=(12.0, 2.5))
+    roads = two_lane_road(600.0)
+    run = PlannedDrive(behavior(roads), roads)
+    run.run(40.0, lambda now: [bus])
+    run.world.close()
+    beside = [y for x, y, _ in run.path if 114.0 < x < 126.0]
+    assert min(beside) - CAR.size[1] / 2.0 - (LANE + 1.25) > 1.0
+    assert run.front > 180.0
 
 
 def test_standing_motorbike_is_passed() -> None:
