@@ -19,6 +19,7 @@ from eidrive_scenario.storyboard.context.condition import EntityCondition as Ent
 from eidrive_scenario.storyboard.context.condition import Measure as Measure
 from eidrive_scenario.storyboard.context.condition import QuantityCondition as QuantityCondition
 from eidrive_scenario.storyboard.context.condition import describe_rule as describe_rule
+from eidrive_scenario.storyboard.context.condition import next_change as next_change
 from eidrive_scenario.storyboard.context.condition import relation as relation
 from eidrive_scenario.storyboard.context.condition import satisfies_rule as satisfies_rule
 from eidrive_scenario.storyboard.context.controller_model import ControllerModel as ControllerModel

@@ -47,7 +47,7 @@ class TraceHash:
         self._names: tuple[str, ...] = ()
         self._packed_names = _packed(())
         """Names of the last view in packed form."""
-        self._scene: dict[str, object] = dict.fromkeys(_SCENE_FIELDS)
+        self._scene: tuple[object, ...] = (None,) * len(_SCENE_FIELDS)
         self._words: dict[tuple[str, ...], int] = {}
 
     def observe(self, frame: Frame) -> None:
@@ -68,11 +68,12 @@ class TraceHash:
             self._sha.update(_LINKS)
             self._floats(len(frame.links))
             self._add_outcomes(frame.links)
-        for name, field_codec in _SCENE_FIELDS.items():
-            before, now = self._scene[name], getattr(frame, name)
-            if now is not before and now != before and (now or before):
-                self._texts(name, json.dumps(field_codec.encode(now), sort_keys=True))
-            self._scene[name] = now
+        scene = frame.signals, frame.appearances, frame.environment, frame.monitors
+        if scene != self._scene:
+            for now, last, (name, field_codec) in zip(scene, self._scene, _SCENE_FIELDS.items(), strict=True):
+                if now != last and (now or last):
+                    self._texts(name, json.dumps(field_codec.encode(now), sort_keys=True))
+        self._scene = scene
 
     def hexdigest(self) -> str:
         """Return 64 hexadecimal digits over the frames so far."""

@@ -222,6 +222,8 @@ def remove_actors(commands: Commands, run: RunState) -> None:
 
 def set_trailers(commands: Commands, run: RunState) -> None:
     """Set which actors are connected, before a trailer enters the world."""
+    if commands.trailers is run.trailers:
+        return
     run.trailers = commands.trailers
     run.world.set_trailers([frozenset(pair) for pair in commands.trailers.items()])
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
@@ -20,11 +19,11 @@ from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trailers import (
+    Coupling,
     check_acyclic,
+    couplings,
     declared_trailer,
     next_displacement,
-    pairs,
-    pose_behind,
 )
 from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
@@ -111,6 +110,11 @@ class Storyboard:
         )
         self.context.warnings += unassigned_controller_warnings(self.context.actors, controllers or {})
         self._routes = RequestedRoutes()
+        self._couplings: tuple[Coupling, ...] = ()
+        self._trailers: Mapping[str, str] = {}
+        """Trailer of each towing vehicle, by name."""
+        self._declared_trailers: list[str | None] = []
+        """Trailer of each actor, by which the connections were made."""
         self.ended: str | None = None
         """Reason for the end of the run by the storyboard; None while it continues."""
 
@@ -142,7 +146,8 @@ class Storyboard:
         for actor in self.context.actors.values():
             actor.motion.initialize()
         self._update_spawns(self.context.commands)
-        return self._completed_commands(self.context.commands)
+        driven = [actor for actor in self.context.actors.values() if actor.present and actor.driven]
+        return self._completed_commands(self.context.commands, driven)
 
     def tick(
         self,
@@ -162,46 +167,52 @@ class Storyboard:
         if self.root.state is ElementState.COMPLETE and self.ended is None:
             self.ended = STOPPED if self.root.record.transitions[-1][1] is ElementTransition.STOP else COMPLETE
         commands = self.context.commands
-        towed_pairs = self._add_trailers()
-        self._update_spawns(commands)
-        commands.routes = self._routes.changes(self.context.actors)
+        self._add_trailers()
+        if commands.spawns:
+            self._update_spawns(commands)
+        awake = [actor for actor in self.context.actors.values() if not actor.motion.rests or actor.driven]
+        commands.routes = self._routes.changes(awake)
         for controller_model in self._controller_models:
             if controller_model.actor.present and not controller_model.actor.driven:
                 controller_model.step()
-        towed = {back.name for _, back in towed_pairs}
-        for name, actor in self.context.actors.items():
-            if not actor.present or name in towed:
+        towed, placements, driven = self._trailers.values(), commands.placements, []
+        for actor in self.context.actors.values() if self._controller_models else awake:
+            if not actor.present:
                 continue
-            if not actor.driven:
-                commands.placements[name] = actor.motion.step(self.dt)
+            name, is_driven = actor.name, actor.driven
+            if is_driven:
+                driven.append(actor)
+            if name in towed:
+                continue
+            if not is_driven:
+                placements[name] = actor.motion.step(self.dt)
             elif actor.motion.teleported:
-                commands.placements[name] = actor.motion.placement()
-        _check_placements(commands.placements)
-        for front, back in towed_pairs:
+                placements[name] = actor.motion.placement()
+        _check_placements(placements)
+        for coupling in self._couplings:
+            front, back = coupling.front, coupling.back
             if front.present and back.present:
-                displacement = next_displacement(front, view, self.dt)
-                pose = pose_behind(front, back, displacement, straight=front.motion.teleported)
+                teleports = front.motion.teleported
+                pose = coupling.next_pose(next_displacement(front, view, self.dt), straight=teleports)
                 back.motion.set_towed_state(pose, front.motion)
-                commands.placements[back.name] = msgspec.structs.replace(
-                    back.motion.placement(), teleport=front.motion.teleported
-                )
+                placements[back.name] = back.motion.placement(teleport=teleports)
         self.context.step_traffic()
-        return self._completed_commands(commands)
+        return self._completed_commands(commands, driven)
 
-    def _add_trailers(self) -> list[tuple[Actor, Actor]]:
-        """Add trailers with their towing vehicles, aligned; in Init they are moved there if they were placed elsewhere.
-
-        Return towing vehicles and trailers, from front to end of each train.
-        """
-        towed_pairs = list(pairs(self.context.actors))
-        if not towed_pairs:
-            return towed_pairs
-        self.context.commands.trailers = {front.name: back.name for front, back in towed_pairs}
-        for front, back in towed_pairs:
+    def _add_trailers(self) -> None:
+        """Add trailers with their towing vehicles, aligned; in Init they are moved there if they are elsewhere."""
+        actors = self.context.actors
+        trailers = [actor.trailer for actor in actors.values()]
+        if trailers != self._declared_trailers:
+            self._declared_trailers = trailers
+            self._couplings = tuple(couplings(actors))
+            self._trailers = {coupling.front.name: coupling.back.name for coupling in self._couplings}
+        self.context.commands.trailers = self._trailers
+        for coupling in self._couplings:
+            front, back = coupling.front, coupling.back
             if front.present and (not back.present or self.context.view.tick < 0):
                 back.motion.set_speed(front.motion.speed_along_heading)
-                self.context.add_actor(back.name, ResolvedPosition(pose_behind(front, back, straight=True)))
-        return towed_pairs
+                self.context.add_actor(back.name, ResolvedPosition(coupling.next_pose(straight=True)))
 
     def _update_spawns(self, commands: Commands) -> None:
         """Update the spawns of this tick, whose speeds later actions of the tick may have set."""
@@ -211,11 +222,10 @@ class Storyboard:
                 commands.actor_specs[name] = spec
             commands.spawns[name] = self.context.actors[name].motion.placement()
 
-    def _completed_commands(self, commands: Commands) -> Commands:
+    def _completed_commands(self, commands: Commands, driven: Sequence[Actor]) -> Commands:
         context = self.context
-        driven = [name for name, actor in context.actors.items() if actor.present and actor.driven]
-        commands.driven = frozenset(driven)
-        commands.goals = {name: goal for name in driven if (goal := context.actors[name].goal) is not None}
+        commands.driven = frozenset([actor.name for actor in driven])
+        commands.goals = {actor.name: goal for actor in driven if (goal := actor.goal) is not None}
         commands.overrides = {name: dict(overrides) for name, overrides in context.overrides.items() if overrides}
         commands.signals, commands.appearances = context.signals.states, context.appearances
         commands.monitors = context.monitors
@@ -268,13 +278,14 @@ class RequestedRoutes:
         self._last: dict[str, object] = {}
         """Last route, or waypoints, of each actor."""
 
-    def changes(self, actors: Mapping[str, Actor]) -> Mapping[str, Array]:
-        """Return the points (M, 3) of the routes that were requested since the last call, by actor [m].
+    def changes(self, actors: Iterable[Actor]) -> Mapping[str, Array]:
+        """Return the points (M, 3) of the routes of actors that were requested since the last call, by actor [m].
 
         The lap that follows a closed route is no new route.
         """
         found: dict[str, Array] = {}
-        for name, actor in actors.items():
+        for actor in actors:
+            name = actor.name
             request: object = actor.motion.route
             if request is None:
                 goal = actor.goal

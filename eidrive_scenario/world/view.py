@@ -33,13 +33,6 @@ class Contact:
     """Relative speed at the first contact [m/s]."""
 
 
-_MOTION: Mapping[str, int | slice] = {
-    "position": slice(0, 3), "yaw": 3, "pitch": 4, "roll": 5, "velocity": slice(6, 9), "acceleration": slice(9, 12),
-    "yaw_rate": 12, "speed": 13,
-}  # fmt: skip
-"""Fields of a view by their columns in the values of ActorState."""
-
-
 class ActorState(NamedTuple):
     """Row of a view as scalars, with the names and units of the arrays."""
 
@@ -57,6 +50,16 @@ class ActorState(NamedTuple):
     acceleration_z: float
     yaw_rate: float
     speed: float
+
+
+class ActorColumns(NamedTuple):
+    """Names and categories of the actors of a view, sizes and offsets of their boxes (N, 3) [m], and row by name."""
+
+    names: tuple[str, ...]
+    categories: tuple[str, ...]
+    size: Array
+    offset: Array
+    rows: Mapping[str, int]
 
 
 class RayHits(msgspec.Struct, frozen=True):
@@ -114,23 +117,43 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         states: Sequence[ActorState],
         table: Array,
         boxes: Sequence[Sequence[float]] | None,
-        rows: Mapping[str, int],
-        **columns: Any,
+        *,
+        time: float,
+        tick: int,
+        actors: ActorColumns,
+        contacts: tuple[Contact, ...],
+        unseen: tuple[str, ...],
+        unseen_by: Mapping[str, tuple[str, ...]],
     ) -> WorldView:
         """Return the view of actors in these states. What the caller has already is not computed from the arrays.
 
-        table    (N, 14) the same states
-        boxes    the same as `plain_boxes`, None if it is not known
-        rows     row by name
-        columns  all other fields
+        table   (N, 14) the same states
+        boxes   the same as `plain_boxes`, None if it is not known
+        actors  what is constant while no actor enters or leaves
         """
-        motion: dict[str, Any] = {name: table[:, part] for name, part in _MOTION.items()}
-        view = cls(**motion, **columns)
-        known: dict[str, Any] = {"states": states, "kinematics": table[:, :9], "rows": rows}
+        view = cls(
+            time,
+            tick,
+            actors.names,
+            actors.categories,
+            table[:, 0:3],
+            table[:, 3],
+            table[:, 4],
+            table[:, 5],
+            table[:, 6:9],
+            table[:, 9:12],
+            table[:, 12],
+            table[:, 13],
+            actors.size,
+            actors.offset,
+            contacts,
+            unseen,
+            unseen_by,
+        )
+        known = view.__dict__
+        known["states"], known["kinematics"], known["rows"] = states, table[:, :9], actors.rows
         if boxes is not None:
-            upright = not any([state.pitch or state.roll for state in states])
-            known |= {"plain_boxes": boxes, "is_upright": upright}
-        view.__dict__.update(known)
+            known["plain_boxes"] = boxes
         return view
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:
@@ -191,7 +214,7 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
     @cached_property
     def is_upright(self) -> bool:
         """Whether pitch and roll of all actors are 0, so that their bodies are in their boxes."""
-        return not self.kinematics[:, 4:6].any()
+        return not any([state.pitch or state.roll for state in self.states])
 
     @cached_property
     def plain_boxes(self) -> Sequence[Sequence[float]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,14 +32,14 @@ from eidrive_scenario.world.physics.rays import Crossings, cast_rays, find_cross
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.surfaces import Surfaces
-from eidrive_scenario.world.view import FEW, GROUND, NOTHING, Contact, RayHits, WorldView
+from eidrive_scenario.world.view import FEW, GROUND, NOTHING, ActorColumns, Contact, RayHits, WorldView
 from eidrive_scenario.world.weather import Weather
 
 
 class ActorTable:
     """Data of the actors that is constant while no actor is added or removed.
 
-    columns        fields of the views: names, categories, sizes, and offsets of the boxes
+    columns        names, categories, sizes and offsets of the boxes
     row_of_handle  row of the actor by the number of its body in pybullet, GROUND for other bodies; the last entry, for
                    handle -1, is NOTHING
     row_in_list    the same as a list
@@ -52,14 +51,9 @@ class ActorTable:
         offset = np.array([body.spec.offset for body in order], dtype=float).reshape(-1, 3)
         size.flags.writeable = offset.flags.writeable = False
         categories = tuple(body.spec.category for body in order)
-        self.columns: dict[str, Any] = {
-            "names": tuple(bodies),
-            "categories": categories,
-            "size": size,
-            "offset": offset,
-        }
+        rows = {name: row for row, name in enumerate(bodies)}
+        self.columns = ActorColumns(tuple(bodies), categories, size, offset, rows)
         self.bodies = group_bodies(order, dt)
-        self.rows = {name: row for row, name in enumerate(bodies)}
         self.row_of_handle: Integers = np.full(
             max([highest_handle, *(body.handle for body in order)]) + 2, GROUND, dtype=np.int64
         )
@@ -182,7 +176,7 @@ class World:
     def set_trailers(self, pairs: Collection[frozenset[str]]) -> None:
         """Set the pairs of a vehicle and its trailer, which may overlap; actors may be absent."""
         self._contacts.find_added(self._bodies)
-        self._couplings.pairs = frozenset(pairs)
+        self._couplings.set_pairs(frozenset(pairs))
 
     def attached(self, name: str) -> tuple[str, ...]:
         """Return the present trailers of a vehicle, or all other bodies of the road train of a trailer."""
@@ -229,17 +223,18 @@ class World:
         if not (placements.keys() <= present and controls.keys() <= present):
             self._body(min({*placements, *controls} - present))
         self._contacts.find_added(self._bodies)
-        self._actors.bodies.place(placements)
+        bodies = self._actors.bodies
+        bodies.place(placements)
         for name, driven in self._driven.items():
             if name in placements:
                 driven.teleport(placements[name])
         if self._couplings.any_affected:
             self._update_attributes()
             self._couplings.update(self._bodies)
-        touches = self._physics.tick(self._actors.bodies, self._driven, controls, self._friction)
+        touches = self._physics.tick(bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
-        self._contacts.step(self._actors.bodies, touches)
+        self._contacts.step(bodies, touches)
 
     def view(self) -> WorldView:
         """Return the current view, the same object until a change."""
@@ -309,19 +304,18 @@ class World:
 
     def _view_now(self, contacts: tuple[Contact, ...]) -> WorldView:
         """Return the view of the current poses and motion."""
-        bodies = self._actors.bodies
-        states, table = bodies.states()
+        actors = self._actors
+        states, table = actors.bodies.states()
         return WorldView.of_states(
             states,
             table,
-            [body.box for body in bodies.current()] if len(states) <= FEW else None,
-            self._actors.rows,
+            [body.box for body in actors.bodies.current()] if len(states) <= FEW else None,
             time=self.time,
             tick=self.tick,
+            actors=actors.columns,
             contacts=contacts,
             unseen=self._unseen,
             unseen_by=self._unseen_by,
-            **self._actors.columns,
         )
 
     def _body(self, name: str) -> Body:
@@ -344,6 +338,7 @@ class World:
     def _changed(self) -> None:
         """Reset caches after a change of actors or scenery."""
         self._view = None
+        self._couplings.note_change()
         self._physics.changed()
         self._physics.scenery_changed()
         self._free_space.scenery_changed()

@@ -24,6 +24,7 @@ class StoryboardElementStateCondition(Condition):
     """
 
     instant = True
+    reads = ()
     element: model.StoryboardElementStateCondition
     _observer: ElementStateObserver | None = None
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar
 
-from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
+from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model, next_change
 from eidrive_scenario.api.common import WorldView as View
 
 
@@ -27,11 +28,19 @@ def velocity_of(view: View, entity: str) -> list[float]:
     return vector
 
 
+class MotionCondition(QuantityCondition):
+    """Base class of conditions on the motion of the entity alone, and of one that the element refers to."""
+
+    def __init__(self, element: model.Element, entities: Sequence[str], rule: str = "any") -> None:
+        super().__init__(element, entities, rule)
+        self.reads = {*entities, getattr(element, "entity_ref", None) or ""}
+
+
 def _direction_prefix(direction: model.DirectionalDimension | None) -> str:
     return "" if direction is None else f"{direction.value} "
 
 
-class SpeedCondition(QuantityCondition):
+class SpeedCondition(MotionCondition):
     """Speed [m/s], signed along the heading; with a direction the component of the velocity along that axis."""
 
     element: model.SpeedCondition
@@ -48,7 +57,7 @@ class SpeedCondition(QuantityCondition):
         return component_of(velocity_of(context.view, entity), context.pose(entity).h, self.element.direction)
 
 
-class RelativeSpeedCondition(QuantityCondition):
+class RelativeSpeedCondition(MotionCondition):
     """Own speed minus another entity's [m/s]; with a direction along that axis of the other entity."""
 
     element: model.RelativeSpeedCondition
@@ -70,7 +79,7 @@ class RelativeSpeedCondition(QuantityCondition):
         return component_of(difference, context.pose(other).h, self.element.direction)
 
 
-class AccelerationCondition(QuantityCondition):
+class AccelerationCondition(MotionCondition):
     """Acceleration [m/s²]: its magnitude, or with a direction its component along that axis."""
 
     element: model.AccelerationCondition
@@ -86,7 +95,7 @@ class AccelerationCondition(QuantityCondition):
         return component_of(vector, context.pose(entity).h, self.element.direction)
 
 
-class DurationCondition(QuantityCondition):
+class DurationCondition(MotionCondition):
     """Base class of conditions on the time for which a state of the entity has lasted [s]."""
 
     element: model.StandStillCondition | model.EndOfRoadCondition | model.OffroadCondition
@@ -119,6 +128,11 @@ class DurationCondition(QuantityCondition):
         start = self.since(context, entity)
         return math.nan if start is None else context.time - start
 
+    def constant_until(self, context: ConditionContext) -> float:
+        """Return the time at which a state reaches the duration [s]."""
+        starts = [start for name in self.entities if (start := self.since(context, name)) is not None]
+        return min((next_change(context.time, start + self.element.duration) for start in starts), default=math.inf)
+
     def threshold(self) -> tuple[model.Rule, float]:
         """Return the rule and the duration."""
         return self.rule_of_duration, self.element.duration
@@ -135,7 +149,7 @@ class StandStillCondition(DurationCondition):
         return context.actors[entity].standing_since
 
 
-class TraveledDistanceCondition(QuantityCondition):
+class TraveledDistanceCondition(MotionCondition):
     """Distance covered in the world [m], without teleports."""
 
     element: model.TraveledDistanceCondition

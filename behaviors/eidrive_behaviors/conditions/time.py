@@ -10,6 +10,7 @@ from eidrive_scenario.api.actions import (
     Measure,
     describe_rule,
     model,
+    next_change,
     relation,
     satisfies_rule,
 )
@@ -19,11 +20,16 @@ from eidrive_scenario.api.common import Diagnostic
 class SimulationTimeCondition(Condition):
     """Time since the start of the run [s]."""
 
+    reads = ()
     element: model.SimulationTimeCondition
 
     def holds(self, context: ConditionContext) -> bool:
         """Compare the time of this view."""
         return satisfies_rule(context.time, self.element.rule, self.element.value)
+
+    def constant_until(self, context: ConditionContext) -> float:
+        """Return the limit while it is ahead [s]."""
+        return next_change(context.time, self.element.value)
 
     def explain(self, context: ConditionContext) -> str:
         """Describe the current time."""

@@ -96,20 +96,18 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def update(self) -> Status:
         """Decide on the current step."""
 
-    def tick_once(self) -> None:
-        """Tick as py_trees does. A running action is updated without a generator, as this happens in every step."""
-        if self.status is not Status.RUNNING or self.third_party:
-            super().tick_once()
-            return
-        status: object = self.update()
-        new = status if isinstance(status, Status) else Status.INVALID
-        if new is not Status.RUNNING:
-            self.stop(new)
-        self.status = new
-
     def tick_checked(self) -> None:
         """Tick once. Raise InvalidResult for an invalid decision."""
-        self.tick_once()
+        if self.status is Status.RUNNING and not self.third_party:
+            # A running action is updated without py_trees' generator, as this happens in every step.
+            status: object = self.update()
+            if status is Status.RUNNING:
+                return
+            new = status if isinstance(status, Status) else Status.INVALID
+            self.stop(new)
+            self.status = new
+        else:
+            self.tick_once()
         if self.third_party or self.status is Status.INVALID:
             self.check_decision()
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -47,6 +48,12 @@ def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
     raise ValueError(f"unknown rule {rule!r}")
 
 
+def next_change(value: float, limit: float) -> float:
+    """Return the value up to which the comparison of an increasing value with its limit is certainly constant."""
+    before, after = limit - 2.0 * EPSILON, limit + 2.0 * EPSILON
+    return before if value < before else math.inf if value > after else -math.inf
+
+
 def describe_rule(rule: model.Rule) -> str:
     """Return the symbol of a Rule."""
     return SYMBOLS[rule.value]
@@ -74,6 +81,9 @@ class Condition(ABC):
     instant: ClassVar[bool] = False
     """True if its value can change within a tick, as states of elements and values that actions set do. It is then
     evaluated again after such a change. Other conditions are evaluated once per tick."""
+    reads: Collection[str] | None = None
+    """Entities whose motion changes its value, beside time and the states of storyboard elements. None if anything else
+    changes it: it is then evaluated in every tick."""
 
     def __init__(self, element: model.Element) -> None:
         self.element = element
@@ -101,6 +111,12 @@ class Condition(ABC):
     def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the quantities that it compares now."""
         return ()
+
+    def constant_until(self, context: ConditionContext) -> float:
+        """Return the time [s] up to which a condition with `reads` is constant while they stand and no element changes
+        its state.
+        """
+        return math.inf
 
 
 def truth(condition: Condition, held: object) -> bool:

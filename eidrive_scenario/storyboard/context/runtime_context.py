@@ -40,6 +40,7 @@ class RuntimeContext:
     The other members are for the storyboard and its tree: element states, holders of control domains, pending actions.
 
     view         ground truth of this tick; it has no actors before the first view (Init)
+    moved        entities whose state differs from that in the last view; all after a change of the actors of the view
     dt           length of the current step [s]; 0 in Init
     parameters, variables  values by name, as text
     monitors     values by name
@@ -61,6 +62,7 @@ class RuntimeContext:
         self.dt = 0.0
         self.seed = seed
         self.view = empty_view
+        self.moved: set[str] = set()
         self.progress = ElementStates()
         self.parameters: dict[str, str] = dict(scenario.parameters)
         self.variables: dict[str, str] = dict(scenario.variables)
@@ -110,21 +112,26 @@ class RuntimeContext:
         external_poses: Mapping[str, ExternalPose] = NONE,
     ) -> None:
         """Start a tick with a new view and empty commands; histories are continued."""
+        last_names = self.view.names
         self.view = view
         self.dt = dt
         self.user_values = user_values
         self.external_poses.update(external_poses)
         self.commands = Commands()
         self.progress.begin(view.tick, view.time)
-        rows: Mapping[str, int] = view.rows
+        moved, rows, states = set(), view.rows, view.states
         for name, actor in self.actors.items():
             row = rows.get(name)
             if row is not None:
-                actor.observe(view, row)
+                if actor.motion.rests and states[row] is actor.last_state and not actor.tracks_off_road:
+                    continue
+                if actor.observe(view, row):
+                    moved.add(name)
                 if actor.tracks_off_road:
                     actor.update_off_road(self.roads, view)
                 if actor.tracks_end_of_road and actor.driven:
                     actor.update_end_of_road(self.roads, view)
+        self.moved = moved if view.names is last_names else set(self.actors)
 
     def pose(self, name: str) -> Pose:
         """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""

@@ -134,12 +134,12 @@ class Actor:
             return performance.max_speed, performance.max_acceleration, performance.max_deceleration
         return math.inf, math.inf, math.inf
 
-    def observe(self, view: WorldView, row: int) -> None:
-        """Update the histories by a new view."""
+    def observe(self, view: WorldView, row: int) -> bool:
+        """Update the histories by a new view. Return whether its state differs from that in the last one."""
         state, last, motion = view.states[row], self._last_state, self.motion
         teleported, end_of_road = motion.teleported, motion.end_of_road
         if state is last and not teleported and not end_of_road:
-            return  # a standing actor whose histories are up to date
+            return False  # a standing actor whose histories are up to date
         self._last_state = state
         if teleported:
             motion.clear_teleported()
@@ -154,6 +154,12 @@ class Actor:
             motion.set_observed_state(pose_of(view, row), speed)
         else:
             self._set_at_end_of_road(end_of_road, view.time)
+        return True
+
+    @property
+    def last_state(self) -> ActorState | None:
+        """State in the last view that it was in; None before."""
+        return self._last_state
 
     @property
     def tracks_off_road(self) -> bool:

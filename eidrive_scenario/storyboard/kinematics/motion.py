@@ -58,15 +58,15 @@ class Motion(MotionState):
 
     def set_speed(self, speed: float) -> None:
         """Set the speed [m/s] from the current step on."""
-        self._speed = speed
+        self._speed, self._rests = speed, False
 
     def set_backing(self, backs: bool) -> None:
         """Set whether a positive speed moves the actor against its heading, as on a trajectory with such headings."""
-        self._backs = backs
+        self._backs, self._rests = backs, False
 
     def set_route(self, route: Route | None, branch_selector: BranchSelector | None = None) -> None:
         """Set the route, and the selector of branches at junctions that the route does not cover."""
-        self._route, self._visit, self._branch_selector = route, 0, branch_selector
+        self._route, self._visit, self._branch_selector, self._rests = route, 0, branch_selector, False
 
     def ahead(self, place: LaneLocation, distance: float) -> LaneLocation | None:
         """Return the location at a distance along lane and route [m]; None if the lane ends before."""
@@ -84,6 +84,7 @@ class Motion(MotionState):
         self._end_of_road = False
         if self._route_lanes is not None:
             self._route_lanes.forget()
+        self._rests = False
         self._teleport = self._teleported = True
         self._teleports += 1
 
@@ -94,7 +95,7 @@ class Motion(MotionState):
 
     def set_lateral_step(self, steering: LateralStep) -> None:
         """Set the lateral part of the current step."""
-        self._lateral_step = steering
+        self._lateral_step, self._rests = steering, False
 
     def move_to(
         self, pose: Pose, *, land: bool = False, jump: bool = False, rail: Callable[[float], Pose] | None = None
@@ -105,13 +106,13 @@ class Motion(MotionState):
         jump   teleport: the distance does not count as covered
         rail   returns the pose after a given distance [m]; used if `move_along_lane` sets the distance of the step
         """
-        self._next_pose, self._pose_at_distance = pose, rail
+        self._next_pose, self._pose_at_distance, self._rests = pose, rail, False
         self._snaps_to_lane = land
         self._teleported = self._teleported or jump
 
     def move_along_lane(self, distance: float) -> None:
         """Set the distance of the current step along lane or trajectory [m], independent of speed and heading."""
-        self._lane_distance = distance
+        self._lane_distance, self._rests = distance, False
 
     def set_reference_lane(self, lane: int) -> LaneLocation | None:
         """Refer the location to another lane of the same road. Return it with the offset from that lane."""
@@ -120,17 +121,19 @@ class Motion(MotionState):
             directions = [self.roads.driving_direction(here.road, number) for number in (here.lane, lane)]
             if directions[0] != directions[1]:
                 self._heading = wrap_angle(self._heading + math.pi)
+            self._rests = False
             here = here._replace(lane=lane, offset=here.t - self.roads.location(here.road, lane, here.s).t)
             self._location = here
         return here
 
     def set_observed_state(self, pose: Pose, speed: float) -> None:
         """Set pose and speed [m/s] of a driven vehicle to those of the view."""
-        self._pose, self._speed = pose, speed
+        self._pose, self._speed, self._rests = pose, speed, False
 
     def set_towed_state(self, pose: Pose, front: Motion) -> None:
         """Set the pose of a trailer. It has the speed of its towing vehicle, and teleports with it."""
         self._pose, self._speed, self._teleported = pose, front.speed_along_heading, front.teleported
+        self._rests = False
 
     def clear_teleported(self) -> None:
         """Clear `teleported`, as a view shows the new pose."""
@@ -141,7 +144,7 @@ class Motion(MotionState):
 
         An actor outside the road that does not point along it keeps its heading.
         """
-        self._crosses = False
+        self._crosses = self._rests = False
         hint = self._location
         place = self.roads.locate_at(self._pose.x, self._pose.y, hint) if self.roads is not None else None
         self._set_location(place)
@@ -173,7 +176,8 @@ class Motion(MotionState):
                 if self.roads is None:
                     self._speed = 0.0
         elif distance == 0.0 and steering is None:
-            pass
+            stands = self._speed == 0.0 and math.copysign(1.0, self._speed) == 1.0
+            self._rests = stands and not self._end_of_road and not self._teleported
         elif self._location is not None and (lane_distance is not None or not self._crosses):
             self._move_along_lane(distance, steering, dt)
         else:
@@ -183,10 +187,10 @@ class Motion(MotionState):
         speed = self.speed_along_heading
         return Placement(x, y, z, h, p, r, speed, target is not None and self._teleported, across)
 
-    def placement(self) -> Placement:
+    def placement(self, *, teleport: bool = True) -> Placement:
         """Return the current placement."""
         x, y, z, h, p, r = self._pose
-        return Placement(x, y, z, h, p, r, self.speed_along_heading, True)
+        return Placement(x, y, z, h, p, r, self.speed_along_heading, teleport)
 
     def _move_along_lane(self, distance: float, steering: LateralStep | None, dt: float) -> None:
         assert self.roads is not None

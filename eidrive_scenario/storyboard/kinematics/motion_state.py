@@ -36,6 +36,12 @@ class MotionState:
         self._teleported = False
         self._teleports = 0
         self._lift = 0.0
+        self._rests = False
+
+    @property
+    def rests(self) -> bool:
+        """Whether the last step had its pose and speed 0, and the next step keeps them, as nothing was requested."""
+        return self._rests
 
     @property
     def pose(self) -> Pose:

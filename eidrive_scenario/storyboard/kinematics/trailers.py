@@ -28,6 +28,49 @@ class Displacement(NamedTuple):
 NO_DISPLACEMENT = Displacement(0.0, 0.0, 0.0)
 
 
+class Coupling(NamedTuple):
+    """Connection of a towing vehicle and its trailer.
+
+    hitch  distance of the hitch ahead of the reference point of the vehicle [m]
+    reach  distance of the coupler ahead of the reference point of the trailer [m]
+    bar    distance of the coupler ahead of the equivalent axle of the trailer [m]
+    """
+
+    front: Actor
+    back: Actor
+    hitch: float
+    reach: float
+    bar: float
+
+    @classmethod
+    def of(cls, front: Actor, back: Actor) -> Coupling:
+        """Return the connection of two actors."""
+        reach = _coupler(back)
+        return cls(front, back, _hitch(front), reach, bar(back.entity, reach))
+
+    def next_pose(self, displacement: Displacement = NO_DISPLACEMENT, *, straight: bool = False) -> Pose:
+        """Return the pose of the trailer behind its towing vehicle after a displacement of the vehicle.
+
+        The coupler is at the hitch. The axle of the trailer follows the hitch as in a single-track model without slip:
+        it is at the reference point, with several axles at the end of `bar`. `straight` aligns the trailer with the
+        vehicle. If one of them is on a slope or bank, the trailer lies in the surface of the road.
+        """
+        front, back, hitch, reach, bar = self
+        pose, before = front.motion.pose, back.motion.pose
+        dx, dy, turn = displacement
+        heading = pose.h + turn
+        x, y = pose.x + dx + hitch * math.cos(heading), pose.y + dy + hitch * math.sin(heading)
+        if not straight:
+            axle_x, axle_y = before.x, before.y
+            if offset := bar - reach:
+                axle_x, axle_y = axle_x - offset * math.cos(before.h), axle_y - offset * math.sin(before.h)
+            heading = math.atan2(y - axle_y, x - axle_x)
+        x, y = x - reach * math.cos(heading), y - reach * math.sin(heading)
+        if pose.p == pose.r == 0.0 and before.p == before.r == 0.0:
+            return Pose(x, y, pose.z, heading, 0.0, 0.0)
+        return _pose_on_surface(front, x, y, heading)
+
+
 def declared_trailer(entity: model.Element) -> str | None:
     """Return the name of the trailer that an entity has from the start; None without one."""
     if not isinstance(entity, model.Vehicle) or entity.trailer is None:
@@ -37,8 +80,11 @@ def declared_trailer(entity: model.Element) -> str | None:
     return entity.trailer.trailer_ref.entity_ref or None if entity.trailer.trailer_ref is not None else None
 
 
-def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
-    """Yield towing vehicles and their trailers, from front to end of each train; a trailer has one towing vehicle."""
+def couplings(actors: Mapping[str, Actor]) -> Iterator[Coupling]:
+    """Yield the connections of towing vehicles and trailers, from front to end of each train.
+
+    A trailer has one towing vehicle.
+    """
     drawn = {actor.trailer for actor in actors.values() if actor.trailer is not None}
     if not drawn:
         return
@@ -50,7 +96,7 @@ def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
             if back is None:
                 break
             hitched.add(back.name)
-            yield actor, back
+            yield Coupling.of(actor, back)
             actor = back
 
 
@@ -83,32 +129,6 @@ def next_displacement(front: Actor, view: WorldView, dt: float) -> Displacement:
         state.velocity_y * dt + state.acceleration_y * half,
         state.yaw_rate * dt,
     )
-
-
-def pose_behind(
-    front: Actor, back: Actor, displacement: Displacement = NO_DISPLACEMENT, *, straight: bool = False
-) -> Pose:
-    """Return the pose of a trailer behind its towing vehicle after a displacement of the vehicle.
-
-    The coupler is at the hitch. The axle of the trailer follows the hitch as in a single-track model without slip: it
-    is at the reference point, with several axles at the end of `bar`. `straight` aligns the trailer with the vehicle.
-    If one of them is on a slope or bank, the trailer lies in the surface of the road.
-    """
-    pose = front.motion.pose
-    hitch, reach = _hitch(front), _coupler(back)
-    dx, dy, turn = displacement
-    direction = pose.h + turn
-    x, y = pose.x + dx + hitch * math.cos(direction), pose.y + dy + hitch * math.sin(direction)
-    before = back.motion.pose
-    axle_offset = bar(back.entity, reach) - reach
-    axle_x, axle_y = before.x, before.y
-    if axle_offset:
-        axle_x, axle_y = before.x - axle_offset * math.cos(before.h), before.y - axle_offset * math.sin(before.h)
-    heading = direction if straight else math.atan2(y - axle_y, x - axle_x)
-    x, y = x - reach * math.cos(heading), y - reach * math.sin(heading)
-    if pose.p == pose.r == 0.0 and before.p == before.r == 0.0:
-        return Pose(x, y, pose.z, heading, 0.0, 0.0)
-    return _pose_on_surface(front, x, y, heading)
 
 
 def _pose_on_surface(front: Actor, x: float, y: float, heading: float) -> Pose:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple, Never
+
+import msgspec
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.requests import Goal, Overrides
@@ -16,6 +18,9 @@ from eidrive_scenario.roads import Pose
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
+
+NONE: Mapping[str, Never] = MappingProxyType({})
+"""No entries."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +37,7 @@ class CustomCommand:
     scope: Scope | None = None
 
 
-@dataclass
-class Commands:
+class Commands(msgspec.Struct):
     """Commands of one tick of the storyboard. The context writes them, the simulation executes them.
 
     placements   next pose of every scripted actor
@@ -52,24 +56,20 @@ class Commands:
     appearances  appearances of the actors that differ from the default
     """
 
-    placements: dict[str, Placement] = field(default_factory=dict)
-    goals: dict[str, Goal] = field(default_factory=dict)
-    spawns: dict[str, Placement] = field(default_factory=dict)
-    actor_specs: dict[str, ActorSpec] = field(default_factory=dict)
-    removals: set[str] = field(default_factory=set)
-    trailers: Mapping[str, str] = field(default_factory=dict)
+    placements: dict[str, Placement] = msgspec.field(default_factory=dict)
+    goals: dict[str, Goal] = msgspec.field(default_factory=dict)
+    spawns: dict[str, Placement] = msgspec.field(default_factory=dict)
+    actor_specs: dict[str, ActorSpec] = msgspec.field(default_factory=dict)
+    removals: set[str] = msgspec.field(default_factory=set)
+    trailers: Mapping[str, str] = NONE
     driven: frozenset[str] = frozenset()
-    overrides: Mapping[str, Overrides] = field(default_factory=dict)
-    custom: list[CustomCommand] = field(default_factory=list)
+    overrides: Mapping[str, Overrides] = NONE
+    custom: list[CustomCommand] = msgspec.field(default_factory=list)
     environment: Environment | None = None
-    signals: Mapping[str, str] = field(default_factory=dict)
-    monitors: Mapping[str, bool] = field(default_factory=dict)
-    routes: Mapping[str, Array] = field(default_factory=dict)
-    appearances: Mapping[str, Appearance] = field(default_factory=dict)
-
-
-NONE: Mapping[str, Never] = MappingProxyType({})
-"""No inputs from outside."""
+    signals: Mapping[str, str] = NONE
+    monitors: Mapping[str, bool] = NONE
+    routes: Mapping[str, Array] = NONE
+    appearances: Mapping[str, Appearance] = NONE
 
 
 class ExternalPose(NamedTuple):

@@ -77,6 +77,8 @@ class ElementStates:
         self.changes: list[StateChange] = []
         self.tick = -1
         self.time = 0.0
+        self.version = 0
+        """Number of changes so far."""
         self._matches: ReferenceMatch[ElementRecord] | None = None
 
     def register(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
@@ -100,6 +102,7 @@ class ElementStates:
         record.state = after
         if transition is not None:
             record.transitions.append((self.tick, transition))
+        self.version += 1
         self.changes.append(
             StateChange(self.time, record.path[-1], "/".join(record.path), record.kind, before, transition, after, why)
         )

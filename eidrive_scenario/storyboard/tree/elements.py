@@ -8,6 +8,7 @@
 
 Steps 2 and 3 repeat while a state changes, so that a chain of elements is executed in one tick: transitions consume no
 simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1). An element starts at most once in a tick, which bounds the loop.
+Until a state changes, both steps visit the elements with a trigger and the running actions only.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from py_trees.composites import Composite
 
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import ElementRecord, ElementState, ElementTransition
-from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
+from eidrive_scenario.storyboard.tree.trigger import Trigger, WaitForTrigger
 
 NO_TRIGGER = "it has no start trigger"
 """Reason for the start of an element without a start trigger."""
+ALWAYS = Trigger(())
+"""Trigger of an element that starts with its parent; it does not rest."""
 
 
 class StoryElement(Composite):
@@ -68,29 +71,35 @@ class StoryElement(Composite):
         if self.limit < 1:
             self._change(ElementTransition.SKIP, ElementState.COMPLETE, "maximumExecutionCount is 0")
 
-    def evaluate_triggers(self) -> None:
-        """Stop and start this element and its children by their triggers.
+    def awaited_triggers(self) -> Iterator[tuple[StoryElement, Trigger]]:
+        """Yield the elements, this one and below, that wait for a trigger, top down, and the triggers."""
+        if self.record.state is ElementState.STANDBY:
+            yield self, ALWAYS if self.start_leaf is None else self.start_leaf.trigger
+        elif self.record.state is ElementState.RUNNING:
+            if self.stop_leaf is not None:
+                yield self, self.stop_leaf.trigger
+            for element in self.elements:
+                yield from element.awaited_triggers()
+
+    def evaluate_trigger(self) -> None:
+        """Stop or start this element by its trigger; the triggers of the children of a started one are evaluated, too.
 
         A stop trigger is evaluated from the tick after the start on, that of the storyboard from the first tick on.
         """
-        record = self.record
-        state = record.state
-        if state is ElementState.COMPLETE:
+        state = self.record.state
+        if state is ElementState.COMPLETE or self._tried_at == self.context.progress.tick:
             return
-        if self._tried_at != self.context.progress.tick:
-            if state is ElementState.RUNNING:
-                stop = self.stop_leaf
-                if stop is not None and stop.is_fired():
-                    self.stop_element(stop.trigger.why)
-                    return
-            elif state is ElementState.STANDBY:
-                start = self.start_leaf
-                if start is None or start.is_fired():
-                    self.start(NO_TRIGGER if start is None else start.trigger.why)
-        if record.state is ElementState.RUNNING:
-            for element in self.elements:
-                if element.record.state is not ElementState.COMPLETE:
-                    element.evaluate_triggers()
+        if state is ElementState.RUNNING:
+            stop = self.stop_leaf
+            if stop is not None and stop.is_fired():
+                self.stop_element(stop.trigger.why)
+        elif state is ElementState.STANDBY:
+            start = self.start_leaf
+            if start is None or start.is_fired():
+                self.start(NO_TRIGGER if start is None else start.trigger.why)
+                if self.record.state is ElementState.RUNNING:
+                    for element in self.elements:
+                        element.evaluate_trigger()
 
     def start(self, why: str = "") -> None:
         """Enter runningState; the children enter standbyState."""
@@ -122,6 +131,12 @@ class StoryElement(Composite):
             for element in self.elements:
                 element.complete_finished()
             self.complete_if_done()
+
+    def running_actions(self) -> Iterator[StoryElement]:
+        """Yield the running actions, this element and below."""
+        if self.record.state is ElementState.RUNNING:
+            for element in self.elements:
+                yield from element.running_actions()
 
     def update_children(self) -> None:
         """Update the running children; end if all of them are complete."""
@@ -162,10 +177,14 @@ class StoryboardElement(StoryElement):
     """Root of the tree. It ends by its stop trigger; without one with its last story."""
 
     kind = "storyboard"
+    _listed = _updated = -1
+    """Number of state changes before the lists of elements were made, and before all elements were updated."""
+    _awaited: tuple[tuple[StoryElement, Trigger], ...] = ()
+    _running_actions: tuple[StoryElement, ...] = ()
 
     def tick_tree(self, init: Behaviour | None = None) -> None:
         """Tick the tree, and the actions of Init that are running."""
-        progress = self.context.progress
+        progress, moved, time = self.context.progress, self.context.moved, self.context.time
         if self.state is None:
             self.enter_standby()
             self.start()
@@ -176,7 +195,17 @@ class StoryboardElement(StoryElement):
         seen = -1
         while seen != len(progress.changes):
             seen = len(progress.changes)
-            self.evaluate_triggers()
+            if self._listed != progress.version:
+                self._listed = progress.version
+                self._awaited = tuple(self.awaited_triggers())
+                self._running_actions = tuple(self.running_actions())
+            for element, trigger in self._awaited:
+                if (
+                    trigger.rests_until <= time
+                    or trigger.version != progress.version
+                    or not moved.isdisjoint(trigger.reads)
+                ):
+                    element.evaluate_trigger()
             if self.state is not ElementState.RUNNING:
                 return
             if init is not None:
@@ -187,6 +216,19 @@ class StoryboardElement(StoryElement):
                 pending, self.context.pending_actions = self.context.pending_actions, []
                 for action in pending:
                     action.abort()
+
+    def update_children(self) -> None:
+        """Update the running actions. From the first change of a state on, other elements may be complete as well."""
+        progress, version = self.context.progress, self.context.progress.version
+        if self._updated == version:
+            for action in self._running_actions:
+                action.update_children()
+                if progress.version != version:
+                    break
+            else:
+                return
+        super().update_children()
+        self._updated = version
 
     def complete_if_done(self) -> None:
         """End with the last story if the storyboard has no stop trigger."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
 from py_trees.common import Status
 
@@ -182,6 +182,11 @@ class ActionElement(StoryElement):
             completing, self._completing = self._completing, []
             self._end_behaviours(completing)
 
+    def running_actions(self) -> Iterator[StoryElement]:
+        """Yield the action if it is running."""
+        if self.record.state is ElementState.RUNNING:
+            yield self
+
     def update_children(self) -> None:
         """Update the behaviours once per tick; those that reach their goals end at the end of the step."""
         self.status = Status.RUNNING
@@ -198,13 +203,15 @@ class ActionElement(StoryElement):
         done: list[ActionBehaviour] = []
         for behaviour in tuple(behaviours):
             self._update_behaviour(behaviour)
-            if behaviour.status in (Status.SUCCESS, Status.FAILURE):
+            if behaviour.status is Status.SUCCESS or behaviour.status is Status.FAILURE:
                 (done if behaviour.immediate else self._completing).append(behaviour)
-        self.context.completes_this_step = self.context.completes_this_step or bool(self._completing)
+        if self._completing:
+            self.context.completes_this_step = True
         self._end_behaviours(done)
 
     def _update_behaviour(self, behaviour: ActionBehaviour) -> None:
-        self._awaiting.pop(behaviour, None)
+        if self._awaiting:
+            self._awaiting.pop(behaviour, None)
         try:
             if behaviour.status is not Status.RUNNING and behaviour.is_actor_missing:
                 raise EntityAbsentError(behaviour.actor_name)

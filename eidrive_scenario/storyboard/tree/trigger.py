@@ -13,6 +13,7 @@ from py_trees.common import Status
 
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario.model import Rule
 from eidrive_scenario.storyboard.context.condition import Condition, Measure, truth
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
@@ -82,6 +83,11 @@ class ConditionEvaluator:
             self.result = self._apply_delay(context, result, entities)
         return self.result
 
+    @property
+    def is_delaying(self) -> bool:
+        """Whether a true result is delayed now, or has become true by a delay."""
+        return self._recorded or bool(self._history)
+
     def _apply_delay(self, context: RuntimeContext, result: bool, entities: tuple[str, ...]) -> bool:
         """Return the delayed result; true ones are stored with the explanation at their instant."""
         if result or self._recorded:
@@ -128,8 +134,7 @@ class ConditionGroup:
         """Whether all conditions are true. Each is evaluated, as edges and delays depend on earlier values."""
         holds = bool(self.monitors)
         for monitor in self.monitors:
-            if not monitor.evaluate(context):
-                holds = False
+            holds = monitor.evaluate(context) and holds
         return holds
 
 
@@ -141,10 +146,25 @@ class TriggerObserver(Protocol):
 
 
 class Trigger:
-    """Disjunction of condition groups."""
+    """Disjunction of condition groups.
+
+    It need not be evaluated while nothing changes that its conditions read: neither the motion of the entities nor the
+    state of an element, and the time has not come. As it did not fire at the last evaluation, it does not fire now.
+
+    reads        entities whose motion can let it fire
+    version      number of state changes of elements before the last evaluation
+    rests_until  time [s] before which a change of motion or states is required to let it fire
+    """
 
     def __init__(self, groups: Sequence[ConditionGroup]) -> None:
         self.groups = tuple(groups)
+        self._evaluators = tuple(evaluator for group in self.groups for evaluator in group.monitors)
+        reads = [evaluator.condition.reads for evaluator in self._evaluators]
+        is_known = all(is_built_in(type(evaluator.condition)) for evaluator in self._evaluators) and None not in reads
+        self._can_rest = is_known
+        self.reads = frozenset(name for names in reads if names for name in names)
+        self.version = -1
+        self.rests_until = -math.inf
         self.why = ""
         self.observer: TriggerObserver | None = None
         self.triggering: tuple[str, ...] = ()
@@ -155,20 +175,33 @@ class Trigger:
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Whether the trigger fires; `why` then describes the reason."""
-        fired = [group for group in self.groups if group.evaluate(context)]
+        fired = []
+        for group in self.groups:
+            if group.evaluate(context):
+                fired.append(group)
         if fired:
             self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
             names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
             self.triggering = tuple(dict.fromkeys(names))
         if self.observer is not None:
             self.observer.on_evaluated(context)
+        version, self.rests_until = context.progress.version, -math.inf
+        # After a change it is evaluated twice, so that edges are over.
+        if self._can_rest and version == self.version and not fired and context.moved.isdisjoint(self.reads):
+            self.rests_until = self._next_evaluation(context)
+        self.version = version
         return bool(fired)
+
+    def _next_evaluation(self, context: RuntimeContext) -> float:
+        if self.observer is not None or any([evaluator.is_delaying for evaluator in self._evaluators]):
+            return -math.inf
+        return min([evaluator.condition.constant_until(context) for evaluator in self._evaluators], default=math.inf)
 
     def reset(self) -> None:
         """Discard all evaluations."""
-        for group in self.groups:
-            for monitor in group.monitors:
-                monitor.reset()
+        self.version = -1
+        for evaluator in self._evaluators:
+            evaluator.reset()
 
     def describe(self) -> str:
         """Describe the trigger."""

@@ -144,15 +144,13 @@ class ScriptedBody(Body):
         """Pose x y z yaw pitch roll at the start of the last step."""
         self.is_resting = False
         """Whether it did not move in the last step, and had stopped before."""
-        self._resting_state: ActorState | None = None
+        self._state: ActorState | None = None
 
     @property
     def state(self) -> ActorState:
-        if not self.is_resting:
-            return super().state
-        if self._resting_state is None:
-            self._resting_state = super().state
-        return self._resting_state
+        if self._state is None:
+            self._state = super().state
+        return self._state
 
     @property
     def travel(self) -> float:
@@ -172,33 +170,31 @@ class ScriptedBody(Body):
 
         The velocity along the heading is the given speed. The lateral one follows from the distance if there is any.
         """
-        p, dt = placement, self._dt
-        speed = p.speed
-        after = px, py, pz, pyaw, _, _ = p.x, p.y, p.z, p.yaw, p.pitch, p.roll
+        p, dt, speed = placement, self._dt, placement.speed
+        after = px, py, pz, pyaw, pitch, roll = p.x, p.y, p.z, p.yaw, p.pitch, p.roll
         if self.is_resting and speed == 0.0 and self.from_pose == after:
             return
-        x, y, z, yaw = self.x, self.y, self.z, self.yaw
-        self.from_pose = before = (x, y, z, yaw, self.pitch, self.roll)
-        was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
-        self._pose(*after)
-        self.speed = speed
-        self.moved = before != after
+        before = x, y, z, yaw, _, _ = self.x, self.y, self.z, self.yaw, self.pitch, self.roll
+        self.moved, old = before != after, self.velocity
+        was_moving = self.yaw_rate != 0.0 or old != STILL
+        self._pose(px, py, pz, pyaw, pitch, roll)
         along = self._along_heading(speed)
         if p.teleport:
-            self.from_pose = after
-            self.velocity = self.velocity_before = along
-            self.acceleration, self.yaw_rate = STILL, 0.0
+            before, old, acceleration, yaw_rate = after, along, STILL, 0.0
         else:
             if p.across:
                 vx, vy, vz = (px - x) / dt, (py - y) / dt, (pz - z) / dt
                 fx, fy, fz = self._along_heading(1.0)
                 excess = speed - (vx * fx + vy * fy + vz * fz)
                 along = vx + excess * fx, vy + excess * fy, vz + excess * fz
-            self._accelerate_to(along)
-            self.yaw_rate = wrap_angle(pyaw - yaw) / dt if pyaw != yaw else 0.0
-        is_moving = self.moved or self.velocity != STILL
+            acceleration = (along[0] - old[0]) / dt, (along[1] - old[1]) / dt, (along[2] - old[2]) / dt
+            yaw_rate = wrap_angle(pyaw - yaw) / dt if pyaw != yaw else 0.0
+        self.from_pose, self.velocity_before, self.velocity = before, old, along
+        self.acceleration, self.yaw_rate, self.speed = acceleration, yaw_rate, speed
+        is_moving = self.moved or along != STILL
         self.stale = self.stale or was_moving or is_moving
-        self.is_resting, self._resting_state = not is_moving and self.acceleration == STILL, None
+        self.is_resting = not is_moving and acceleration == STILL
+        self._state = tuple.__new__(ActorState, (*after, *along, *acceleration, yaw_rate, speed))
 
     def end_step(
         self,
@@ -218,7 +214,7 @@ class ScriptedBody(Body):
         self.center_x, self.center_y, self.center_z = center
         self._cos, self._sin = heading
         self.from_pose, self.velocity_before, self.moved = from_pose, velocity_before, moved
-        self.stale, self.is_resting, self._resting_state = stale, is_resting, None
+        self.stale, self.is_resting, self._state = stale, is_resting, state
 
     def sync_pose(self) -> None:
         """Move the rigid body to the pose of the actor."""

@@ -29,13 +29,24 @@ class Couplings:
         self._client = client
         self.pairs: frozenset[Pair] = frozenset()
         """Names of connected actors."""
+        self._is_complete = True
+        """Whether all of them, and no others, pass through each other."""
         self._apart: dict[Pair, tuple[int, int]] = {}
         """Handles of the bodies that do not collide with each other."""
 
     @property
     def any_affected(self) -> bool:
         """Whether `update` has pairs to process."""
-        return bool(self.pairs or self._apart)
+        return not self._is_complete
+
+    def set_pairs(self, pairs: frozenset[Pair]) -> None:
+        """Set which actors are connected."""
+        self.pairs = pairs
+        self.note_change()
+
+    def note_change(self) -> None:
+        """Note that bodies have entered or left."""
+        self._is_complete = not self.pairs and not self._apart
 
     def attached(self, name: str) -> frozenset[str]:
         """Return the actors that are connected to an actor directly or by others, without the actor itself."""
@@ -61,6 +72,7 @@ class Couplings:
             elif self._apart.get(pair) != handles:
                 self._collide(handles, False)
                 self._apart[pair] = handles
+        self._is_complete = self._apart.keys() <= self.pairs
 
     def _collide(self, handles: tuple[int, int], enabled: bool) -> None:
         bullet.setCollisionFilterPair(*handles, -1, -1, int(enabled), physicsClientId=self._client)
@@ -128,8 +140,10 @@ class ContactTracker:
 
     def _start(self, bodies: BodyGroup, touches: Touches) -> tuple[Contact, ...]:
         """Return the contacts that started since the last call."""
-        begun: list[Contact] = []
         near = {(first.name, second.name): (first, second) for first, second in bodies.near_pairs(PARTED)}
+        if not (near or self._touching or touches):
+            return ()
+        begun: list[Contact] = []
         moved = bodies.moved_names() if self._touching else set()
         for pair in [pair for pair in self._touching if pair not in touches]:
             if pair in near:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
+from msgspec.structs import replace
 
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.world.actor import Placement
@@ -35,9 +36,10 @@ class KinematicWorld:
         for name in names:
             self.placements.pop(name, None)
 
-    def move(self, placements: Mapping[str, Placement]) -> None:
-        for name, after in placements.items():
+    def move(self, placements: Mapping[str, Placement], driven: Collection[str] = ()) -> None:
+        for name in [name for name in self.placements if name in placements or name not in driven]:
             before = self.placements[name]
+            after = placements.get(name) or replace(before, speed=0.0, teleport=False, across=True)
             velocity = self._rate(_position(before), _position(after))
             if after.teleport or not after.across:
                 velocity = _along(after)

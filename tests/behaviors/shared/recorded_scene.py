@@ -112,5 +112,5 @@ def _record(storyboard: Storyboard, world: KinematicWorld, ticks: int) -> Record
         record.commands.append(commands)
         world.remove(commands.removals)
         world.add(commands.spawns)
-        world.move(commands.placements)
+        world.move(commands.placements, commands.driven)
     return record

@@ -20,7 +20,7 @@ from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.kinematics.trailers import pairs
+from eidrive_scenario.storyboard.kinematics.trailers import couplings
 from eidrive_scenario.storyboard.state.element_states import StateChange
 
 RMS_LIMIT = 0.10
@@ -146,7 +146,7 @@ def _names(simulation: Simulation) -> dict[str, str]:
     assert entities is not None
     declared = {one.name for one in entities.scenario_object}
     names: dict[str, str] = {}
-    for front, back in pairs(simulation.storyboard.context.actors):
+    for front, back, *_ in couplings(simulation.storyboard.context.actors):
         if back.name not in declared:
             names[back.name] = f"{names.get(front.name, front.name)}+"
     return names

@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.actor import Actor
-from eidrive_scenario.storyboard.kinematics.trailers import bar, pose_behind
+from eidrive_scenario.storyboard.kinematics.trailers import Coupling, bar
 
 REACH = 6.0
 
@@ -49,13 +49,14 @@ def test_trailer_in_long_turn_follows_circle_of_its_equivalent_axle(axles: tuple
     trailer = vehicle(*axles, trailer_coupler=model.TrailerCoupler(dx=REACH))
     truck = vehicle((0.0, 0.0), trailer_hitch=model.TrailerHitch(dx=0.0))
     front, back = Actor("Truck", truck, (), None), Actor("Trailer", trailer, (), None)
+    coupling = Coupling.of(front, back)
     radius, step = 20.0, 0.0005
     back.motion.set_observed_state(Pose(20.0, -REACH, 0.0, math.pi / 2, 0.0, 0.0), 1.0)
     for count in range(round(2.5 * math.pi / step)):
         angle = count * step
         x, y = radius * math.cos(angle), radius * math.sin(angle)
         front.motion.set_observed_state(Pose(x, y, 0.0, angle + math.pi / 2, 0.0, 0.0), 1.0)
-        back.motion.set_towed_state(pose_behind(front, back), front.motion)
+        back.motion.set_towed_state(coupling.next_pose(), front.motion)
     length = bar(trailer, REACH)
     pose = back.motion.pose
     at = front.motion.pose.x - length * math.cos(pose.h), front.motion.pose.y - length * math.sin(pose.h)
