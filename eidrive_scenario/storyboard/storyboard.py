@@ -224,9 +224,11 @@ class Storyboard:
 
     def _completed_commands(self, commands: Commands, driven: Sequence[Actor]) -> Commands:
         context = self.context
-        commands.driven = frozenset([actor.name for actor in driven])
-        commands.goals = {actor.name: goal for actor in driven if (goal := actor.goal) is not None}
-        commands.overrides = {name: dict(overrides) for name, overrides in context.overrides.items() if overrides}
+        if driven:
+            commands.driven = frozenset([actor.name for actor in driven])
+            commands.goals = {actor.name: goal for actor in driven if (goal := actor.goal) is not None}
+        if context.overrides:
+            commands.overrides = {name: dict(overrides) for name, overrides in context.overrides.items() if overrides}
         commands.signals, commands.appearances = context.signals.states, context.appearances
         commands.monitors = context.monitors
         return commands

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
-from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model, next_change
+from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model, next_change, speed_of
 from eidrive_scenario.api.common import WorldView as View
 
 
@@ -31,9 +31,14 @@ def velocity_of(view: View, entity: str) -> list[float]:
 class MotionCondition(QuantityCondition):
     """Base class of conditions on the motion of the entity alone, and of one that the element refers to."""
 
+    by_speed: ClassVar[bool] = False
+    """Whether only a change of the speed changes the value, unless the element has a direction."""
+
     def __init__(self, element: model.Element, entities: Sequence[str], rule: str = "any") -> None:
         super().__init__(element, entities, rule)
-        self.reads = {*entities, getattr(element, "entity_ref", None) or ""}
+        names = {*entities, getattr(element, "entity_ref", None) or ""}
+        by_speed = self.by_speed and getattr(element, "direction", None) is None
+        self.reads = {speed_of(name) for name in names} if by_speed else names
 
 
 def _direction_prefix(direction: model.DirectionalDimension | None) -> str:
@@ -45,6 +50,7 @@ class SpeedCondition(MotionCondition):
 
     element: model.SpeedCondition
     unit = "m/s"
+    by_speed = True
 
     def what(self) -> str:
         """Describe the compared quantity."""
@@ -62,6 +68,7 @@ class RelativeSpeedCondition(MotionCondition):
 
     element: model.RelativeSpeedCondition
     unit = "m/s"
+    by_speed = True
 
     def what(self) -> str:
         """Describe the compared quantity."""
@@ -142,6 +149,7 @@ class StandStillCondition(DurationCondition):
     """Standstill for longer than a duration [s]."""
 
     element: model.StandStillCondition
+    by_speed = True
     state, otherwise, requirement = "standing", "moving", "stands still"
 
     def since(self, context: ConditionContext, entity: str) -> float | None:

@@ -190,21 +190,28 @@ class Cubic(Curve):
     v: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     pace: float = 1.0
 
+    def bend(self, ds: float) -> tuple[float, float]:
+        _, _, curvature, speed = self._derivatives(ds * self.pace)
+        return curvature, speed
+
     def at(self, ds: float) -> CurvePoint:
         p = ds * self.pace
         u0, u1, u2, u3 = self.u
         v0, v1, v2, v3 = self.v
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
+        du, dv, curvature, speed = self._derivatives(p)
+        x, y = self.x + self.cos * u - self.sin * v, self.y + self.sin * u + self.cos * v
+        return CurvePoint(x, y, self.h + math.atan2(dv, du), curvature, speed)
+
+    def _derivatives(self, p: float) -> tuple[float, float, float, float]:
+        """Return the derivatives of u and v by p, the curvature [1/m], and the path length per meter of s."""
+        _, u1, u2, u3 = self.u
+        _, v1, v2, v3 = self.v
         du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
         ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
         norm = math.hypot(du, dv)
-        return CurvePoint(
-            self.x + self.cos * u - self.sin * v,
-            self.y + self.sin * u + self.cos * v,
-            self.h + math.atan2(dv, du),
-            (du * ddv - dv * ddu) / norm**3 if norm > STANDSTILL else 0.0,
-            norm * self.pace,
-        )
+        curvature = (du * ddv - dv * ddu) / norm**3 if norm > STANDSTILL else 0.0
+        return du, dv, curvature, norm * self.pace
 
 
 def spiral(

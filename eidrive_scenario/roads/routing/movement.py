@@ -12,10 +12,8 @@ from eidrive_scenario.roads.model.curves import Arc
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.routing.links import LaneLinks
-from eidrive_scenario.roads.routing.steady_lanes import LEAST_REST, SteadyLane
+from eidrive_scenario.roads.routing.steady_lanes import LEAST_REST, STRIDE, SteadyLane
 
-STRIDE = 2.0
-"""Maximum step of the integration along a curved lane [m]."""
 EQUAL_TURN = 1e-6
 """Maximum difference of the sizes of two turns that count as equal [rad]."""
 LOOK_AHEAD = 30.0

@@ -29,6 +29,15 @@ if TYPE_CHECKING:
 E = TypeVar("E", bound=model.Element)
 
 
+Motive = str | tuple[str, str]
+"""Motion of an entity, by its name; with `speed` a change of its speed."""
+
+
+def speed_of(name: str) -> Motive:
+    """Return the change of the speed of an entity."""
+    return name, "speed"
+
+
 class EntityAbsentError(LookupError):
     """The position of an entity is required, and the entity is absent."""
 

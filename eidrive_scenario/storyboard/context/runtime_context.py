@@ -15,9 +15,11 @@ from eidrive_scenario.storyboard.context.protocols import (
     DomainHolder,
     E,
     EntityAbsentError,
+    Motive,
     PendingAction,
     PositionCache,
     PreemptableAction,
+    speed_of,
 )
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
@@ -40,7 +42,7 @@ class RuntimeContext:
     The other members are for the storyboard and its tree: element states, holders of control domains, pending actions.
 
     view         ground truth of this tick; it has no actors before the first view (Init)
-    moved        entities whose state differs from that in the last view; all after a change of the actors of the view
+    moved        entities whose state, and whose speed, differs from that in the last view; all if actors enter or leave
     dt           length of the current step [s]; 0 in Init
     parameters, variables  values by name, as text
     monitors     values by name
@@ -62,7 +64,7 @@ class RuntimeContext:
         self.dt = 0.0
         self.seed = seed
         self.view = empty_view
-        self.moved: set[str] = set()
+        self.moved: set[Motive] = set()
         self.progress = ElementStates()
         self.parameters: dict[str, str] = dict(scenario.parameters)
         self.variables: dict[str, str] = dict(scenario.variables)
@@ -119,19 +121,23 @@ class RuntimeContext:
         self.external_poses.update(external_poses)
         self.commands = Commands()
         self.progress.begin(view.tick, view.time)
-        moved, rows, states = set(), view.rows, view.states
+        moved: set[Motive] = set()
+        rows, states = view.rows, view.states
         for name, actor in self.actors.items():
             row = rows.get(name)
             if row is not None:
-                if actor.motion.rests and states[row] is actor.last_state and not actor.tracks_off_road:
+                last = actor.last_state
+                if states[row] is last and actor.motion.rests and not actor.tracks_off_road:
                     continue
                 if actor.observe(view, row):
                     moved.add(name)
+                    if last is None or last.speed != states[row].speed:
+                        moved.add(speed_of(name))
                 if actor.tracks_off_road:
                     actor.update_off_road(self.roads, view)
                 if actor.tracks_end_of_road and actor.driven:
                     actor.update_end_of_road(self.roads, view)
-        self.moved = moved if view.names is last_names else set(self.actors)
+        self.moved = moved if view.names is last_names else {*self.actors, *map(speed_of, self.actors)}
 
     def pose(self, name: str) -> Pose:
         """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""

@@ -152,7 +152,7 @@ class Actor:
             self.standing_since = view.time
         if self.driven:
             motion.set_observed_state(pose_of(view, row), speed)
-        else:
+        elif end_of_road or self.end_of_road_since is not None:
             self._set_at_end_of_road(end_of_road, view.time)
         return True
 

@@ -215,7 +215,12 @@ class Motion(MotionState):
             lane_pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
         self._location = here
         against = self.roads.driving_direction(here.road, here.lane) < 0
-        x, y, z, h, p, r = lane_pose.turned(self._heading + math.pi if against else self._heading)
+        turn = self._heading + math.pi if against else self._heading
+        x, y, z, h, p, r = lane_pose
+        if p == 0.0 and r == 0.0:
+            h += turn
+        else:
+            _, _, _, h, p, r = lane_pose.turned(turn)
         # twice as fast as the constructor of the named tuple
         self._pose = tuple.__new__(Pose, (x, y, z if self._lift == 0.0 else z + self._lift, wrap_angle(h), p, r))
 

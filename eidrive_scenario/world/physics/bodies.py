@@ -178,13 +178,14 @@ class ScriptedBody(Body):
         self.moved, old = before != after, self.velocity
         was_moving = self.yaw_rate != 0.0 or old != STILL
         self._pose(px, py, pz, pyaw, pitch, roll)
-        along = self._along_heading(speed)
+        cos, sin = self._cos, self._sin
+        along = (speed * cos, speed * sin, 0.0) if pitch == 0.0 else self._along_heading(speed)
         if p.teleport:
             before, old, acceleration, yaw_rate = after, along, STILL, 0.0
         else:
             if p.across:
                 vx, vy, vz = (px - x) / dt, (py - y) / dt, (pz - z) / dt
-                fx, fy, fz = self._along_heading(1.0)
+                fx, fy, fz = (cos, sin, 0.0) if pitch == 0.0 else self._along_heading(1.0)
                 excess = speed - (vx * fx + vy * fy + vz * fz)
                 along = vx + excess * fx, vy + excess * fy, vz + excess * fz
             acceleration = (along[0] - old[0]) / dt, (along[1] - old[1]) / dt, (along[2] - old[2]) / dt

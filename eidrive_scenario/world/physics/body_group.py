@@ -89,6 +89,7 @@ class BodyGroup:
     def __init__(self, bodies: Sequence[Body]) -> None:
         self._bodies = tuple(bodies)
         self._by_name = {body.name: body for body in bodies if isinstance(body, ScriptedBody)}
+        self._widest = max((body.radius for body in bodies), default=0.0)
         self._rows_format = struct.Struct(f"{14 * len(self._bodies)}d")
         self._moving = [*self._by_name.values()]
         """Scripted bodies that do not rest."""
@@ -150,16 +151,20 @@ class BodyGroup:
             self._update(set(chain.from_iterable(pairs)))
             return [(self._bodies[row], self._bodies[other]) for row, other in pairs]
         # Without this comparison one by one, runs with few actors take 1.2 to 1.3 times longer.
-        bodies = self.current()
-        moved = [row for row, body in enumerate(bodies) if body.moved]
-        near = []
-        for row in moved:
+        bodies, near = self.current(), []
+        by_x = sorted([(body.center_x, row, body.moved) for row, body in enumerate(bodies)])
+        for index, (x, row, moved) in enumerate(by_x, 1):
             body = bodies[row]
-            x, y, radius = body.center_x, body.center_y, body.radius + gap
-            for other_row, other in enumerate(bodies):
-                dx, dy, reach = other.center_x - x, other.center_y - y, radius + other.radius
-                if dx * dx + dy * dy <= reach * reach and (other_row > row or not other.moved) and other_row != row:
-                    near.append((row, other_row) if row < other_row else (other_row, row))
+            y, radius = body.center_y, body.radius + gap
+            limit = x + radius + self._widest
+            for other_x, other_row, other_moved in by_x[index:]:
+                if other_x > limit:
+                    break
+                if moved or other_moved:
+                    other = bodies[other_row]
+                    dx, dy, reach = other_x - x, other.center_y - y, radius + other.radius
+                    if dx * dx + dy * dy <= reach * reach:
+                        near.append((row, other_row) if row < other_row else (other_row, row))
         return [(bodies[row], bodies[other]) for row, other in sorted(near)]
 
     def _update(self, rows: Collection[int]) -> None:
