@@ -23,6 +23,8 @@ BOX_SAMPLES: Array = np.array(
 )
 """Points (10, 3) of a box, in half lengths from its center: eight corners, the center, the middle of the top."""
 
+TURN = 2.0 * math.pi
+"""Full turn [rad]."""
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 
 
@@ -32,9 +34,7 @@ def wrap_angle(angle: float) -> float: ...
 def wrap_angle(angle: Array) -> Array: ...
 def wrap_angle(angle: Any) -> Any:
     """Return the equivalent angle in (-pi, pi] [rad]; a float or an array."""
-    if isinstance(angle, np.ndarray):
-        return np.pi - (np.pi - angle) % (2 * np.pi)
-    return math.pi - (math.pi - angle) % (2 * math.pi)
+    return math.pi - (math.pi - angle) % TURN
 
 
 def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:

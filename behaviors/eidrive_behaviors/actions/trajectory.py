@@ -261,16 +261,15 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set the pose at the end of the step."""
-        if self.actor.driven:
+        actor = self.actor
+        if actor.driven:
             return self._set_driver_goal()
-        motion, dt, layout = self.actor.motion, self.context.dt, self._layout
+        motion, dt, layout = actor.motion, self.context.dt, self._layout
         if dt > 0.0 and not self._begun:
             self._begin()
-        if dt > 0.0:
+        if dt > 0.0 and not self._direction_known:
             self._determine_direction()
-        if self._pursuit is not None or (
-            dt == 0.0 and self._follows_limits and self.actor.present and self._put is None
-        ):
+        if self._pursuit is not None or (dt == 0.0 and self._follows_limits and actor.present and self._put is None):
             return self._drive(self._pursuit)
         way = self._progress.way
         if self._timing is None:
@@ -288,7 +287,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._progress.move(self.context.view.tick, before, after)
         self._update_backing()
         pose = self._pose(after)
-        if dt == 0.0 or not self.actor.present:
+        if dt == 0.0 or not actor.present:
             self._enter(pose)
         else:
             rail = None if self._timing is not None else partial(self._pose_after_distance, before)

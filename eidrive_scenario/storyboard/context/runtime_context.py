@@ -118,7 +118,8 @@ class RuntimeContext:
         self.view = view
         self.dt = dt
         self.user_values = user_values
-        self.external_poses.update(external_poses)
+        if external_poses:
+            self.external_poses.update(external_poses)
         self.commands = Commands()
         self.progress.begin(view.tick, view.time)
         moved: set[Motive] = set()

@@ -251,7 +251,11 @@ def blend(a: Pose, b: Pose, share: float) -> Pose:
         a.x + share * (b.x - a.x),
         a.y + share * (b.y - a.y),
         a.z + share * (b.z - a.z),
-        a.h + share * wrap_angle(b.h - a.h),
-        a.p + share * wrap_angle(b.p - a.p),
-        a.r + share * wrap_angle(b.r - a.r),
+        _blend_angle(a.h, b.h, share),
+        _blend_angle(a.p, b.p, share),
+        _blend_angle(a.r, b.r, share),
     )
+
+
+def _blend_angle(a: float, b: float, share: float) -> float:
+    return a + share * wrap_angle(b - a) if a != b else a + 0.0

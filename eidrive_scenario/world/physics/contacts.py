@@ -148,7 +148,7 @@ class ContactTracker:
         for pair in [pair for pair in self._touching if pair not in touches]:
             if pair in near:
                 first, second = near[pair]
-                if box_distance(first.box, second.box) <= PARTED:
+                if frozenset(pair) in self._couplings.pairs or box_distance(first.box, second.box) <= PARTED:
                     continue
             elif moved.isdisjoint(pair):
                 continue
