@@ -348,9 +348,12 @@ class BodyBatch(BodyGroup):
 
     def _placements(self, placements: Mapping[str, Placement]) -> Array:
         """Return the placements of the scripted bodies as rows; that of a body without one is its pose, at rest."""
-        found = list(map(placements.get, self._names))
-        rows = [astuple(placement or Placement(*self._state[row, :6].tolist())) for row, placement in enumerate(found)]
-        return np.fromiter(chain.from_iterable(rows), float, _FIELDS * len(rows)).reshape(-1, _FIELDS)
+        given = [row for row, name in enumerate(self._names) if name in placements]
+        rows = [astuple(placements[self._names[row]]) for row in given]
+        wanted = np.empty((len(self._names), _FIELDS))
+        wanted[:, :6], wanted[:, 6:] = self._state[:, :6], astuple(Placement(0.0, 0.0))[6:]
+        wanted[given] = np.fromiter(chain.from_iterable(rows), float, _FIELDS * len(rows)).reshape(-1, _FIELDS)
+        return wanted
 
 
 def _along_heading(speed: Array, cos: Array, sin: Array, pitch: Array, pitched: Integers) -> Array:
