@@ -27,7 +27,7 @@ from eidrive_scenario.storyboard.context.protocols import ActionContext as Actio
 from eidrive_scenario.storyboard.context.protocols import ConditionContext as ConditionContext
 from eidrive_scenario.storyboard.context.protocols import ControllerContext as ControllerContext
 from eidrive_scenario.storyboard.context.protocols import EntityAbsentError as EntityAbsentError
-from eidrive_scenario.storyboard.context.protocols import speed_of as speed_of
+from eidrive_scenario.storyboard.context.protocols import speed_change as speed_change
 from eidrive_scenario.storyboard.kinematics.actor import Actor as Actor
 from eidrive_scenario.storyboard.kinematics.motion import STEEPEST as STEEPEST
 from eidrive_scenario.storyboard.kinematics.motion import LateralStep as LateralStep

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
-from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model, next_change, speed_of
+from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model, next_change, speed_change
 from eidrive_scenario.api.common import WorldView as View
 
 
@@ -38,7 +38,7 @@ class MotionCondition(QuantityCondition):
         super().__init__(element, entities, rule)
         names = {*entities, getattr(element, "entity_ref", None) or ""}
         by_speed = self.by_speed and getattr(element, "direction", None) is None
-        self.reads = {speed_of(name) for name in names} if by_speed else names
+        self.reads = {speed_change(name) for name in names} if by_speed else names
 
 
 def _direction_prefix(direction: model.DirectionalDimension | None) -> str:

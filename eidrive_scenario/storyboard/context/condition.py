@@ -13,7 +13,7 @@ from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.storyboard.context.protocols import ConditionContext, Motive
+from eidrive_scenario.storyboard.context.protocols import ConditionContext, MotionChange
 
 SYMBOLS = {
     "greaterThan": ">",
@@ -81,9 +81,9 @@ class Condition(ABC):
     instant: ClassVar[bool] = False
     """True if its value can change within a tick, as states of elements and values that actions set do. It is then
     evaluated again after such a change. Other conditions are evaluated once per tick."""
-    reads: Collection[Motive] | None = None
-    """Motions that change its value, beside time and the states of storyboard elements. None if anything else changes
-    it: it is then evaluated in every tick."""
+    reads: Collection[MotionChange] | None = None
+    """Motion that changes its value, beside time and the states of storyboard elements. None if anything else changes
+    it: it is then evaluated in every tick, as conditions of third parties are."""
 
     def __init__(self, element: model.Element) -> None:
         self.element = element

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 E = TypeVar("E", bound=model.Element)
 
 
-Motive = str | tuple[str, str]
-"""Motion of an entity, by its name; with `speed` a change of its speed."""
+MotionChange = str | tuple[str, str]
+"""Change of the state of an entity, by its name, or of its speed, by its name and `speed`."""
 
 
-def speed_of(name: str) -> Motive:
+def speed_change(name: str) -> MotionChange:
     """Return the change of the speed of an entity."""
     return name, "speed"
 

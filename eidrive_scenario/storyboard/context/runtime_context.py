@@ -15,11 +15,11 @@ from eidrive_scenario.storyboard.context.protocols import (
     DomainHolder,
     E,
     EntityAbsentError,
-    Motive,
+    MotionChange,
     PendingAction,
     PositionCache,
     PreemptableAction,
-    speed_of,
+    speed_change,
 )
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
@@ -64,7 +64,7 @@ class RuntimeContext:
         self.dt = 0.0
         self.seed = seed
         self.view = empty_view
-        self.moved: set[Motive] = set()
+        self.moved: set[MotionChange] = set()
         self.progress = ElementStates()
         self.parameters: dict[str, str] = dict(scenario.parameters)
         self.variables: dict[str, str] = dict(scenario.variables)
@@ -122,7 +122,7 @@ class RuntimeContext:
             self.external_poses.update(external_poses)
         self.commands = Commands()
         self.progress.begin(view.tick, view.time)
-        moved: set[Motive] = set()
+        moved: set[MotionChange] = set()
         rows, states = view.rows, view.states
         for name, actor in self.actors.items():
             row = rows.get(name)
@@ -133,12 +133,12 @@ class RuntimeContext:
                 if actor.observe(view, row):
                     moved.add(name)
                     if last is None or last.speed != states[row].speed:
-                        moved.add(speed_of(name))
+                        moved.add(speed_change(name))
                 if actor.tracks_off_road:
                     actor.update_off_road(self.roads, view)
                 if actor.tracks_end_of_road and actor.driven:
                     actor.update_end_of_road(self.roads, view)
-        self.moved = moved if view.names is last_names else {*self.actors, *map(speed_of, self.actors)}
+        self.moved = moved if view.names is last_names else {*self.actors, *map(speed_change, self.actors)}
 
     def pose(self, name: str) -> Pose:
         """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""

@@ -40,7 +40,7 @@ class CustomCommand:
 class Commands(msgspec.Struct):
     """Commands of one tick of the storyboard. The context writes them, the simulation executes them.
 
-    placements   next pose of every scripted actor
+    placements   next pose of each scripted actor; one without it stands
     goals        requests to driven actors; an actor without an entry follows its own settings
     spawns       placements of the actors that enter the world
     actor_specs  bodies of entering actors whose body does not follow from an entity, such as background traffic
