@@ -107,8 +107,11 @@ def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: flo
     """
     labels = np.array(numbers, dtype=np.intp)
     boxes = np.concatenate([report.boxes for report in reports])
+    scores = np.concatenate([report.scores for report in reports])
+    velocity = np.concatenate([report.velocity for report in reports])
+    covariance = np.concatenate([report.covariance for report in reports])
     count = max(numbers) + 1
-    means = _means(boxes, labels, count)
+    means, score, mean_velocity, mean_covariance = _means((boxes, scores, velocity, covariance), labels, count)
     words = [word for report in reports for word in report.classes]
     votes: list[list[str]] = [[] for _ in range(count)]
     yaws: list[list[float]] = [[] for _ in range(count)]
@@ -119,10 +122,10 @@ def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: flo
     return Detections(
         now,
         means,
-        _means(np.concatenate([report.scores for report in reports]), labels, count),
+        score,
         tuple(map(_most_frequent, votes)),
-        _means(np.concatenate([report.velocity for report in reports]), labels, count),
-        _means(np.concatenate([report.covariance for report in reports]), labels, count),
+        mean_velocity,
+        mean_covariance,
     )
 
 
@@ -142,14 +145,18 @@ def _mean_yaw(yaws: Sequence[float]) -> float:
     )
 
 
-def _means(values: Array, labels: NDArray[np.intp], count: int) -> Array:
-    """Return the means (G, ...) of the values (K, ...) without NaN of each label, added in order; NaN if there is none.
+def _means(quantities: Sequence[Array], labels: NDArray[np.intp], count: int) -> list[Array]:
+    """Return the means (G, ...) of quantities (K, ...) without NaN of each label, added in order; NaN if there is none.
 
     Sums begin with -0, the neutral element of addition, so that a single value is unchanged to the bit.
     """
-    known = ~np.isnan(values.reshape(len(values), -1)).any(axis=1)
-    values, labels = values[known], labels[known]
-    total, means = np.full((count, *values.shape[1:]), -0.0), np.full((count, *values.shape[1:]), math.nan)
-    np.add.at(total, labels, values)
-    counts = np.bincount(labels, minlength=count).reshape(-1, *[1] * (values.ndim - 1))
-    return np.divide(total, counts, out=means, where=counts > 0)
+    columns = [values.reshape(len(values), -1) for values in quantities]
+    widths = [values.shape[1] for values in columns]
+    table, starts = np.concatenate(columns, axis=1), np.cumsum([0, *widths[:-1]])
+    known = ~np.logical_or.reduceat(np.isnan(table), starts, axis=1).repeat(widths, axis=1)
+    total, counts = np.full((count, table.shape[1]), -0.0), np.zeros((count, table.shape[1]))
+    np.add.at(total, labels, np.where(known, table, -0.0))
+    np.add.at(counts, labels, known)
+    means = np.divide(total, counts, out=np.full(total.shape, math.nan), where=counts > 0)
+    split = zip(starts.tolist(), widths, quantities, strict=True)
+    return [means[:, start : start + width].reshape(-1, *values.shape[1:]) for start, width, values in split]
