@@ -116,11 +116,10 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         cls,
         states: Sequence[ActorState],
         table: Array,
-        boxes: Sequence[Sequence[float]] | None,
+        actors: ActorColumns,
         *,
         time: float,
         tick: int,
-        actors: ActorColumns,
         contacts: tuple[Contact, ...],
         unseen: tuple[str, ...],
         unseen_by: Mapping[str, tuple[str, ...]],
@@ -128,7 +127,6 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         """Return the view of actors in these states. What the caller has already is not computed from the arrays.
 
         table   (N, 14) the same states
-        boxes   the same as `plain_boxes`, None if it is not known
         actors  what is constant while no actor enters or leaves
         """
         view = cls(
@@ -152,8 +150,6 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         )
         known = view.__dict__
         known["states"], known["kinematics"], known["rows"] = states, table[:, :9], actors.rows
-        if boxes is not None:
-            known["plain_boxes"] = boxes
         return view
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from eidrive_scenario.world.physics.rays import Crossings, cast_rays, find_cross
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.surfaces import Surfaces
-from eidrive_scenario.world.view import FEW, GROUND, NOTHING, ActorColumns, Contact, RayHits, WorldView
+from eidrive_scenario.world.view import GROUND, NOTHING, ActorColumns, Contact, RayHits, WorldView
 from eidrive_scenario.world.weather import Weather
 
 
@@ -309,10 +309,9 @@ class World:
         return WorldView.of_states(
             states,
             table,
-            [body.box for body in actors.bodies.current()] if len(states) <= FEW else None,
+            actors.columns,
             time=self.time,
             tick=self.tick,
-            actors=actors.columns,
             contacts=contacts,
             unseen=self._unseen,
             unseen_by=self._unseen_by,

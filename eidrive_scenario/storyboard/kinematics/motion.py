@@ -214,7 +214,7 @@ class Motion(MotionState):
         if lane_pose is None:
             lane_pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
         self._location = here
-        against = self.roads.driving_direction(here.road, here.lane) < 0
+        against = self.roads.roads[here.road].directions[here.lane] < 0
         turn = self._heading + math.pi if against else self._heading
         x, y, z, h, p, r = lane_pose
         if p == 0.0 and r == 0.0:
