@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
+
+from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
@@ -12,10 +15,25 @@ DISTANCES = (1e-9, 0.01, 0.3, 2.0, 7.0, 60.0, 500.0)
 """Lengths of the steps [m]."""
 
 
+CUBICS = """<geometry s="0" x="0" y="0" hdg="0.3" length="60">
+<paramPoly3 pRange="arcLength" aU="0" bU="1" cU="0" dU="-1e-5" aV="0" bV="0" cV="4e-3" dV="-3e-5"/></geometry>
+<geometry s="60" x="55" y="25" hdg="0.4" length="40">
+<paramPoly3 pRange="normalized" aU="0" bU="40" cU="0" dU="-1" aV="0" bV="0" cV="-3" dV="2"/></geometry>"""
+"""Plan view of 100 m of cubics."""
+SLOPE = '<elevationProfile><elevation s="0" a="1" b="0.04" c="-1e-4" d="0"/></elevationProfile>'
+
+
+def networks() -> Iterator[RoadNetwork]:
+    """Yield the roads of the library, and a road of cubics with and without a slope."""
+    yield from map(RoadNetwork.load, sorted(library_path().rglob("*.xodr")))
+    for profiles in ("", SLOPE):
+        text = map_xml(road_xml(geometry=CUBICS, profiles=profiles))
+        yield RoadNetwork.parse(text.encode(), "cubics")
+
+
 def test_step_in_section_equals_advance_and_lane_pose_bit_by_bit() -> None:
     draw, compared = random.Random(4), 0
-    for file in sorted(library_path().rglob("*.xodr")):
-        network = RoadNetwork.load(file)
+    for network in networks():
         for _ in range(60):
             road = draw.choice(list(network.roads.values()))
             section = draw.choice(road.sections)
@@ -35,8 +53,7 @@ def test_step_in_section_equals_advance_and_lane_pose_bit_by_bit() -> None:
 def test_steps_to_the_ends_of_steady_parts_equal_advance_bit_by_bit() -> None:
     """Parts end at lane sections and at curves of the reference line; steps that do not remain within one have none."""
     draw, compared, ended = random.Random(8), 0, 0
-    for file in sorted(library_path().rglob("*.xodr")):
-        network = RoadNetwork.load(file)
+    for network in networks():
         for road in network.roads.values():
             ends = [*road.reference.starts, *road.section_starts, road.length]
             s = draw.uniform(0.0, road.length)
