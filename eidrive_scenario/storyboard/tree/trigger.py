@@ -148,10 +148,10 @@ class TriggerObserver(Protocol):
 class Trigger:
     """Disjunction of condition groups.
 
-    It need not be evaluated while nothing changes that its conditions read: neither the motion of the entities nor the
-    state of an element, and the time has not come. As it did not fire at the last evaluation, it does not fire now.
+    It need not be evaluated while nothing changes that its conditions read: the motion of entities, the states of
+    elements, and the time that a condition awaits. As it did not fire at the last evaluation, it does not fire then.
 
-    reads        entities whose motion can let it fire
+    reads        motion that can let it fire
     version      number of state changes of elements before the last evaluation
     rests_until  time [s] before which a change of motion or states is required to let it fire
     """
