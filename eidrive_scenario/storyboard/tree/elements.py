@@ -3,12 +3,12 @@
 `tick_tree` executes one tick:
 
 1. Actions that the last step completed end, and with them, bottom up, the elements whose children are complete.
-2. `evaluate_triggers` stops and starts elements, top down.
+2. `evaluate_trigger` stops and starts elements, top down.
 3. `update_children` lets each running action decide on the next step, once per tick. Actions that only set a value end.
 
 Steps 2 and 3 repeat while a state changes, so that a chain of elements is executed in one tick: transitions consume no
 simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1). An element starts at most once in a tick, which bounds the loop.
-Until a state changes, both steps visit the elements with a trigger and the running actions only.
+Until a state changes, they visit the elements that wait for a trigger, and the running actions only.
 """
 
 from __future__ import annotations
