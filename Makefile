@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help help-all install demo test test-all lint reproduce docs check-docs check-standards bench bench-compare bench-corpora bench-history eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
+.PHONY: help help-all install demo test test-all lint reproduce docs check-docs check-standards bench bench-compare bench-corpora bench-history eval closed-loop planners overtaking corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -hE '^[a-z-]+:.* ## ' $(MAKEFILE_LIST) | sed -E 's/:.* ## /\t/' | expand -t 20
@@ -86,6 +86,9 @@ library-pictures: install  #- draw the scenarios of the library: docs/library/*.
 
 planners: install  #- run the scenes for planners with two planners, 10 seeds each: reports/planner_scenes.md
 	$(BIN)/python -m eidrive_reports.planner_scenes --out reports
+
+overtaking: install  #- overtake with oncoming traffic at gaps of 4 to 20 s, and in random drives: reports/overtaking.md
+	$(BIN)/python -m eidrive_reports.overtaking --out reports --detector lidar --detector yolov5
 
 driven-files: install  #- drive the files of EIDRIVE_CORPORA by the planner: reports/driven_corpora.md
 	@test -n "$$EIDRIVE_CORPORA" || { echo 'EIDRIVE_CORPORA is not set: the folder of the corpora'; exit 2; }
