@@ -139,6 +139,9 @@ SWUNG = 0.3
 """Offset from the route from which on the vehicle is beside it [m]."""
 SPARE = 0.2
 """Clearance beside a passed obstacle in addition to the lateral margin [m], so that rounding does not block it."""
+EARLY = 0.5
+"""Share of the way to a meeting with an oncoming cyclist after which the vehicle is aside; a choice, so that it may
+slow down meanwhile."""
 BESIDE_BUS = 1.0
 """Clearance beside a standing bus, from behind which passengers may come [m]; a choice."""
 LEAST_CLEARANCE = 0.25
@@ -242,16 +245,17 @@ def extended(
 
 
 def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
-    """Return the nearest hypothesis that comes towards the vehicle in the lane of its route."""
+    """Return the nearest hypothesis that comes towards the vehicle in the lane of its route, or a cyclist or pedestrian
+    whose distance the vehicle should keep there."""
     center = situation.s + body.center
+
+    def comes(one: Present) -> bool:
+        if situation.kind_of(one.owner) in VULNERABLE:
+            return one.speed < -ONCOMING_SPEED and _is_in_way(one, body.half_width)
+        return one.speed < -WRONG_WAY and abs(one.d) - one.half_width < body.half_width
+
     found = [
-        one
-        for one in scene.present
-        if one.speed < -WRONG_WAY
-        and one.s > center
-        and not one.crosses
-        and abs(one.d) - one.half_width < body.half_width
-        and scene.certain[one.row]
+        one for one in scene.present if one.s > center and not one.crosses and comes(one) and scene.certain[one.row]
     ]
     return min(found, key=attrgetter("s"), default=None)
 
@@ -259,19 +263,36 @@ def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present |
 def _evasions(
     situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, head_on: Present
 ) -> list[LateralProfile]:
-    """Return changes to the neighboring lanes that reach as far as an oncoming vehicle, and are free behind.
+    """Return changes to the neighboring lanes that reach as far as an oncoming vehicle, and are free behind, and
+    motions past an oncoming cyclist or pedestrian.
 
-    The first one is away from the lanes of the opposite direction.
+    The first lane is away from those of the opposite direction.
     """
     places = (situation.s + 10.0, head_on.s)
     here, there = (situation.line.lanes_beside(situation.lanes_at(place)) for place in places)
     evasions = []
+    if situation.kind_of(head_on.owner) in VULNERABLE:
+        obstacle = _meeting(situation, head_on, body)
+        around = [_around(situation, settings, obstacle, body, side) for side in (here.overtaking, -here.overtaking)]
+        evasions += [profile for profile in around if profile is not None]
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
         if not (math.isnan(offset) or math.isnan(beyond)) and has_gap_now(scene, offset, situation.motion, body):
             start = Start(*situation.steered, situation.speed)
             evasions.append(to_lane(offset, start, settings.lateral_acceleration))
     return evasions
+
+
+def _meeting(situation: Situation, head_on: Present, body: Body) -> _Obstacle:
+    """Return an oncoming object between the places at which the vehicle should be aside [m]."""
+    gap = max(head_on.rear - situation.s - body.front, 0.0)
+    way = gap * situation.speed / (situation.speed - head_on.speed)
+    begin, end = situation.s + EARLY * way, situation.s + way + 2.0 * head_on.half_length + body.wheelbase
+    end += body.rear + BEFORE_OBSTACLE
+    step = (end - begin) / 3.0
+    places = (begin, begin + step, begin + 2.0 * step, end)
+    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in places]
+    return _Obstacle([head_on], begin, end, beside)
 
 
 def _behind_neighbor(

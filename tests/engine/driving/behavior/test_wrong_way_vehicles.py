@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
-from planned_drive import LANE, KnownBox, PlannedDrive, behavior
+from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 from signal_street import CAR
 
 from eidrive_scenario.roads import RoadNetwork
@@ -73,3 +73,28 @@ def test_vehicle_without_a_neighboring_lane_stands_before_the_collision() -> Non
 def test_lane_is_kept_if_lane_changes_are_switched_off() -> None:
     run = drive(2, 1, lane_changes=False)
     assert max(abs(y - LANE) for _, y, _ in run.path) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("kind", "y", "speed"),
+    [
+        ("bicycle", LANE - 1.4, 4.0),
+        ("bicycle", LANE, 4.0),
+        ("bicycle", LANE - 1.2, 9.0),
+        ("pedestrian", LANE - 1.2, 1.4),
+    ],
+)
+def test_wrong_way_cyclist_has_one_meter_without_a_stop(kind: str, y: float, speed: float) -> None:
+    """Cyclists and pedestrians come at the edge or in the middle of the lane; the other lane is empty."""
+    roads = two_lane_road(600.0)
+    run = PlannedDrive(behavior(roads, 12.0), roads, speed=12.0)
+
+    def other(now: float) -> KnownBox:
+        return KnownBox(160.0 - speed * now, y, vx=-speed, kind=kind, size=(1.8, 0.6), yaw=math.pi)
+
+    run.run(18.0, lambda now: [other(now)])
+    run.world.close()
+    beside = [place for tick, (x, place, _) in enumerate(run.path) if abs(x + 1.4 - other(0.05 * tick).x) < 3.0]
+    assert min(beside) - CAR.size[1] / 2.0 - (y + 0.3) > 0.95
+    assert min(run.speeds) > 4.0
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.15)
