@@ -19,7 +19,7 @@ import typer
 from typer.main import get_command
 
 from eidrive_scenario import __version__
-from eidrive_scenario.cli.output import Guarded, echo, make_writable, print_error
+from eidrive_scenario.cli.output import BROKEN_PIPE, Guarded, echo, flush_output, make_writable, print_error
 from eidrive_scenario.cli.supervision import allow
 from eidrive_scenario.errors import ABORTED
 
@@ -156,10 +156,17 @@ def main() -> None:
     make_writable()
     allow()
     try:
-        app()
+        try:
+            app()
+        finally:
+            flush_output()
+    except BrokenPipeError as error:
+        raise SystemExit(BROKEN_PIPE) from error
     except OSError as error:
         # Help and usage errors are printed before a command runs.
         print_error(error)
+        with suppress(OSError):
+            flush_output()
         raise SystemExit(ABORTED) from error
     finally:
         # The process ends, and the system frees its memory. A last search for garbage would take 0.1 s.

@@ -8,6 +8,7 @@ import shlex
 import sys
 import traceback
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -42,6 +43,16 @@ def echo(message: object, *, err: bool = False, color: str = "") -> None:
     typer.echo(typer.style(text, fg=color) if color else text, err=err)
 
 
+def flush_output() -> None:
+    """Write the buffered output. If that fails it is discarded, so that the flush at exit does not fail again: raise
+    OSError."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise
+
+
 def _writable(stream: TextIO | None) -> TextIO:
     if stream is None:
         return open(os.devnull, "w", encoding="utf-8")
@@ -56,7 +67,7 @@ def has_all_characters() -> bool:
     return (getattr(sys.stdout, "encoding", None) or "utf-8").lower().replace("-", "") in ("utf8", "utf16", "utf32")
 
 
-_INTERRUPTED, _BROKEN_PIPE = 130, 141
+_INTERRUPTED, BROKEN_PIPE = 130, 141
 """Exit codes of shells: 128 + SIGINT, 128 + SIGPIPE."""
 
 
@@ -82,10 +93,12 @@ class Guarded(TyperGroup):
                 raise
             # The reader, for example `head`, closed the pipe; rich replaces the error by the exit of a failed run.
             if isinstance(error.__context__ if isinstance(error, SystemExit) else error, BrokenPipeError):
-                # Without this, the flush at exit reports the error again.
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-                raise typer.Exit(_BROKEN_PIPE) from error
+                with suppress(OSError):
+                    flush_output()
+                raise typer.Exit(BROKEN_PIPE) from error
             (show_traceback if ctx.params.get("traceback") else print_error)(error)
+            with suppress(OSError):
+                flush_output()
             raise typer.Exit(ABORTED) from error
 
 

@@ -26,7 +26,8 @@ def eidrive(
     *arguments: str | Path, stdout: int | IO[bytes] = subprocess.PIPE, **variables: str
 ) -> subprocess.CompletedProcess[bytes]:
     command = [sys.executable, "-m", "eidrive_scenario", *map(str, arguments)]
-    environment = {**os.environ, **variables}
+    # In a shell, Python writes what it has buffered at its end, too.
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"} | variables
     return subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, env=environment, check=False)
 
 
