@@ -215,7 +215,9 @@ def passing_profiles(
         # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
         sides: tuple[int, ...] = (overtaking, -overtaking)
         if moves:
-            sides = (overtaking,) if math.isnan(beside.left) and math.isnan(beside.right) else ()
+            one_lane = math.isnan(beside.left) and math.isnan(beside.right)
+            solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
+            sides = (overtaking,) if one_lane and not solid else ()
         profiles += [
             profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
         ]

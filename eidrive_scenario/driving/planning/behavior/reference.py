@@ -13,6 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.path import PlannedPath, path_heights
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
+from eidrive_scenario.roads.model.road_map import LaneSection
 from eidrive_scenario.roads.routing.graph import assumed_speed
 
 NARROWEST = 2.5
@@ -42,6 +43,8 @@ class LanesBeside(NamedTuple):
     overtaking: int = 1
     oncoming_limit: float = math.nan
     """Speed limit of the nearest lane of the opposite direction [m/s]; NaN if there is none."""
+    has_solid_line: bool = False
+    """Whether a solid line separates the vehicle from the lanes of the opposite direction."""
 
     @property
     def faster(self) -> float:
@@ -68,6 +71,7 @@ class LanesBeside(NamedTuple):
             -self.far_edge,
             -self.overtaking,
             self.oncoming_limit,
+            self.has_solid_line,
         )
 
 
@@ -246,7 +250,18 @@ class ReferenceLine:
             return beside
         opposite = min(lanes, key=lambda lane: abs(lane.center - beside.oncoming))
         limit = self._roads.speed_limit(place.road, place.s, opposite.number)
+        section = self._roads.road(place.road).section_at(place.s)
+        beside = beside._replace(has_solid_line=_has_solid_line(section, place.s, place.lane))
         return beside if limit is None else beside._replace(oncoming_limit=limit)
+
+
+def _has_solid_line(section: LaneSection, s: float, lane: int) -> bool:
+    """Return whether the line in the middle of the road that is nearest to a lane is solid at s."""
+    middle = section.lanes.get(0)
+    marks = [mark for mark in (middle.road_marks if middle is not None else ()) if mark.s_offset <= s - section.s]
+    # The lines of a mark in the middle are named from left to right.
+    kinds = marks[-1].type.split() if marks else []
+    return bool(kinds) and kinds[-1 if lane < 0 else 0] == "solid"
 
 
 class _Lane(NamedTuple):

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
+from opendrive_xml import map_xml, road_xml
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 from signal_street import CAR
 
 from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
+from eidrive_scenario.roads import RoadNetwork
 
 
 @pytest.mark.parametrize("y", [LANE, LANE - 1.0])
@@ -103,6 +106,35 @@ def test_slow_bicycle_is_overtaken_on_an_empty_road() -> None:
     run.world.close()
     assert run.front > 220.0
     assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("mark", "overtakes"),
+    [("solid", False), ("solid solid", False), ("broken solid", False), ("solid broken", True), ("broken", True)],
+)
+def test_moving_vehicle_is_not_overtaken_over_a_solid_line(mark: str, overtakes: bool) -> None:
+    """The lines of a mark in the middle are named from left to right; the vehicle is to the right of them."""
+    roads = marked_road(mark)
+    run = PlannedDrive(behavior(roads, 13.0), roads, speed=13.0)
+    run.run(24.0, lambda now: [KnownBox(60.0 + 4.5 * now, vx=4.5, kind="bicycle", size=(1.8, 0.6))])
+    run.world.close()
+    assert (run.front > 60.0 + 4.5 * 24.0 + 5.0) == overtakes
+    assert overtakes or max(y for _, y, _ in run.path) < 0.0
+
+
+def test_standing_vehicle_is_passed_over_a_solid_line() -> None:
+    roads = marked_road("solid")
+    run = PlannedDrive(behavior(roads), roads)
+    run.run(26.0, lambda now: [KnownBox(70.0)])
+    run.world.close()
+    assert run.front > 120.0
+
+
+def marked_road(mark: str) -> RoadNetwork:
+    """Return a road of two directions with a mark in the middle."""
+    lane = f'<lane id="0" type="none"><roadMark sOffset="0" type="{mark}"/></lane>'
+    road = re.sub("<center>.*?</center>", f"<center>{lane}</center>", road_xml(length=600.0), flags=re.DOTALL)
+    return RoadNetwork.parse(map_xml(road))
 
 
 def test_bicycle_is_followed_until_the_oncoming_lane_is_free() -> None:
