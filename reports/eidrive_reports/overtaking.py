@@ -333,14 +333,14 @@ def draw(runs: Sequence[OvertakingRun], path: Path) -> None:
     """Draw the shares of accepted gaps over their duration."""
     figure = Figure(figsize=(7.0, 3.5), layout="constrained")
     axes = figure.add_subplot()
-    axes.axvspan(*CRITICAL_GAPS, color="0.88", label="critical gaps of HCM, turns from and into the road")
+    axes.axvspan(*CRITICAL_GAPS, color="0.88", label="critical gaps of turns (HCM)")
     for kind, marker in zip(OBSTACLES, "osD^", strict=True):
         shares = [accepted / max(count, 1) for accepted, count in _accepted(runs, kind)]
         axes.plot(GAPS, shares, marker=marker, label=kind)
     axes.set_xlabel("gap in oncoming traffic [s]")
     axes.set_ylabel("share of accepted gaps")
     axes.set_xticks(GAPS)
-    axes.legend(fontsize="small")
+    figure.legend(loc="outside upper center", ncols=3, fontsize="small")
     figure.savefig(path, dpi=150)
 
 
