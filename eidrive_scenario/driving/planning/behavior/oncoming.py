@@ -47,6 +47,8 @@ FREE_TIME = 1.0
 FARTHEST = 150.0
 """Distance of the view into the oncoming lane for which the vehicle waits farther behind an object [m]: traffic at
 50 km/h needs 11 s for it, about the duration of a maneuver from standstill."""
+LONGEST_VIEW = 500.0
+"""Distance up to which a view is of use [m]: traffic at 130 km/h needs 14 s for it, longer than a maneuver takes."""
 SAMPLE = 2.0
 """Spacing of the places on the oncoming lane that are checked for a view [m]."""
 RESPONSE, RESPONSE_DECELERATION = 1.0, 3.0
@@ -105,7 +107,7 @@ class OncomingTraffic:
     """
 
     def __init__(self, view: float, times: Array, body: Body, settings: BehaviorSettings) -> None:
-        self._ahead: Array = np.arange(SAMPLE, view + SAMPLE, SAMPLE)
+        self._ahead: Array = np.arange(SAMPLE, min(view, LONGEST_VIEW) + SAMPLE, SAMPLE)
         """Distances of the places that are checked for a view [m]."""
         self._times = times
         self._body = body
