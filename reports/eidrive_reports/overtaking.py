@@ -4,7 +4,7 @@ python -m eidrive_reports.overtaking --out reports --figures docs/figures
 
 Behind each kind of obstacle the ego meets oncoming traffic: two cars, a gap, and a column. The share of the gaps that
 it accepts is drawn over their duration. Random drives vary the obstacle, all speeds and gaps, and the range of the
-sensors; they are repeated with other detectors. The output is overtaking.md and overtaking.svg.
+sensors; they are repeated with other detectors. The output is overtaking.md and overtaking.png.
 """
 
 from __future__ import annotations
