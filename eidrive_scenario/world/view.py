@@ -148,8 +148,8 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
             unseen,
             unseen_by,
         )
-        known = view.__dict__
-        known["states"], known["kinematics"], known["rows"] = states, table[:, :9], actors.rows
+        cache = view.__dict__
+        cache["states"], cache["kinematics"], cache["rows"] = states, table[:, :9], actors.rows
         return view
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:

@@ -232,8 +232,10 @@ def extended(
     It is the same if there are none, if they need more clearance to its side, or if the vehicle returns already.
     """
     side, end = profile.side, profile.places[-2] if len(profile.places) > 2 else -math.inf
+    if profile.last != 0.0 or situation.steered[0] >= end:
+        return profile
     blocker = _blocker(situation, scene, body)
-    if blocker is None or profile.last != 0.0 or not situation.steered[0] < end or blocker.rear > end + TOGETHER:
+    if blocker is None or blocker.rear > end + TOGETHER:
         return profile
     obstacle = _obstacle(situation, scene, settings, blocker, body)
     if obstacle is None or obstacle.end <= end or max(one.speed for one in obstacle.objects) > ONCOMING_SPEED:

@@ -37,7 +37,8 @@ LONG, LONGEST = 2, 4
 begins behind a standing object without a place to see from: it would wait forever. A choice."""
 HEADWAYS = 4.0 / 3.0
 """Time since the last oncoming vehicle over the longest headway that was observed, up to which the traffic may go on; a
-choice."""
+compromise: with 3 none of 60 random drives of `eidrive_reports.overtaking` collided, but those behind a truck waited
+more than half a minute after the last car."""
 LEAST_HEADWAY = 1.0
 """Difference between expected arrivals that belong to different vehicles [s]."""
 SLOWEST = 0.5
