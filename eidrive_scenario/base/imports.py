@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
+from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 
@@ -47,5 +48,5 @@ def optional_import(module: str, extra: str) -> Any:
         return import_module(module)
     except ImportError as error:
         top = module.partition(".")[0]
-        hint = f"install it: pip install 'eidrive-scenario[{extra}]'"
+        hint = f"install it: {install_command(extra)}"
         raise SettingError(Diagnostic(f"{_PACKAGES.get(top, top)} is not installed", hint)) from error

@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.base.installation import requirement_source
 from eidrive_scenario.cli.output import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
@@ -70,7 +71,7 @@ def _write(source: Traversable, folder: Path, package: str, written: list[Path])
         bare = entry.name.removesuffix(_SUFFIX)
         path = folder / _NAMES.get(bare, bare).format(package=package)
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = entry.read_text(encoding="utf-8").replace("@package@", package)
+        text = entry.read_text(encoding="utf-8").replace("@package@", package).replace("@source@", requirement_source())
         written.append(path)
         path.write_text(text.replace("@name@", package.replace("_", "-")), encoding="utf-8")
 

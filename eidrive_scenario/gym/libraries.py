@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.errors import Diagnostic, SettingError
 
-INSTALL = "install it: pip install 'eidrive-scenario[gym]'"
+INSTALL = f"install it: {install_command('gym')}"
 """Hint of the error for a missing library."""
 
 try:

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 
 import cv2
 
+from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import write_atomically
@@ -177,7 +178,7 @@ def _encode(station: RecordedStation, path: Path, size: tuple[int, int], rate: f
     try:
         import imageio_ffmpeg
     except ImportError as error:
-        hint = "pip install 'eidrive-scenario[film]'"
+        hint = f"install it: {install_command('film')}"
         raise SettingError(Diagnostic("films require imageio-ffmpeg, which is not installed", hint)) from error
     source = ["-f", "rawvideo", "-pix_fmt", "bgr24", "-s", f"{size[0]}x{size[1]}", "-r", f"{rate:g}", "-i", "-"]
     with TemporaryDirectory() as folder:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.v2x.messages.message import Message, StationState
@@ -56,7 +57,7 @@ class Asn1Encoder:
         try:
             import asn1tools
         except ImportError as error:
-            hint = "install it with pip install 'eidrive-scenario[asn1]'"
+            hint = f"install it: {install_command('asn1')}"
             raise SettingError(Diagnostic("asn1_files requires package asn1tools", hint, source, line)) from error
         for file in files:
             if not is_regular_file(file):

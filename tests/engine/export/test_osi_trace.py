@@ -191,5 +191,5 @@ def test_missing_library_raises_error_with_install_command(tmp_path: Path, monke
     for module in [name for name in sys.modules if name.partition(".")[0] == "osi3"]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "osi3", None)
-    with pytest.raises(SettingError, match=r"osi-python is not installed; install it: pip install 'eidrive-scenario\["):
+    with pytest.raises(SettingError, match=r"osi-python is not installed; install it: pip install .*\["):
         write_osi(run, tmp_path / "t.mcap")

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from eidrive_scenario.base.installation import install_command
+
 PAGE = Path(__file__).parents[3] / "docs" / "reinforcement_learning.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -37,4 +39,4 @@ def test_missing_library_is_an_error_with_the_command_that_installs_it(module: s
         "    print(error)\n"
     )
     printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
-    assert printed.strip() == f"{library} is not installed; install it: pip install 'eidrive-scenario[gym]'"
+    assert printed.strip() == f"{library} is not installed; install it: {install_command('gym')}"
