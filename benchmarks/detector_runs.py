@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -16,9 +16,10 @@ from eidrive_scenario.extensions.library import library_path, resolve_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 SCENARIO = "coop/scenario_1"
-DEFAULT = ""
-AS_EI_DRIVE = "{camera: {width: 800, height: 600, rate: 20}, lidar: {rate: 20}}"
+DEFAULT: Mapping[str, str] = {}
+AS_EI_DRIVE = {"sensors": "{camera: {width: 800, height: 600, rate: 20}, lidar: {rate: 20}}"}
 """Image of CARLA's default size and a lidar reading in each tick."""
+INT8 = {"detector_settings": "{precision: int8}"}
 
 
 class RunTime(NamedTuple):
@@ -29,9 +30,9 @@ class RunTime(NamedTuple):
     passed: bool
 
 
-def run(detector: str, sensors: str, seed: int) -> RunTime:
-    """Run the scenario once; `sensors` is the property of that name of the stations, empty for the default."""
-    with _scenario(sensors) as path:
+def run(detector: str, properties: Mapping[str, str], seed: int) -> RunTime:
+    """Run the scenario once; `properties` are those of the controllers of the stations."""
+    with _scenario(properties) as path:
         simulation = Simulation(load_for_seed(path, seed, {}), seed=seed, settings=RunSettings(detector=detector))
         start = time.process_time()
         result = simulation.run()
@@ -40,15 +41,16 @@ def run(detector: str, sensors: str, seed: int) -> RunTime:
 
 
 @contextmanager
-def _scenario(sensors: str) -> Iterator[Path]:
-    """Yield the path of the scenario, or of a copy with these sensors."""
+def _scenario(properties: Mapping[str, str]) -> Iterator[Path]:
+    """Yield the path of the scenario, or of a copy with these properties."""
     path = resolve_scenario(SCENARIO)
-    if not sensors:
+    if not properties:
         yield path
         return
     text = path.read_text(encoding="utf-8").replace('"../', f'"{library_path()}/')
     oracle = '<Property name="detector" value="oracle"/>'
+    added = "".join(f'<Property name="{name}" value="{value}"/>' for name, value in properties.items())
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
-        copy.write_text(text.replace(oracle, f'{oracle}<Property name="sensors" value="{sensors}"/>'), encoding="utf-8")
+        copy.write_text(text.replace(oracle, oracle + added), encoding="utf-8")
         yield copy

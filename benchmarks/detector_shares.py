@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
 from typing import Any
@@ -33,10 +33,10 @@ PARTS: dict[str, tuple[tuple[type, str], ...]] = {
 """Measured methods by component, each without the measured methods that it calls: a detector draws the images."""
 
 
-def measured_run(detector: str, sensors: str, seed: int) -> tuple[RunTime, dict[str, float]]:
+def measured_run(detector: str, properties: Mapping[str, str], seed: int) -> tuple[RunTime, dict[str, float]]:
     """Run the scenario once; return its times, and the processor time of each of PARTS [s]."""
     with measured_parts() as parts:
-        return run(detector, sensors, seed), parts
+        return run(detector, properties, seed), parts
 
 
 @contextmanager
@@ -82,13 +82,13 @@ def print_table(seed: int, repeats: int) -> None:
         f"OpenCV {cv2.getNumThreads()} thread; simulated time per processor time, and shares by component"
     )
     print(f"{'':38}" + "".join(f"{part:>10}" for part in (*PARTS, "rest")))
-    for detector, sensors in CASES:
+    for detector, properties in CASES:
         best, parts = min(
-            (measured_run(detector, sensors, seed) for _ in range(repeats)),
+            (measured_run(detector, properties, seed) for _ in range(repeats)),
             key=lambda entry: entry[0].total / entry[0].simulated,
         )
         shares = [*parts.values(), best.total - sum(parts.values())]
-        name = f"{detector}, {'800 x 600 and lidar at 20 Hz' if sensors else 'default sensors'}"
+        name = f"{detector}, {'800 x 600 and lidar at 20 Hz' if properties else 'default sensors'}"
         cells = "".join(f"{100 * share / best.total:8.0f} %" for share in shares)
         verdict = "passed" if best.passed else "failed"
         print(f"{name:38}{cells}   {best.simulated / best.total:.2f} times real time, {verdict}")

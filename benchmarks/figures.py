@@ -67,15 +67,22 @@ def heavy_traffic() -> float:
     return DT * len(ticks[0]) / sum_of_minima(ticks)
 
 
-def detector(name: str, sensors: str = "") -> float:
+def detector(name: str, properties: Mapping[str, str] | None = None) -> float:
     """Return the simulated time of scenario 1 with a detector on two stations per processor time."""
     import cv2
     from detector_runs import run
 
     cv2.setNumThreads(1)
-    run(name, sensors, seed=1)
-    measured = run(name, sensors, seed=1)
+    run(name, properties or {}, seed=1)
+    measured = run(name, properties or {}, seed=1)
     return measured.simulated / measured.total
+
+
+def integers(name: str) -> float:
+    """Return the figure of a detector whose network computes with 8-bit integers."""
+    from detector_runs import INT8
+
+    return detector(name, INT8)
 
 
 def large_images() -> float:
@@ -161,6 +168,8 @@ FIGURES: Mapping[str, Figure] = {
     "scenario_5": Figure(REAL_TIME, heavy_traffic, 10.0),
     "yolov5": Figure(REAL_TIME, lambda: detector("yolov5"), 3.0, 1.44),
     "ssd": Figure(REAL_TIME, lambda: detector("ssd"), 3.0, 1.37),
+    "yolov5_int8": Figure(REAL_TIME, lambda: integers("yolov5"), 3.5),
+    "ssd_int8": Figure(REAL_TIME, lambda: integers("ssd"), 3.5),
     "yolov5_800x600": Figure(REAL_TIME, large_images, 1.2, 0.44),
     "lidar": Figure(REAL_TIME, lambda: detector("lidar"), 5.0, 2.48),
     "cars_200": Figure(REAL_TIME, lambda: traffic(200, 100, 30.0), 20.0, 6.7, maps=True),

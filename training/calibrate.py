@@ -145,13 +145,10 @@ def main() -> None:
     images = list(distant_vehicles(camera, options.worlds))
     for name in options.networks:
         path = SHIPPED / f"{name}.npz"
-        with np.load(path) as stored:
-            arrays = {key: stored[key] for key in stored.files}
-        description = json.loads(str(arrays[DESCRIPTION]))
-        _write(path, arrays, {**description, "outward": []})
+        write_description(path, outward=[])
         errors = edge_errors(build_network(name, LearnedSettings()), images)
         rows = outward_rows(errors)
-        _write(path, arrays, {**description, "outward": rows})
+        write_description(path, outward=rows)
         card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
         card["outward"] = {"script": "training/calibrate.py", "boxes": len(errors), "rows": rows}
         path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
@@ -160,8 +157,12 @@ def main() -> None:
             print(f"{height:6.1f} px high: {', '.join(f'{value:+.2f}' for value in outward)} px outwards")
 
 
-def _write(path: Path, arrays: dict[str, NDArray[np.generic]], description: dict[str, object]) -> None:
-    np.savez_compressed(path, **{**arrays, DESCRIPTION: np.array(json.dumps(description))})  # type: ignore[arg-type]
+def write_description(path: Path, **entries: object) -> None:
+    """Set entries of the description in a weight file."""
+    with np.load(path) as stored:
+        arrays = {key: stored[key] for key in stored.files}
+    description = {**json.loads(str(arrays[DESCRIPTION])), **entries}
+    np.savez_compressed(path, **{**arrays, DESCRIPTION: np.array(json.dumps(description))})
 
 
 if __name__ == "__main__":

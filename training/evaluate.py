@@ -25,9 +25,9 @@ from training.image_evaluation import (
     center_errors,
     evaluate_dataset,
     evaluate_scenes,
-    held_out,
     milliseconds,
     parameters,
+    rendered,
 )
 from training.light_scenes import light_scenes
 from training.light_scores import light_table, readings
@@ -57,7 +57,7 @@ def evaluate(options: argparse.Namespace) -> None:
     names = [name for name in DETECTORS if (SHIPPED / f"{name}.npz").is_file()]
     networks = {name: build_network(name, LearnedSettings()) for name in names}
     sensitive_networks = {name: build_network(name, LearnedSettings(confidence=LOW)) for name in names}
-    dataset = held_out(options.data / "held_out", options.seed, options.pictures, options.processes)
+    dataset = rendered("held_out", options.data / "held_out", options.seed, options.pictures, options.processes)
     clear = Weather(name="clear")
     fog = load_weather("foggy_morning").model_copy(update={"name": "fog"})
     scenes = list(library_scenes([clear, fog]))

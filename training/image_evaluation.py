@@ -24,14 +24,14 @@ MATCHED_WITHIN = 4.0
 """Maximum distance of a lifted box from the center of its object [m]."""
 
 
-def held_out(folder: Path, seed: int, images: int, processes: int) -> Dataset:
-    """Return the held-out images, rendered if they are missing."""
+def rendered(split: str, folder: Path, seed: int, images: int, processes: int) -> Dataset:
+    """Return the images of a split, rendered if they are missing."""
     if not (folder / "labels.npz").is_file():
         shots: list[Shot] = []
         worlds = -(-images // PER_WORLD)
-        for number, found in enumerate(render(seed, "held_out", worlds, 0, processes)):
+        for number, found in enumerate(render(seed, split, worlds, 0, processes)):
             shots += found
-            print(f"\rrendering held-out images: {(number + 1) * PER_WORLD}/{worlds * PER_WORLD}", end="", flush=True)
+            print(f"\rrendering images of {split}: {(number + 1) * PER_WORLD}/{worlds * PER_WORLD}", end="", flush=True)
         print()
         write(folder, [entry.data for entry in shots], table(shots))
     return Dataset.load(folder)

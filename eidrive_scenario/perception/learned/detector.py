@@ -57,7 +57,9 @@ class LearnedDetector(Detector):
         self._signals: tuple[SignalReading, ...] = ()
         path = weights_path(self.network, self.settings)
         check_weights_exist(path)
-        self.library_versions = runtime_versions(select_runtime(path, self.settings.runtime, self.settings.device))
+        self.library_versions = runtime_versions(
+            select_runtime(path, self.settings.runtime, self.settings.device, self.settings.precision)
+        )
         self._network: ImageNetwork | None = None
         self.processes_batches = self.settings.device == "cuda"
         self._prepared: Mapping[str, ImageDetections] = {}

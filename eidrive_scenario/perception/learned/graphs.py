@@ -14,6 +14,7 @@ from eidrive_scenario.perception.learned.networks.ssd_sizes import STRIDES as SS
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, DEPTHS, WIDTHS
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import STRIDES as YOLO_STRIDES
 from eidrive_scenario.perception.learned.onnx_file import Attribute, Node, onnx_model
+from eidrive_scenario.perception.learned.quantization import Ranges, quantized
 
 IMAGE = "image"
 _EPSILON = 1e-3
@@ -93,18 +94,25 @@ class Graph:
         attributes = {"coordinate_transformation_mode": "asymmetric", "mode": "nearest", "nearest_mode": "floor"}
         return self._add("Resize", (source, "", "doubled"), self._channels[source], **attributes)
 
-    def onnx(self, input_size: tuple[int, int], outputs: Mapping[str, int]) -> bytes:
+    def onnx(self, input_size: tuple[int, int], outputs: Mapping[str, int], ranges: Ranges | None) -> bytes:
         """Return the ONNX model.
 
         input_size  width and height of its input [px]
         outputs     layers whose outputs it returns, with the distance of their cells [px]
+        ranges      of the layers, to compute with 8-bit integers; None: in single precision
+
+        Raise ValueError if a range is missing.
         """
         width, height = input_size
         shapes = {
             name: (1, self._channels[name], -(-height // stride), -(-width // stride))
             for name, stride in outputs.items()
         }
-        return onnx_model(self._nodes, self._tensors, {IMAGE: (1, 3, height, width)}, shapes)
+        nodes: Sequence[Node] = self._nodes
+        tensors: Mapping[str, NDArray[Any]] = self._tensors
+        if ranges is not None:
+            nodes, tensors = quantized(nodes, tensors, IMAGE, list(outputs), ranges)
+        return onnx_model(nodes, tensors, {IMAGE: (1, 3, height, width)}, shapes)
 
     def _convolution(
         self, source: str, name: str, weight: Any, bias: Any, stride: int, padding: int, groups: int
@@ -128,8 +136,10 @@ class Graph:
         return output
 
 
-def ssd_onnx(arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tuple[int, int]) -> bytes:
-    """Return the ONNX model of these weights.
+def ssd_onnx(
+    arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tuple[int, int], ranges: Ranges | None = None
+) -> bytes:
+    """Return the ONNX model of these weights, with 8-bit integers if the ranges of its layers are given.
 
     Its outputs are encoded boxes (1, 6 · 4, H/s, W/s) of each stride s, then class logits (1, 6 · (1 + C), H/s, W/s).
     Raise ValueError if the weights do not fit.
@@ -148,7 +158,7 @@ def ssd_onnx(arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tuple
             width = graph.channels(level)
             x = graph.conv_unit(level, f"{kind}.{number}.0", width, 3, groups=width)
             outputs[graph.head(x, f"{kind}.{number}.1", BOXES_PER_CELL * each)] = stride
-    return graph.onnx(input_size, outputs)
+    return graph.onnx(input_size, outputs, ranges)
 
 
 def _separable_units(graph: Graph, source: str, name: str, units: tuple[tuple[int, int], ...], first: int = 0) -> str:
@@ -166,8 +176,10 @@ def _separable_unit(graph: Graph, source: str, name: str, outputs: int, stride: 
     return graph.sum(source, x) if stride == 1 and inputs == outputs else x
 
 
-def yolov5_onnx(arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tuple[int, int]) -> bytes:
-    """Return the ONNX model of these weights.
+def yolov5_onnx(
+    arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tuple[int, int], ranges: Ranges | None = None
+) -> bytes:
+    """Return the ONNX model of these weights, with 8-bit integers if the ranges of its layers are given.
 
     Its outputs are (1, A (5 + C), H/s, W/s) for each stride s, before the sigmoid. Raise ValueError if the weights do
     not fit.
@@ -200,9 +212,8 @@ def yolov5_onnx(arrays: Mapping[str, NDArray[Any]], classes: int, input_size: tu
     coarse = _cross_stage(graph, x, "out_coarse", w5, 1, shortcut=False)
     channels = ANCHORS_PER_SCALE * (5 + classes)
     levels = enumerate(zip((fine, middle, coarse), YOLO_STRIDES, strict=True))
-    return graph.onnx(
-        input_size, {graph.head(level, f"heads.{number}", channels): stride for number, (level, stride) in levels}
-    )
+    outputs = {graph.head(level, f"heads.{number}", channels): stride for number, (level, stride) in levels}
+    return graph.onnx(input_size, outputs, ranges)
 
 
 def _cross_stage(graph: Graph, source: str, name: str, outputs: int, depth: int, *, shortcut: bool = True) -> str:

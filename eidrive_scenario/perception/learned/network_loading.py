@@ -36,7 +36,7 @@ def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     check_weights_exist(path)
     if path.suffix == TORCHSCRIPT_SUFFIX and not torchscript_is_allowed(allow_torchscript):
         raise refused_torchscript(path)
-    runtime = select_runtime(path, settings.runtime, settings.device)
+    runtime = select_runtime(path, settings.runtime, settings.device, settings.precision)
     if not is_installed(runtime):
         raise missing_runtime(runtime)
 
@@ -48,7 +48,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     """
     check_network(name, settings, allow_torchscript=allow_torchscript)
     path = weights_path(name, settings)
-    runtime = select_runtime(path, settings.runtime, settings.device)
+    runtime = select_runtime(path, settings.runtime, settings.device, settings.precision)
     if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         return ExternalNetwork(
             path,
@@ -62,7 +62,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
             device=settings.device,
             allow_torchscript=torchscript_is_allowed(allow_torchscript),
         )
-    network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device)
+    network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device, settings.precision)
     if network.name != name:
         message = f"weights {quoted(str(path))} are of another network (got {network.name!r}; expected {name!r})"
         raise SettingError(Diagnostic(message, f"use the detector {network.name!r}"))

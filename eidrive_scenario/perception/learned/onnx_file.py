@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-
-from eidrive_scenario.base.arrays import Floats
+from numpy.typing import NDArray
 
 IR_VERSION = 8
 OPSET = 13
@@ -19,6 +19,8 @@ OPSET = 13
 _VARINT, _LENGTH, _FIXED32 = 0, 2, 5
 _FLOAT = 1
 """TensorProto.FLOAT."""
+_ELEMENT_TYPES = {"float32": _FLOAT, "uint8": 2, "int8": 3, "int32": 6}
+"""TensorProto.DataType by type in numpy."""
 _ATTRIBUTE_TYPES = {float: 1, int: 2, str: 3, tuple: 7}
 """AttributeProto.AttributeType by type in Python; tuples are of whole numbers."""
 
@@ -37,14 +39,14 @@ class Node:
 
 def onnx_model(
     nodes: Sequence[Node],
-    tensors: Mapping[str, Floats],
+    tensors: Mapping[str, NDArray[Any]],
     inputs: Mapping[str, Sequence[int]],
     outputs: Mapping[str, Sequence[int]],
 ) -> bytes:
     """Return the content of an ONNX file.
 
     nodes            operations in the order of execution
-    tensors          constants in single precision, by name
+    tensors          constants by name, in single precision or of integers with 8 or 32 bits
     inputs, outputs  shapes by name
     """
     graph = b"".join(
@@ -84,9 +86,10 @@ def _attribute(name: str, value: Attribute) -> bytes:
     return _text(1, name) + content + _integer(20, _ATTRIBUTE_TYPES[type(value)])
 
 
-def _tensor(name: str, value: Floats) -> bytes:
+def _tensor(name: str, value: NDArray[Any]) -> bytes:
     shape = b"".join(_integer(1, side) for side in value.shape)
-    return shape + _integer(2, _FLOAT) + _text(8, name) + _block(9, value.astype("<f4").tobytes())
+    content = value.astype(value.dtype.newbyteorder("<")).tobytes()
+    return shape + _integer(2, _ELEMENT_TYPES[value.dtype.name]) + _text(8, name) + _block(9, content)
 
 
 def _value_info(name: str, shape: Sequence[int]) -> bytes:

@@ -18,7 +18,7 @@ from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.image_network import VEHICLES, Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.networks import ssd_sizes, yolov5_sizes
 from eidrive_scenario.perception.learned.runtimes import Device, Runtime, load_onnx
-from eidrive_scenario.perception.learned.weights import Weights, read, read_weights, suitable
+from eidrive_scenario.perception.learned.weights import Precision, Weights, read, read_weights, suitable
 from eidrive_scenario.sensing.readings import CameraReading
 
 
@@ -129,13 +129,14 @@ class OwnNetwork(ImageNetwork):
         confidence: float | None = None,
         threads: int = 1,
         device: Device = "cpu",
+        precision: Precision = "float32",
     ) -> None:
         digest = hashlib.sha256(read_weights(path)).hexdigest()
-        weights, self._infer = _loaded(path, digest, runtime, threads, device)
+        weights, self._infer = _loaded(path, digest, runtime, threads, device, precision)
         description = weights.description
         super().__init__(description.classes, description.input_size, confidence or description.confidence)
         self.name = description.network
-        self.identity: str = f"{digest} {self.confidence!r} {runtime} {threads} {device}"
+        self.identity: str = f"{digest} {self.confidence!r} {runtime} {threads} {device} {precision}"
         self._outward: Floats = np.array(description.outward, dtype=float).reshape(-1, 5)
         self._anchors = weights.arrays["anchors"] if self.name == "yolov5" else None
 
@@ -202,7 +203,9 @@ class OwnNetwork(ImageNetwork):
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: Path, digest: str, runtime: Runtime, threads: int, device: Device) -> tuple[Weights, Infer]:
+def _loaded(
+    path: Path, digest: str, runtime: Runtime, threads: int, device: Device, precision: Precision
+) -> tuple[Weights, Infer]:
     """Return a weight file with this digest and its function, which stations and runs share."""
     weights = read(path)
     if runtime == "torch":
@@ -212,11 +215,11 @@ def _loaded(path: Path, digest: str, runtime: Runtime, threads: int, device: Dev
             network = trainable(weights)
         return weights, TorchNetwork(network, threads, device, GPU_BATCH if device == "cuda" else 1)
     with suitable(path):
-        content = weights.onnx()
+        content = weights.onnx(precision)
     compute = load_onnx(runtime, path, threads, content)
-    return weights, lambda images: [compute(_planes(image)) for image in images]
+    return weights, lambda images: [compute(planes(image)) for image in images]
 
 
-def _planes(image: NDArray[np.uint8]) -> Floats:
+def planes(image: NDArray[np.uint8]) -> Floats:
     """Return an image (H, W, 3) as (1, 3, H, W) in [0, 1]."""
     return np.divide(np.stack(cv2.split(image))[None], np.float32(255.0), dtype=np.float32)

@@ -21,8 +21,9 @@ import cv2
 import numpy as np
 
 from eidrive_scenario.base.arrays import Floats
+from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
-from eidrive_scenario.perception.learned.weights import ONNX_SUFFIX, TORCHSCRIPT_SUFFIX, read_weights
+from eidrive_scenario.perception.learned.weights import ONNX_SUFFIX, TORCHSCRIPT_SUFFIX, Precision, read_weights
 
 Runtime = Literal["onnxruntime", "openvino", "torch", "opencv"]
 Device = Literal["cpu", "cuda"]
@@ -35,8 +36,10 @@ _EXTRAS: Mapping[Runtime, str] = {"openvino": "openvino", "onnxruntime": "onnx",
 """Optional dependencies of this project that contain each runtime."""
 
 
-def runtimes_of(path: Path, device: Device = "cpu") -> tuple[Runtime, ...]:
+def runtimes_of(path: Path, device: Device = "cpu", precision: Precision = "float32") -> tuple[Runtime, ...]:
     """Return the runtimes that can execute weights of this file type on a device, the fastest first."""
+    if precision == "int8":
+        return ("openvino",)
     if path.suffix == TORCHSCRIPT_SUFFIX or (device == "cuda" and path.suffix != ONNX_SUFFIX):
         return ("torch",)
     if device == "cuda":
@@ -44,13 +47,13 @@ def runtimes_of(path: Path, device: Device = "cpu") -> tuple[Runtime, ...]:
     return ("onnxruntime", "opencv") if path.suffix == ONNX_SUFFIX else FASTEST_FIRST
 
 
-def select_runtime(path: Path, wanted: str = AUTO, device: Device = "cpu") -> Runtime:
+def select_runtime(path: Path, wanted: str = AUTO, device: Device = "cpu", precision: Precision = "float32") -> Runtime:
     """Return the runtime for weights: the wanted one, or the fastest that is installed; `torch` if none is.
 
     Raise SettingError if the wanted runtime cannot execute weights of this file type on the device, or is not
     installed.
     """
-    suitable = runtimes_of(path, device)
+    suitable = runtimes_of(path, device, precision)
     if not suitable:
         message = f"device {device!r} executes no {path.suffix} weights"
         raise SettingError(Diagnostic(message, "set `device: cpu`, or use weights .npz or .pt"))
@@ -61,14 +64,14 @@ def select_runtime(path: Path, wanted: str = AUTO, device: Device = "cpu") -> Ru
             if not is_installed(name):
                 raise missing_runtime(name)
             return name
-    where = f"{path.suffix or '.npz'} weights on the device {device!r}"
+    where = f"{path.suffix or '.npz'} weights on the device {device!r} with precision {precision!r}"
     message = f"runtime {wanted!r} does not execute {where}"
     raise SettingError(Diagnostic(message, f"set `runtime` to {AUTO}, {', '.join(suitable)}"))
 
 
 def missing_runtime(name: Runtime) -> SettingError:
     """Return the error for a runtime that is not installed."""
-    hint = f"run: pip install 'eidrive-scenario[{_EXTRAS[name]}]'"
+    hint = f"run: {install_command(_EXTRAS[name])}"
     return SettingError(Diagnostic(f"runtime {name!r} is not installed", hint))
 
 
@@ -288,5 +291,5 @@ def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
     if isinstance(error, cv2.error):
         layer = _LAYER.search(str(error))
         message += f": OpenCV does not support layer {layer[1]}" if layer else ""
-        hint += ", or install ONNX Runtime: pip install eidrive-scenario[onnx]"
+        hint += f", or install ONNX Runtime: {install_command('onnx')}"
     return SettingError(Diagnostic(message, hint))

@@ -17,6 +17,7 @@ from eidrive_scenario.perception.learned.weights import (
     ONNX_SUFFIX,
     OWN_SUFFIX,
     TORCHSCRIPT_SUFFIX,
+    Precision,
 )
 
 EXTERNAL_SUFFIXES = (ONNX_SUFFIX, TORCHSCRIPT_SUFFIX)
@@ -36,6 +37,7 @@ class LearnedSettings(Settings):
     confidence   minimum score of a box; None: the optimum of the shipped weights, and 0.35 for others
     runtime      library that executes the network; `auto`: the fastest one that is installed
     device       `cuda` executes .npz and .pt by torch on a GPU
+    precision    `int8` executes .npz by OpenVINO with 8-bit integers, on the CPU
     threads      of the computation of the network on the CPU, in the whole process
     """
 
@@ -47,11 +49,14 @@ class LearnedSettings(Settings):
     confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
     runtime: Literal["auto", Runtime] = "auto"
     device: Device = "cpu"
+    precision: Precision = "float32"
     threads: Annotated[int, Field(ge=1, le=256)] = 1
 
     @model_validator(mode="after")
     def _check_consistency(self) -> LearnedSettings:
         suffix = Path(self.weights or OWN_SUFFIX).suffix or OWN_SUFFIX
+        if self.precision == "int8" and (suffix != OWN_SUFFIX or self.device != "cpu"):
+            raise ValueError("precision: int8 applies to weights .npz on the device cpu only")
         if suffix in EXTERNAL_SUFFIXES:
             if not self.classes or self.input_size is None:
                 raise ValueError(f"weights: {suffix} files require `classes: [...]` and `input_size: [width, height]`")

@@ -10,10 +10,10 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.perception.learned.graphs import ssd_onnx, yolov5_onnx
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES, Anchors
+from eidrive_scenario.perception.learned.quantization import Ranges
 
 MAX_BYTES = 512 * MIB
 """Maximum size of a weight file, and of all arrays in a .npz together."""
@@ -33,6 +34,8 @@ DEFAULT_CONFIDENCE = 0.35
 """Minimum score of a detection if neither the settings nor the weights state one."""
 ALLOW_TORCHSCRIPT = "EIDRIVE_ALLOW_TORCHSCRIPT"
 """Environment variable: 1 permits TorchScript weights, as the option --allow-torchscript does."""
+Precision = Literal["float32", "int8"]
+"""Numbers with which a network computes."""
 OWN_SUFFIX, ONNX_SUFFIX, TORCHSCRIPT_SUFFIX = ".npz", ".onnx", ".pt"
 
 
@@ -114,6 +117,7 @@ class Description:
     confidence  default of the minimum score of a box
     outward     rows of a box height and of the distances by which the left, top, right and bottom edges of boxes of
                 vehicles are outside those of the vehicles on average, by ascending height [px]
+    ranges      of the outputs of layers, for 8-bit integers; none: not calibrated
     """
 
     network: str
@@ -122,6 +126,7 @@ class Description:
     anchors: Anchors | None = None
     confidence: float = DEFAULT_CONFIDENCE
     outward: tuple[tuple[float, ...], ...] = ()
+    ranges: Ranges = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -131,10 +136,17 @@ class Weights:
     description: Description
     arrays: Mapping[str, NDArray[Any]]
 
-    def onnx(self) -> bytes:
-        """Return the ONNX model of the network. Raise ValueError if an array is missing or has another shape."""
-        graph = yolov5_onnx if self.description.network == "yolov5" else ssd_onnx
-        return graph(self.arrays, len(self.description.classes), self.description.input_size)
+    def onnx(self, precision: Precision = "float32") -> bytes:
+        """Return the ONNX model of the network.
+
+        Raise ValueError if an array is missing or has another shape, and if ranges for 8-bit integers are missing.
+        """
+        description = self.description
+        if precision == "int8" and not description.ranges:
+            raise ValueError("its layers have no ranges for int8 (`python -m training.quantize FILE` adds them)")
+        graph = yolov5_onnx if description.network == "yolov5" else ssd_onnx
+        ranges = description.ranges if precision == "int8" else None
+        return graph(self.arrays, len(description.classes), description.input_size, ranges)
 
 
 def read(path: Path) -> Weights:
@@ -195,6 +207,9 @@ def _parse_description(data: dict[str, Any]) -> Description:
         raise ValueError("outward: invalid row (expected a height and four distances)")
     if any(before[0] >= after[0] for before, after in pairwise(outward)):
         raise ValueError("outward: rows are not in ascending order of their heights")
+    ranges = {str(layer): (float(least), float(most)) for layer, (least, most) in data.get("ranges", {}).items()}
+    if not all(math.isfinite(least) and math.isfinite(most) and least <= most for least, most in ranges.values()):
+        raise ValueError("ranges: invalid range (expected the least and the greatest value of each layer)")
     return Description(
         network=network,
         classes=classes,
@@ -202,4 +217,5 @@ def _parse_description(data: dict[str, Any]) -> Description:
         confidence=confidence,
         anchors=anchors,
         outward=outward,
+        ranges=ranges,
     )

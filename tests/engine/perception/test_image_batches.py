@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_memory import ImageMemory
 from eidrive_scenario.perception.learned.image_network import Candidates
+from eidrive_scenario.perception.learned.network_loading import build_network
 from eidrive_scenario.perception.learned.own_network import OwnNetwork
 from eidrive_scenario.perception.learned.settings import LearnedSettings
+from eidrive_scenario.perception.learned.weights import Precision
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, Readings
 from eidrive_scenario.simulation import RunSettings, run_file
 
@@ -141,3 +144,20 @@ def test_run_with_batches_has_the_same_trace(kind: str, monkeypatch: pytest.Monk
     calls = calls_of(monkeypatch)
     assert run_file("coop/scenario_1", seed=1, settings=settings).trace_hash == alone
     assert 2 in calls
+
+
+@pytest.mark.parametrize("name", ["yolov5", "ssd"])
+def test_integers_detect_the_same_objects(images: Sequence[CameraReading], name: str) -> None:
+    pytest.importorskip("openvino", reason="needs the extra 'openvino'")
+    single, integer = (
+        build_network(name, LearnedSettings(runtime="openvino", precision=precision))
+        for precision in get_args(Precision)
+    )
+    for reading in images:
+        expected, detections = (
+            sorted(zip(each.classes, each.boxes.tolist(), each.scores.tolist(), strict=True))
+            for each in (single.find(reading.rgb), integer.find(reading.rgb))
+        )
+        assert [kind for kind, _, _ in detections] == [kind for kind, _, _ in expected]
+        np.testing.assert_allclose([box for _, box, _ in detections], [box for _, box, _ in expected], atol=4.0)
+        np.testing.assert_allclose([score for *_, score in detections], [score for *_, score in expected], atol=0.1)

@@ -9,13 +9,14 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.extensions.settings import parse_settings
@@ -25,7 +26,7 @@ from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_n
 from eidrive_scenario.perception.learned.own_network import Infer, OwnNetwork
 from eidrive_scenario.perception.learned.runtimes import Runtime, is_installed, select_runtime
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.perception.learned.weights import read
+from eidrive_scenario.perception.learned.weights import Precision, read
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 RED_BOXES = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
@@ -49,9 +50,10 @@ def noise(seed: int = 7) -> NDArray[np.uint8]:
 
 
 @NETWORKS
-def test_onnx_model_passes_the_checker_of_onnx(name: str) -> None:
+@pytest.mark.parametrize("precision", get_args(Precision))
+def test_onnx_model_passes_the_checker_of_onnx(name: str, precision: Precision) -> None:
     onnx = pytest.importorskip("onnx", reason="needs the extra 'dev'")
-    model = onnx.load_from_string(read(SHIPPED / f"{name}.npz").onnx())
+    model = onnx.load_from_string(read(SHIPPED / f"{name}.npz").onnx(precision))
     onnx.checker.check_model(model, full_check=True)
     assert (model.ir_version, model.opset_import[0].version) == (8, 13)
     inferred = onnx.shape_inference.infer_shapes(model, strict_mode=True).graph
@@ -143,9 +145,9 @@ def test_auto_selects_fastest_installed_runtime(
 @pytest.mark.parametrize(
     ("settings", "diagnostic"),
     [
-        ({"runtime": "openvino"}, "runtime 'openvino' is not installed; run: pip install 'eidrive-scenario[openvino]'"),
-        ({"runtime": "onnxruntime"}, "run: pip install 'eidrive-scenario[onnx]'"),
-        ({"device": "cuda"}, "runtime 'torch' is not installed; run: pip install 'eidrive-scenario[learned]'"),
+        ({"runtime": "openvino"}, f"runtime 'openvino' is not installed; run: {install_command('openvino')}"),
+        ({"runtime": "onnxruntime"}, f"run: {install_command('onnx')}"),
+        ({"device": "cuda"}, f"runtime 'torch' is not installed; run: {install_command('learned')}"),
         (
             {"runtime": "opencv", "device": "cuda"},
             "runtime 'opencv' does not execute .npz weights on the device 'cuda'",
@@ -153,12 +155,20 @@ def test_auto_selects_fastest_installed_runtime(
         ({"runtime": "tensorrt"}, "setting 'runtime' is 'tensorrt'"),
         (
             {"runtime": "openvino", "weights": str(RED_BOXES), "classes": ["car", "bus"], "input_size": [96, 64]},
-            "'openvino' does not execute .onnx weights on the device 'cpu'; set `runtime` to auto, onnxruntime, opencv",
+            "on the device 'cpu' with precision 'float32'; set `runtime` to auto, onnxruntime, opencv",
         ),
         (
             {"device": "cuda", "weights": str(RED_BOXES), "classes": ["car", "bus"], "input_size": [96, 64]},
             "device 'cuda' executes no .onnx weights",
         ),
+        ({"precision": "int8"}, f"run: {install_command('openvino')}"),
+        (
+            {"precision": "int8", "runtime": "opencv"},
+            "'opencv' does not execute .npz weights on the device 'cpu' with precision 'int8'",
+        ),
+        ({"precision": "int8", "device": "cuda"}, "precision: int8 applies to weights .npz on the device cpu only"),
+        ({"precision": "int8", "weights": "a.onnx"}, "precision: int8 applies to weights .npz"),
+        ({"precision": "float16"}, "setting 'precision' is 'float16'"),
     ],
 )
 def test_unavailable_runtime_or_device_raises_error_with_hint(
