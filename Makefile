@@ -41,6 +41,8 @@ docs: install   ## update the coverage table of docs/openscenario.md, and build 
 	$(BIN)/sphinx-build -W --keep-going --quiet docs build/site
 
 check-docs: install  #- execute the commands of the documentation in a new environment with a wheel of the project
+	$(BIN)/python -m pip install --quiet -c constraints.txt stable-baselines3
+	$(BIN)/python -m pytest -q tests/test_examples.py -k stable_baselines
 	$(BIN)/python tests/document_commands.py
 
 check-standards: install  #- check scenarios, road files and OSI traces by the checkers of ASAM and by omega-prime

@@ -77,3 +77,13 @@ def test_training_writes_a_policy_that_can_be_evaluated(tmp_path: Path) -> None:
     assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
     _, row, _ = run("evaluate_policy.py", "--policy", "policy.npz", "--seeds", "1", "--latency", "0.3", folder=tmp_path)
     assert row.split()[0] == "0.30"
+
+
+@pytest.mark.statistical
+def test_stable_baselines_trains_a_policy(tmp_path: Path) -> None:
+    """`make check-docs` installs the library."""
+    pytest.importorskip("stable_baselines3")
+    head, *rows = run("train_sb3.py", "--steps", "1280", "--episodes", "1", "--out", "ppo.zip", folder=tmp_path)
+    assert head.split() == ["latency", "[s]", "passed"]
+    assert [row.split()[0] for row in rows] == ["0", "0.15", "0.3", "0.45", "0.6"]
+    assert (tmp_path / "ppo.zip").is_file()
