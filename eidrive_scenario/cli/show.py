@@ -124,6 +124,9 @@ def tree(
 
 def view(
     recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
+    other: Annotated[
+        Path | None, typer.Argument(help="A second one on the same roads, which the page shows over the first.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File of the page.", show_default="beside the recording")
     ] = None,
@@ -138,7 +141,7 @@ def view(
         str | None, typer.Option(help="Station of pictures and films.", show_default="the first that drives")
     ] = None,
 ) -> None:
-    """Write a recorded run as an HTML replay, or its top view as pictures.
+    """Write a recorded run, or two with a common time axis, as an HTML replay, or its top view as pictures.
 
     Example: eidrive view reports/scenario_1 --browser
     """
@@ -148,12 +151,15 @@ def view(
     path = recording_in(recording)
     complete = not is_partial(path)
     has_pictures = any(path is not None for path in (png, gif, mp4))
-    page = out or (None if has_pictures and not browser else path.with_suffix(".html"))
+    page = out or (None if has_pictures and not browser else path.with_name(TWO_RUNS if other else f"{path.stem}.html"))
     if at is not None and png is None:
         raise SettingError(Diagnostic("--at without --png has no effect", "add --png FILE"))
     if station is not None and not has_pictures:
         raise SettingError(Diagnostic("--station has no effect on the page", "add --png, --gif or --mp4"))
-    check_output_paths({"--out": page, "--png": png, "--gif": gif, "--mp4": mp4}, [path])
+    if other is not None and has_pictures:
+        raise SettingError(Diagnostic("pictures and films show one recording (got two)", "omit the second one"))
+    second = None if other is None else recording_in(other)
+    check_output_paths({"--out": page, "--png": png, "--gif": gif, "--mp4": mp4}, [path, *([second] if second else [])])
     opened = open_recording(path)
     if has_pictures:
         from eidrive_scenario.recording.run_files import RESULT, result_of
@@ -171,11 +177,11 @@ def view(
         if mp4 is not None:
             film.write_mp4(recorded, mp4)
     if page is not None:
-        damage = _write_replay(opened, page, complete)
+        damage = _write_replay(opened, page, complete, None if second is None else open_recording(second))
     for line in damage:
         echo(f"warning: {path} is damaged: {line}", color="yellow", err=True)
-    if not complete:
-        echo(f"warning: {path}: the run did not end, the recording is incomplete", color="yellow", err=True)
+    for partial in filter(is_partial, [path, *([second] if second else [])]):
+        echo(f"warning: {partial}: the run did not end, the recording is incomplete", color="yellow", err=True)
     for written in (png, gif, mp4, page):
         if written is not None:
             echo(str(written))
@@ -183,13 +189,18 @@ def view(
         typer.launch(page.resolve().as_uri())
 
 
-def _write_replay(recording: Recording, page: Path, complete: bool) -> tuple[str, ...]:
-    """Write the page of a recording, and return the damage of the recording."""
+TWO_RUNS = "two-runs.html"
+"""File of the page of two recordings beside the first."""
+
+
+def _write_replay(recording: Recording, page: Path, complete: bool, other: Recording | None) -> tuple[str, ...]:
+    """Write the page of a recording with an optional other one, and return the damage of the recordings."""
     from eidrive_scenario.recording.run_files import RESULT, result_of
     from eidrive_scenario.reporting.replay.page import make_replay
 
     beside = recording.path.with_name(RESULT)
-    return make_replay(recording, page, result_of(recording.path), result_file=beside, complete=complete).damage
+    result = result_of(recording.path)
+    return make_replay(recording, page, result, result_file=beside, complete=complete, other=other).damage
 
 
 def report(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,24 +20,37 @@ from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.storyboard.state.element_states import ElementState, StateChange
-from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message
+from eidrive_scenario.world.view import Contact
 
 MOST = 40_000
 """Maximum number of messages in a page."""
 Row = list[float | str | None]
+_OF_SIGNAL = frozenset({"sensing", "propagation", "jamming", "collision"})
+"""Reasons of losses for which the line of sight matters."""
 
 
 class MessageList:
-    """Messages in the order of their outcomes: [sent, sender, receiver, arrives or None if it is lost, reason].
+    """Messages in the order of their outcomes: [sent, sender, receiver, arrives or None if it is lost, reason, size,
+    content].
 
-    Times are in s. The reason is that of a loss. Messages of a station to itself are omitted. `omitted` is the number
-    of messages after the first MOST, `count` that of the others.
+    Times are in s, sizes in bytes. The reason is that of a loss, with the bodies in the line of sight. Messages of a
+    station to itself are omitted. `omitted` is the number of messages after the first MOST, `count` that of the others.
     """
 
     def __init__(self) -> None:
         self._rows: list[Row] = []
+        self._contents: dict[tuple[str, int], str] = {}
+        self._texts: dict[str, str] = {}
+        """Contents, each once, as most messages of a run have equal ones."""
         self.count = 0
         self.omitted = 0
+
+    def observe_sent(self, messages: Iterable[Message]) -> None:
+        """Note the contents of sent messages. Their outcomes are known later."""
+        for message in messages if self.count < MOST else ():
+            text = describe_content(message)
+            self._contents[message.sender, message.number] = self._texts.setdefault(text, text)
 
     def observe(self, events: Iterable[LinkEvent]) -> None:
         """Add the outcomes of one frame."""
@@ -48,15 +62,36 @@ class MessageList:
                 continue
             delivered = event.outcome == "delivered" and event.arrives is not None and math.isfinite(event.arrives)
             arrives = round(event.arrives, 3) if delivered and event.arrives is not None else None
-            self._rows.append(
-                [round(event.sent, 3), event.sender, event.receiver, arrives, "" if delivered else event.reason]
-            )
+            self._rows.append([
+                round(event.sent, 3), event.sender, event.receiver, arrives, "" if delivered else _reason(event),
+                event.size, self._contents.get((event.sender, event.number), ""),
+            ])  # fmt: skip
             self.count += 1
 
     def take(self) -> list[Row]:
         """Return the messages since the last call."""
         rows, self._rows = self._rows, []
         return rows
+
+
+def describe_content(message: Message) -> str:
+    """Return the content of a message: its kind, the number of objects by class, and whatever else it contains."""
+    parts = [message.kind.upper()]
+    numbers = Counter(message.detections.classes)
+    listed = ", ".join(name if number == 1 else f"{name} ({number})" for name, number in sorted(numbers.items()))
+    parts.append(f"{'' if message.objects is None else 'updates of '}{listed or 'no objects'}")
+    if message.sensors:
+        parts.append("sensor information")
+    if message.points is not None:
+        parts.append(f"point cloud of {message.points.size} bytes")
+    return shorten(", ".join(parts), 200)
+
+
+def _reason(event: LinkEvent) -> str:
+    reason = event.reason or "unknown"
+    if reason not in _OF_SIGNAL or event.los in (None, "los"):
+        return reason
+    return shorten(f"{reason}, behind {', '.join(event.blockers) or 'the ground or a building'}", 200)
 
 
 @dataclass
@@ -176,6 +211,8 @@ class ReplayBuilder:
             return
         self._append(part)
         self._series.keep()
+        for step in frame.steps.values():
+            self._messages.observe_sent(step.outbox)
         self.observe_links(frame.links)
         self._timeline.observe(frame.changes)
 
@@ -216,6 +253,7 @@ class ReplayBuilder:
         part["ticks"].append(added["tick"])
         part["poses"].append(added["pose"])
         part["changes"].extend(added["changes"])
+        part["contacts"].extend(added["contacts"])
         for name, actor in added["actors"].items():
             if name not in self._actors:
                 self._actors.add(name)
@@ -244,6 +282,7 @@ def replay_data(
                None otherwise if more entries follow
     messages   see `MessageList`; timeline  see `Timeline`; series, contact, decisive  see `SeriesBuilder`
     changes    [time, path, after, why] of the storyboard transitions
+    contacts   [time, name, other name, relative speed at the impact [m/s]] of all contacts
 
     For `report` and `settings` see `ReplayBuilder`. `final_links` are the message outcomes of the last tick.
     """
@@ -259,7 +298,7 @@ def replay_data(
 def packed(data: Data) -> Data:
     """Return the data without repetitions, as the page contains it: poses by actor, and 0 for an unchanged entry.
 
-    A station has one column for each of its parts.
+    A station has one column for each of its parts. The texts of messages are indices of `texts`.
     """
     names = dict.fromkeys(name for pose in data["poses"] for name in pose)
     poses = {name: _column([pose.get(name) for pose in data["poses"]]) for name in names}
@@ -267,11 +306,26 @@ def packed(data: Data) -> Data:
     for name, steps in data["stations"].items():
         parts = dict.fromkeys(key for step in steps if step is not None for key in step)
         stations[name] = {key: _column([None if step is None else step[key] for step in steps]) for key in parts}
-    return {**data, "poses": poses, "stations": stations}
+    texts: dict[str, int] = {}
+    messages = [
+        [texts.setdefault(entry, len(texts)) if isinstance(entry, str) else entry for entry in row]
+        for row in data["messages"]
+    ]
+    return {**data, "poses": poses, "stations": stations, "messages": messages, "texts": list(texts)}
+
+
+def overlay(data: Data) -> Data:
+    """Return what a page shows of a second run over the first: motion, series, plans, contacts and lost messages."""
+    plans = {
+        name: [None if step is None else {key: step[key] for key in ("plan", "braking")} for step in steps]
+        for name, steps in data["stations"].items()
+    }
+    lost = [row for row in data["messages"] if row[3] is None]
+    return {**data, "stations": plans, "messages": lost, "changes": [], "timeline": []}
 
 
 def _empty_part() -> Data:
-    return {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
+    return {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": [], "contacts": []}
 
 
 def _column(entries: list[Any]) -> list[Any]:
@@ -309,14 +363,22 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
             for change in frame.changes
             if change.transition is not None and math.isfinite(change.time)
         ],
+        "contacts": [
+            [round(view.time, 4), contact.first, contact.second, _impact_speed(contact)] for contact in view.contacts
+        ],
     }
+
+
+def _impact_speed(contact: Contact) -> float | None:
+    return round(contact.impact_speed, 2) if math.isfinite(contact.impact_speed) else None
 
 
 def _size(part: Mapping[str, Any]) -> int:
     """Return the approximate size of the data of one frame in the page [bytes]."""
     poses = sum(40 + len(name) for name in part["pose"])
     changes = sum(len(path) + len(why) for _, path, _, why in part["changes"])
-    return 40 + poses + changes + sum(map(_station_size, part["stations"].values()))
+    contacts = sum(40 + len(first) + len(second) for _, first, second, _ in part["contacts"])
+    return 40 + poses + changes + contacts + sum(map(_station_size, part["stations"].values()))
 
 
 def _station_size(station: Mapping[str, Any] | None) -> int:

@@ -20,27 +20,13 @@ from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
-from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, result_of
+from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, is_partial, result_of
 from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.reporting.drawing.canvas import HOUSE
 from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
-from eidrive_scenario.reporting.drawing.top_view import (
-    AREA,
-    FUSED,
-    GROUND,
-    LANE,
-    LANES,
-    LINK,
-    LOST,
-    OWN,
-    PAINT,
-    RECEIVED,
-    WHITE,
-    RoadDrawing,
-    is_broken,
-)
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, is_broken
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.replay.frame_data import Data, describe_error, packed, replay_data
+from eidrive_scenario.reporting.replay.colors import COLORS
+from eidrive_scenario.reporting.replay.frame_data import Data, describe_error, overlay, packed, replay_data
 from eidrive_scenario.reporting.replay.series import closest_approach
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
@@ -77,16 +63,6 @@ def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
 
 
 TEMPLATE = "replay/page.html.jinja"
-COLORS = {
-    "own": OWN,
-    "received": RECEIVED,
-    "link": LINK,
-    "lost": LOST,
-    "area": AREA,
-    "fused": FUSED,
-    "house": HOUSE,
-    "ground": GROUND,
-}
 
 
 def page_values(
@@ -103,6 +79,8 @@ def page_values(
     notices: Sequence[str] = (),
     complete: bool = True,
     live: bool = False,
+    other: RunOfPage | None = None,
+    labels: tuple[str, str] = ("", ""),
 ) -> dict[str, Any]:
     """Return the values of the template `TEMPLATE`.
 
@@ -113,9 +91,14 @@ def page_values(
     notices   damage of a recording, or what a live page does not show
     complete  whether the run has ended, or is still in progress
     live      whether the page receives the data of the frames from a server
+    other     run that the page shows over this one
+    labels    what distinguishes this run and the other one
     """
+    shown = {**packed(data), "roads": _roads(roads), "colors": COLORS, "images": images}
+    if other is not None:
+        shown["other"] = packed(overlay(other.data))
     return {
-        "title": f"{shorten(scenario, 200)}, seed {seed}",
+        "title": _title(scenario, seed),
         "result": result,
         "facts": facts,
         "settings": json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
@@ -123,8 +106,25 @@ def page_values(
         "notices": notices,
         "complete": complete,
         "live": live,
-        "data": {**packed(data), "roads": _roads(roads), "colors": COLORS, "images": images},
+        "data": shown,
+        "other": other,
+        "differences": [] if other is None else _differences(facts, other.facts),
+        "labels": labels,
     }
+
+
+def _title(scenario: str, seed: int) -> str:
+    return f"{shorten(scenario, 200)}, seed {seed}"
+
+
+def _differences(facts: Mapping[str, str], others: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    """Return the facts in which two runs differ: name, and value of each run."""
+    names = dict.fromkeys([*facts, *others])
+    return [
+        (name, facts.get(name, "absent"), others.get(name, "absent"))
+        for name in names
+        if facts.get(name) != others.get(name)
+    ]
 
 
 def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[str]) -> dict[str, Any] | None:
@@ -151,10 +151,8 @@ def _roads(roads: RoadDrawing) -> dict[str, Any]:
 def _level(roads: RoadDrawing) -> dict[str, Any]:
     """Return lanes and road marks of one level."""
     return {
-        "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
-        "lines": [
-            [is_broken(kind), PAINT.get(color, WHITE), line.round(2).tolist()] for kind, color, line in roads.markings
-        ],
+        "lanes": [[kind, polygon.round(2).tolist()] for kind, polygon in roads.lanes],
+        "lines": [[is_broken(kind), color, line.round(2).tolist()] for kind, color, line in roads.markings],
     }
 
 
@@ -166,6 +164,18 @@ class Replay:
     damage: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class RunOfPage:
+    """Recorded run as a page shows it: title, facts, settings, data of all frames, and verdicts of its result."""
+
+    title: str
+    facts: Mapping[str, str]
+    settings: Mapping[str, Any]
+    data: Data
+    result: ReportedRun | None
+    complete: bool
+
+
 def make_replay(
     recording: Recording,
     out: Path,
@@ -173,21 +183,73 @@ def make_replay(
     *,
     result_file: str | Path = "",
     complete: bool = True,
+    other: Recording | None = None,
 ) -> Replay:
     """Write the replay of a recording to the file `out`, with the verdicts of an optional `result`.
 
     result_file  file of the result for error messages
     complete     whether the run has ended; the page states that an unfinished run is incomplete
+    other        recording that the page shows over this one, with the verdicts of the result in its folder
 
     The readable part of a damaged recording is shown, and the page lists the damage. Raise InputError if no frame can
-    be read, or the result is invalid.
+    be read, the result is invalid, or the roads of the recordings differ.
     """
-    report = DamageReport()
+    report, others_report = DamageReport(), DamageReport()
+    roads = readable_roads(recording, report)
+    second = None
+    if other is not None:
+        if _roads(readable_roads(other, others_report))["levels"] != _roads(roads)["levels"]:
+            reason = f"the roads differ from those of {recording.path}"
+            hint = "give two recordings on the same roads, or write a page of each"
+            raise InputError(Diagnostic(reason, hint, str(other.path)))
+        path = other.path
+        second = _read_run(other, others_report, result_of(path), path.with_name(RESULT), not is_partial(path))
+    run = _read_run(recording, report, result, result_file, complete)
+    labels = ("", "") if other is None or second is None else _labels(recording, run.facts, other, second.facts)
+    damage = (*report.lines(), *(f"{other.path}: {line}" for line in others_report.lines() if other is not None))
+    values = page_values(
+        recording.scenario or recording.path.stem,
+        recording.seed,
+        run.settings,
+        facts=run.facts,
+        command=recording.metadata.get("command", ""),
+        result=run.result,
+        notices=damage,
+        complete=complete and (second is None or second.complete),
+        roads=roads,
+        data=run.data,
+        images=camera_files(recording.path.parent, out.parent),
+        other=second,
+        labels=labels,
+    )
+    return Replay(write_page(out, TEMPLATE, **values), damage)
+
+
+def _labels(
+    recording: Recording, facts: Mapping[str, str], other: Recording, others: Mapping[str, str]
+) -> tuple[str, str]:
+    """Return the first short facts in which two runs differ, or the names of their folders without one."""
+    differences = [(name, *values) for name, *values in _differences(facts, others) if max(map(len, values)) <= 40]
+    shown = [entry for entry in differences if entry[0] not in ("scenario", "seed")][:2]
+    if not shown:
+        return shorten(recording.path.parent.name, 100), shorten(other.path.parent.name, 100)
+    first, second = (", ".join(f"{name} {values[side]}" for name, *values in shown) for side in (0, 1))
+    return first, second
+
+
+def _read_run(
+    recording: Recording,
+    report: DamageReport,
+    result: Mapping[str, Any] | None,
+    result_file: str | Path,
+    complete: bool,
+) -> RunOfPage:
+    """Read a recorded run. Raise InputError if no frame can be read, or the result is invalid."""
     for line in recording.damage:
         report.add(line)
     trace = TraceHash()
     settings = run_settings(recording, report)
-    frames, roads = _drawable(recording, report, trace), readable_roads(recording, report)
+    frames = _drawable(recording, report, trace)
     data = replay_data(frames, report, station_settings(settings), _final_links(recording, report))
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
@@ -196,21 +258,8 @@ def make_replay(
         report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
     verdicts = None if result is None else parse_run(result, result_file)
     data["decisive"] = decisive_instant(data, verdicts, data["actors"])
-    values = page_values(
-        recording.scenario or recording.path.stem,
-        recording.seed,
-        settings,
-        facts=_facts(recording, settings),
-        command=recording.metadata.get("command", ""),
-        result=verdicts,
-        notices=report.lines(),
-        complete=complete,
-        roads=roads,
-        data=data,
-        images=camera_files(recording.path.parent, out.parent),
-    )
-    page = write_page(out, TEMPLATE, **values)
-    return Replay(page, report.lines())
+    title = _title(recording.scenario or recording.path.stem, recording.seed)
+    return RunOfPage(title, _facts(recording, settings), settings, data, verdicts, complete)
 
 
 def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:

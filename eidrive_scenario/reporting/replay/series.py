@@ -28,7 +28,8 @@ class SeriesBuilder:
               sender the age of information [s], the time since the newest received message was generated, and the
               number of messages so far that were too old on arrival. None: absent, farther than FAR, above TTC_LIMIT,
               nothing received yet, none too old yet
-    contact   the first contact of a driven vehicle or of its trailers: time [s] and description; None without a contact
+    contact   the first contact of a driven vehicle or of its trailers: time [s] and description with the relative speed
+              at the impact; None without a contact
     decisive  that contact, else the smallest gap of a driven vehicle. Without driven vehicles all actors are
               considered; None if no two actors were present at the same time
     """
@@ -121,7 +122,10 @@ class SeriesBuilder:
         for contact in frame.view.contacts if self._contact is None else ():
             trains = {*driven}.union(*map(frame.attached, driven))
             if not self._driven or contact.first in trains or contact.second in trains:
-                self._contact = frame.view.time, f"contact of {contact.first} and {contact.second}"
+                text = f"contact of {contact.first} and {contact.second}"
+                if math.isfinite(contact.impact_speed):
+                    text += f" at {contact.impact_speed:.1f} m/s"
+                self._contact = frame.view.time, text
                 return
         if not self._driven and (pair := nearest_pair(frame.view, self._least[0], frame.trailers)) is not None:
             gap, name, other = pair

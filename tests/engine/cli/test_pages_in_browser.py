@@ -169,9 +169,114 @@ def test_slider_layers_and_links_of_replay_change_the_picture(browser: Any, repo
     assert page.time() == pytest.approx(1.0)
     page.page.evaluate("location.hash = '#t=4.5'")
     page.page.wait_for_function("shown.time === 4.5")
-    page.page.locator("#changes button").first.click()
+    page.page.locator("#changes summary").first.click()
     assert page.time() == 0.0
     page.close("replay-controls")
+
+
+PLACES = """[...document.querySelectorAll("#over-time .track, #over-time svg")].map((track) => {
+  const { left, width } = track.getBoundingClientRect();
+  return [Math.round(left), Math.round(width)];
+})"""
+TARGETS = """[...document.querySelectorAll("button, select, summary, label, input[type=range]")]
+  .filter((target) => getComputedStyle(target).pointerEvents !== "none" && target.offsetParent)
+  .filter((target) => !target.matches("label:has(select)"))
+  .map((target) => {
+    const { height, width } = target.getBoundingClientRect();
+    return [target.id || target.textContent, height, width];
+  })"""
+
+
+def test_axis_charts_tracks_and_storyboard_of_replay_have_one_cursor(browser: Any, report: Path) -> None:
+    for width in WIDTHS.values():
+        page = Page(browser, replay_of(report, "error_30pct"), width, address="#t=3.9")
+        places = page.page.evaluate(PLACES)
+        assert len(places) > 10
+        assert len({tuple(place) for place in places}) == 1
+        left, wide = places[0]
+        duration = float(page.page.evaluate("axis"))
+        cursor = "document.getElementById('now').getBoundingClientRect()"
+        at = page.page.evaluate(f"{cursor}.left + {cursor}.width / 2")
+        assert at == pytest.approx(left + wide * 3.9 / duration, abs=1.0)
+        page.page.locator("#charts .track").first.click(position={"x": wide / 2, "y": 30})
+        assert page.time() == pytest.approx(duration / 2, abs=0.1)
+        page.close("replay-cursor", full=False)
+
+
+def test_messages_of_replay_follow_the_cursor_and_name_lost_ones(browser: Any, report: Path) -> None:
+    """30 % of the messages are lost."""
+    page = Page(browser, replay_of(report, "error_30pct"), 1440, address="#t=3.9")
+    current = page.page.locator("#message-list tr[aria-current] td")
+    assert current.all_inner_texts()[:2] == ["3.900 s", "RSU → Ego"]
+    assert page.page.locator("#message-list tbody tr").count() < 40
+    page.page.locator("#slider").fill("20")
+    assert current.first.inner_text() == "1.000 s"
+    sent, lost = (int(word) for word in page.page.inner_text("#message-count").split() if word.isdigit())
+    assert 0.2 < lost / sent < 0.4
+    page.page.get_by_label("lost ones only").check()
+    page.page.locator("#message-list tbody button").nth(3).click()
+    assert "lost: " in current.nth(4).inner_text()
+    assert page.time() == float(current.first.inner_text().removesuffix(" s"))
+    assert page.page.locator("#tracks .mark.lost").count() > 3
+    page.close("replay-messages")
+
+
+def test_changes_of_one_instant_are_one_mark_with_their_number(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440)
+    at_start = int(page.page.evaluate("data.changes.filter(([time]) => time === 0).length"))
+    assert at_start > 1
+    assert page.page.locator("#tracks .mark.change").first.inner_text() == str(at_start)
+    assert page.page.locator("#changes summary").first.inner_text() == f"0.00 s {at_start} changes"
+    page.close("replay-bundles")
+
+
+def test_phone_has_large_targets_and_dark_mode_a_dark_map(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 390, dark=True)
+    sizes = page.page.evaluate(TARGETS)
+    assert len(sizes) > 20
+    assert [size for size in sizes if min(size[1:]) < 44] == []
+    pixel = "[...document.getElementById('street').getContext('2d').getImageData(3, 3, 1, 1).data].slice(0, 3)"
+    assert max(page.page.evaluate(pixel)) < 90
+    picture = "document.getElementById('street').toDataURL()"
+    dark = page.page.evaluate(picture)
+    page.page.emulate_media(color_scheme="light")
+    page.wait(f"{picture} !== {dark!r}")
+    page.close("replay-phone")
+
+
+@pytest.fixture
+def two_runs(eidrive: Eidrive, tmp_path: Path) -> Path:
+    """Page of a run with latency, which ends early by a collision, under one without latency and another time step."""
+    for name, *options in (("a", "latency_300ms"), ("b", "ideal", "--dt", "0.025")):
+        channel, *others = options
+        eidrive("run", "coop/scenario_1", "--channel", channel, "--seed", "1", *others, "--out", tmp_path / name)
+    done = eidrive("view", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "two.html")
+    assert done.exit_code == 0, done.output
+    return tmp_path / "two.html"
+
+
+@pytest.mark.parametrize("size", WIDTHS)
+def test_two_runs_have_one_cursor_until_the_longer_one_ends(browser: Any, two_runs: Path, size: str) -> None:
+    page = Page(browser, two_runs, WIDTHS[size], address="#t=4.7")
+    assert page.time() == 4.7
+    speed = page.page.locator("#charts b").first
+    before = "data.poses.Ego[shown.index - 1][3].toFixed(2)"
+    here = "other.poses.Ego[shown.otherIndex][3].toFixed(2)"
+    assert speed.inner_text().split() == ["A", page.page.evaluate(before), "B", page.page.evaluate(here)]
+    picture = "document.getElementById('street').toDataURL()"
+    both = page.page.evaluate(picture)
+    page.page.get_by_label("run B").uncheck()
+    assert page.page.evaluate(picture) != both
+    page.page.get_by_label("run B").check()
+    assert page.page.inner_text("#known").count("15.3 m/s") == 1
+    page.page.locator("h1").click()
+    page.page.keyboard.press("End")
+    assert page.time() == page.page.evaluate("Number(other.times[other.times.length - 1].toFixed(2))")
+    assert page.page.is_visible("#end-A")
+    assert not page.page.is_visible("#end-B")
+    assert not page.wide()
+    page.page.keyboard.press("d")
+    page.close(f"two-runs-{size}")
 
 
 def test_views_of_replay_show_different_pictures(browser: Any, report: Path) -> None:

@@ -215,6 +215,33 @@ def test_view_shows_verdicts_of_result_beside_recording(eidrive: Eidrive, passin
     assert "<h3>Verdict" not in page.read_text(encoding="utf-8")
 
 
+def test_view_of_two_runs_writes_page_with_both_verdicts(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    """The ego hits the parked car in the first run, and passes it in the second."""
+    eidrive("run", passing_by, "--param", "OtherY=0", "--out", tmp_path / "a")
+    eidrive("run", passing_by, "--out", tmp_path / "b")
+    result = eidrive("view", tmp_path / "a", tmp_path / "b")
+    assert result.exit_code == 0, result.output
+    page = next((tmp_path / "a").rglob("two-runs.html"))
+    assert result.stdout.strip() == str(page)
+    text = page.read_text(encoding="utf-8")
+    assert "Verdict of A" in text
+    assert "Verdict of B" in text
+    assert "Ego and Parked hit each other" in text
+    assert "$OtherY" in text.split("Differences of the runs")[1].split("</dl>")[0]
+
+
+def test_view_of_two_runs_makes_no_pictures_and_keeps_recordings(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path
+) -> None:
+    eidrive("run", passing_by, "--out", tmp_path / "a")
+    result = eidrive("view", tmp_path / "a", tmp_path / "a", "--png", tmp_path / "a.png")
+    assert (result.exit_code, "show one recording" in result.stderr) == (2, True)
+    (recording,) = (tmp_path / "a").rglob("recording.mcap")
+    result = eidrive("view", tmp_path / "a", recording, "-o", recording)
+    assert result.exit_code == 2
+    assert eidrive("view", tmp_path / "a", tmp_path).exit_code == 0, "a run over itself"
+
+
 @pytest.mark.parametrize("arguments", [["view"], ["report", "-o", "page"]])
 def test_too_long_file_name_is_invalid_input(eidrive: Eidrive, arguments: list[str]) -> None:
     result = eidrive(*arguments, "x" * 300)

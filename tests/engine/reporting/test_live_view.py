@@ -86,8 +86,9 @@ def join_parts(events: list[Event]) -> dict[str, Any]:
     parts = [data for kind, data in events if kind == "part"]
     times = [time for part in parts for time in part["times"]]
     found: dict[str, Any] = {"times": times, "actors": {}, "poses": {}, "stations": {}, "series": {}, "timeline": {}}
-    for key in ("ticks", "changes", "messages"):
+    for key in ("ticks", "changes", "contacts"):
         found[key] = [entry for part in parts for entry in part[key]]
+    found["messages"] = [message for part in parts for message in messages_of(part)]
     before = 0
     for part in parts:
         found["actors"] = part["actors"] | found["actors"]
@@ -101,6 +102,15 @@ def join_parts(events: list[Event]) -> dict[str, Any]:
         found[group] = {path: extended(column, len(times), []) for path, column in found[group].items()}
     found["timeline"] = list(found["timeline"].values())
     return found
+
+
+def messages_of(part: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the messages of a part with their texts."""
+    texts = part["texts"]
+    return [
+        [sent, texts[sender], texts[receiver], arrives, texts[reason], size, texts[content]]
+        for sent, sender, receiver, arrives, reason, size, content in part["messages"]
+    ]
 
 
 def leaves(tree: Mapping[str, Any], path: str = "") -> list[tuple[str, list[Any]]]:
@@ -119,7 +129,7 @@ def columns(data: Mapping[str, Any]) -> dict[str, Any]:
         for name, steps in data["stations"].items()
         for key in next(step for step in steps if step is not None)
     }
-    kept = ("times", "ticks", "actors", "changes", "messages", "timeline")
+    kept = ("times", "ticks", "actors", "changes", "contacts", "messages", "timeline")
     return {**{key: data[key] for key in kept}, "poses": poses, "stations": stations,
             "series": dict(leaves(data["series"]))}  # fmt: skip
 

@@ -17,6 +17,7 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
+from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.settings_text import short_number
@@ -163,3 +164,55 @@ def test_replay_report_timeout_of_station_ends_received_boxes(
     column = unpacked(data["stations"]["Ego"]["received"])
     received = [tick for tick, senders in enumerate(column) if senders]
     assert received[-1] == last
+
+
+def recorded_roads(folder: Path, name: str, frames: list[Frame], length: float) -> Recording:
+    """Return a recording of frames on a straight road of a length [m]."""
+    folder = folder / name
+    folder.mkdir()
+    road = (
+        f'<OpenDRIVE><header revMajor="1" revMinor="8"/><road name="" length="{length}" id="1" junction="-1">'
+        f'<planView><geometry s="0" x="0" y="0" hdg="0" length="{length}"><line/></geometry></planView>'
+        '<lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center><right>'
+        '<lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+        "</right></laneSection></lanes></road></OpenDRIVE>"
+    )
+    recorder = Recorder(
+        folder / "recording.mcap",
+        metadata={"scenario": name, "seed": "7"},
+        attachments={"road.xodr": road.encode()},
+    )
+    for frame in frames:
+        recorder.observe(frame)
+    recorder.close()
+    return read_recording(folder / "recording.mcap")
+
+
+def test_replay_of_two_runs_contains_both_with_their_durations(street: Play, tmp_path: Path) -> None:
+    first = recorded_roads(tmp_path, "first", street(1), 100.0)
+    second = recorded_roads(tmp_path, "second", street(4)[:60:2], 100.0)
+    page = make_replay(first, tmp_path / "two.html", other=second).page.read_text(encoding="utf-8")
+    root = html.fromstring(page)
+    data = json.loads(root.findtext(".//script[@id='data']") or "")
+    assert (len(data["times"]), len(data["other"]["times"])) == (100, 30)
+    assert data["other"]["times"][-1] == pytest.approx(2.9)
+    assert data["other"]["poses"]["Incoming"][0] == data["poses"]["Incoming"][0]
+    assert "A: first, seed 7" in "".join(map(str, next(root.iter("h1")).itertext()))
+    assert "B: second, seed 7" in page
+    assert data["other"]["stations"]["Ego"].keys() == {"plan", "braking"}
+
+
+def test_replay_of_two_runs_on_different_roads_raises_input_error(street: Play, tmp_path: Path) -> None:
+    first = recorded_roads(tmp_path, "first", street(1)[:2], 100.0)
+    second = recorded_roads(tmp_path, "second", street(1)[:2], 90.0)
+    with pytest.raises(InputError, match="the roads differ from those of"):
+        make_replay(first, tmp_path / "two.html", other=second)
+
+
+def test_damage_of_second_recording_names_its_file(street: Play, tmp_path: Path) -> None:
+    first = recorded_roads(tmp_path, "first", street(1)[:40], 100.0)
+    file = recorded_roads(tmp_path, "second", street(1)[:40], 100.0).path
+    file.write_bytes(file.read_bytes()[:-40])
+    made = make_replay(first, tmp_path / "two.html", other=read_recording(file))
+    assert made.damage
+    assert all(line.startswith(f"{file}: ") for line in made.damage)

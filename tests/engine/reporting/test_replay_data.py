@@ -6,20 +6,30 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.evaluation.nearest_actor import nearest_body, nearest_pair
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
-from eidrive_scenario.reporting.replay.frame_data import MessageList, Timeline, packed, replay_data
+from eidrive_scenario.reporting.replay.frame_data import (
+    MessageList,
+    Timeline,
+    describe_content,
+    overlay,
+    packed,
+    replay_data,
+)
 from eidrive_scenario.reporting.replay.page import camera_files
 from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
-from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, PointCloud, StationState
 from eidrive_scenario.world.view import Contact
 
 Play = Callable[..., list[Frame]]
@@ -159,7 +169,7 @@ def test_decisive_instant_is_first_contact(street: Play) -> None:
     for tick in (30, 60):
         frames[tick] = replace(frames[tick], view=replace(frames[tick].view, contacts=(touch,)))
     series = observe(frames)
-    assert series.contact == {"time": 1.5, "text": "contact of Ego and Truck"}
+    assert series.contact == {"time": 1.5, "text": "contact of Ego and Truck at 5.0 m/s"}
     assert series.decisive == series.contact
 
 
@@ -212,14 +222,75 @@ def test_closest_approach_names_actors_with_dots() -> None:
     assert unknown["text"] == "closest approach of Ego.v2.Car.1: 4.50 m between centers"
 
 
+def sent_message(classes: tuple[str, ...], **changes: Any) -> Message:
+    """Return the first message of the RSU, with objects of these classes."""
+    count = len(classes)
+    detections = Detections(
+        0.1, np.zeros((count, 7)), np.ones(count), classes, np.zeros((count, 2)), np.zeros((count, 2, 2))
+    )
+    return replace(Message("RSU", 1, 0.1, StationState(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), detections, 200), **changes)
+
+
 def test_messages_have_arrival_or_reason_of_loss() -> None:
     messages = MessageList()
+    messages.observe_sent([sent_message(("car", "truck", "car"))])
     messages.observe([
         LinkEvent("RSU", "Ego", 1, 0.1, "delivered", 0.4, "", 200),
-        LinkEvent("RSU", "Ego", 2, 0.2, "lost", None, "shadowing", 200),
+        LinkEvent("RSU", "Ego", 2, 0.2, "lost", None, "shadowing", 300),
+        LinkEvent("RSU", "Ego", 3, 0.3, "lost", None, "propagation", 300, los="nlosv", blockers=("Bus", "Van")),
+        LinkEvent("RSU", "Ego", 4, 0.4, "lost", None, "propagation", 300, los="nlos"),
+        LinkEvent("RSU", "Ego", 5, 0.5, "lost", None, "queue", 300, los="nlosv", blockers=("Bus",)),
         LinkEvent("Ego", "Ego", 1, 0.2, "delivered", 0.3, "", 200),
     ])  # fmt: skip
-    assert messages.take() == [[0.1, "RSU", "Ego", 0.4, ""], [0.2, "RSU", "Ego", None, "shadowing"]]
+    assert messages.take() == [
+        [0.1, "RSU", "Ego", 0.4, "", 200, "CPM, car (2), truck"],
+        [0.2, "RSU", "Ego", None, "shadowing", 300, ""],
+        [0.3, "RSU", "Ego", None, "propagation, behind Bus, Van", 300, ""],
+        [0.4, "RSU", "Ego", None, "propagation, behind the ground or a building", 300, ""],
+        [0.5, "RSU", "Ego", None, "queue", 300, ""],
+    ]
+
+
+def test_content_of_messages_names_objects_and_other_parts() -> None:
+    cloud = PointCloud(0.1, (0.0, 0.0, 0.0), 0.1, (1, 1, 1), np.zeros(68, dtype=np.uint8))
+    assert describe_content(sent_message((), kind="cam")) == "CAM, no objects"
+    assert describe_content(sent_message(("car",), objects=(3,))) == "CPM, updates of car"
+    full = sent_message(("bus",), points=cloud, sensors=(ViewSector(0.0, 0.0, 1.0, 0.0, 1.0, 50.0),))
+    assert describe_content(full) == "CPM, bus, sensor information, point cloud of 100 bytes"
+    assert len(describe_content(sent_message(("x" * 1000,)))) == 200
+
+
+def test_packed_messages_contain_each_text_once(street: Play) -> None:
+    data = replay_data(street(1))
+    page = packed(data)
+    texts = page["texts"]
+    assert len(set(texts)) == len(texts)
+    resolved = [
+        [texts[entry] if index in (1, 2, 4, 6) else entry for index, entry in enumerate(row)]
+        for row in page["messages"]
+    ]
+    assert resolved == data["messages"]
+
+
+def test_contacts_of_all_actors_have_impact_speed(street: Play) -> None:
+    frames = street(1)
+    for tick, touch in (
+        (30, Contact("Incoming", "Truck", (0.0, 0.0, 0.0), 5.004)),
+        (60, Contact("Ego", "Truck", (0.0, 0.0, 0.0), math.nan)),
+    ):
+        frames[tick] = replace(frames[tick], view=replace(frames[tick].view, contacts=(touch,)))
+    data = replay_data(frames)
+    assert data["contacts"] == [[1.5, "Incoming", "Truck", 5.0], [3.0, "Ego", "Truck", None]]
+    assert data["contact"] == {"time": 3.0, "text": "contact of Ego and Truck"}
+
+
+def test_overlay_has_lost_messages_and_plans_without_boxes(street: Play) -> None:
+    data = replay_data(street(1, frozenset(range(30, 40))))
+    second = overlay(data)
+    lost = [row[0] for row in second["messages"]]
+    assert lost == pytest.approx([0.05 * tick for tick in range(30, 40)])
+    assert {key for step in second["stations"]["Ego"] for key in step} == {"plan", "braking"}
+    assert second["poses"] == data["poses"]
 
 
 def test_number_of_messages_in_page_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,4 +350,4 @@ def test_contact_of_own_trailer_is_decisive(street: Play) -> None:
     assert observe([*frames[:50], hit]).contact is None
     contact = observe([*frames[:50], replace(hit, trailers={"Ego": "Truck"})]).contact
     assert contact is not None
-    assert contact["text"] == "contact of Truck and RSU"
+    assert contact["text"] == "contact of Truck and RSU at 5.0 m/s"

@@ -1,12 +1,15 @@
 /* Player: time, controls, keyboard, layers, and the panels beside the street. */
-const LAYERS = [["truth", "true boxes"], ["labels", "names"], ["own", "own detections"], ["fused", "fused objects, 95 % ellipse"],
-                ["plan", "planned path"], ["messages", "messages"]];
+/* Layers: key, and its signs of the legend with their texts. */
+const LAYERS = [["truth", ["", "true boxes"]], ["labels", ["", "names and speeds"]], ["own", ["box own", "own detections"]],
+                ["fused", ["box fused", "fused objects, 95 % ellipse"]], ["plan", ["band plan", "planned path"], ["band braking", "if it brakes"]],
+                ["messages", ["line link", "messages"], ["line lost", "lost ones"]], ...(other ? [["other", ["box other", "run B"]]] : [])];
 let playing = false, startedAt = 0, startedFrom = 0, announced = 0;
 
 function showTime(time) {
   if (last < 0) return;
-  shown.time = Math.max(data.times[0], Math.min(data.times[last], time));
+  shown.time = Math.max(data.times[0], Math.min(instants[instants.length - 1], time));
   shown.index = indexAt(shown.time);
+  if (other) shown.otherIndex = indexAt(shown.time, other.times);
   draw();
   showCursors();
   showPanels();
@@ -20,7 +23,7 @@ function seek(time) {
   announce();
 }
 
-function step(frames) { seek(data.times[Math.max(0, Math.min(last, shown.index + frames))]); }
+function step(frames) { seek(instants[Math.max(0, Math.min(instants.length - 1, indexAt(shown.time, instants) + frames))]); }
 
 /* Write the instant into the address, so that the address leads to it. */
 function announce() {
@@ -33,25 +36,30 @@ function fromAddress() {
   return match ? Number(match[1]) : null;
 }
 
-let panelIndex = -1, panelStation = null;
+let panelState = "";
 function showPanels() {
-  element("slider").max = last;
-  element("slider").value = shown.index;
+  element("slider").max = instants.length - 1;
+  element("slider").value = indexAt(shown.time, instants);
   element("clock").textContent = shown.time.toFixed(2) + " s";
-  if (shown.index === panelIndex && shown.station === panelStation) return;
-  panelIndex = shown.index; panelStation = shown.station;
-  element("slider").setAttribute("aria-valuetext", data.times[shown.index].toFixed(2) + " s");
-  const known = element("known");
+  const { station } = shown, state = JSON.stringify([element("slider").value, shown.index, station]);
+  followMessages();
+  if (state === panelState) return;
+  panelState = state;
+  element("slider").setAttribute("aria-valuetext", shown.time.toFixed(2) + " s");
+  const known = element("known"), speed = speedOf(station), contacts = contactsOf(station);
   known.textContent = "";
-  const pose = data.poses[shown.station] && data.poses[shown.station][shown.index];
   const rows = !isPresent() ? [["", "absent"]] : [
+    ...(!running && shown.time > endOf(data) + 1e-6 ? [["end", "run A has ended"]] : []),
     ["plan", (part("plan") || "none") + (part("braking") ? " (braking)" : "")],
-    ...(pose ? [["speed", `${pose[3].toFixed(2)} m/s`]] : []),
+    ...(speed !== null ? [["speed", `${speed.toFixed(2)} m/s${contacts.length ? " before the contact" : ""}`]] : []),
+    ...contacts.map(([, first, second, impact]) =>
+      ["contact", `with ${first === station ? second : first}${impact === null ? "" : ` at ${impact.toFixed(1)} m/s`}`]),
     ["own detections", part("own").length],
     ...Object.entries(part("received")).map(([sender, boxes]) => ["from " + sender, boxes.length]),
     ["fused objects", part("fused").length],
   ];
   for (const [key, value] of rows) { make("dt", key, known); make("dd", value, known); }
+  for (const run of other ? runs : []) element("end-" + letterOf(run)).hidden = shown.time <= endOf(run) + 1e-6;
   showChanges();
   showImages();
 }
@@ -59,8 +67,7 @@ function showPanels() {
 let marked = -1;
 function showChanges() {
   const list = element("changes"), time = data.times[shown.index] + 1e-6;
-  let latest = -1;
-  for (const [i, [at]] of data.changes.entries()) if (at <= time) latest = i;
+  const latest = changeTimes.length && changeTimes[0] <= time ? indexAt(time, changeTimes) : -1;
   if (latest === marked) return;
   marked = latest;
   for (const [i, item] of [...list.children].entries()) item.className = i <= latest ? "past" : "future";
@@ -98,9 +105,10 @@ function followEnd(on) {
 }
 
 function play() {
-  if (running && shown.time >= data.times[last] - 1e-6) { followEnd(true); return; }
+  const end = instants[instants.length - 1] - 1e-6;
+  if (running && shown.time >= end) { followEnd(true); return; }
   followEnd(false);
-  if (shown.time >= data.times[last] - 1e-6) showTime(data.times[0]);
+  if (shown.time >= end) showTime(data.times[0]);
   playing = true;
   element("play").textContent = "Pause";
   startedAt = performance.now();
@@ -111,7 +119,7 @@ function play() {
 function advance(now) {
   if (!playing) return;
   showTime(startedFrom + Math.max(0, now - startedAt) / 1000 * Number(element("rate").value));
-  if (shown.time < data.times[last]) { requestAnimationFrame(advance); return; }
+  if (shown.time < instants[instants.length - 1]) { requestAnimationFrame(advance); return; }
   pause();
   followEnd(true);
 }
@@ -130,7 +138,8 @@ function selectStation(name) {
   for (const option of element("view").options) option.disabled = !name && option.value !== "top";
   if (!name && shown.view !== "top") selectView("top");
   layLayers();
-  layCharts();
+  layTime();
+  layMessages();
   showTime(shown.time);
 }
 
@@ -142,18 +151,19 @@ function layLayers() {
   if (layout === laidLayers) return;
   laidLayers = layout;
   parent.textContent = "";
-  const colors = { own: C.own, fused: C.fused, plan: C.link, messages: C.link };
-  const add = (text, color, checked, change) => {
+  const add = (signs, checked, change) => {
     const label = make("label", "", parent), box = make("input", "", label, { type: "checkbox", checked });
     box.onchange = () => { change(box.checked); draw(); };
-    if (color) make("i", "", label, { className: "swatch" }).style.background = color;
-    label.append(text);
+    for (const [sign, text, color] of signs) {
+      if (sign) make("i", "", label, { className: "sign " + sign }).style.setProperty("--sign", color || "");
+      make("span", text, label);
+    }
   };
-  for (const [key, text] of LAYERS) {
+  for (const [key, ...signs] of LAYERS) {
     if (!shown.station && ["own", "fused", "plan"].includes(key)) continue;
-    add(text, colors[key], shown.layers[key], (on) => { shown.layers[key] = on; });
+    add(signs, shown.layers[key], (on) => { shown.layers[key] = on; });
   }
-  for (const sender of received) add("received from " + sender, senderColor(sender), !shown.hidden.has(sender),
+  for (const sender of received) add([["box", "received from " + sender, senderColor(sender)]], !shown.hidden.has(sender),
     (on) => { if (on) shown.hidden.delete(sender); else shown.hidden.add(sender); });
 }
 
@@ -166,17 +176,26 @@ function grow() {
   addChanges();
   showDecisive();
   layLayers();
-  layCharts();
+  layTime();
+  layMessages();
   if (running && !topView.follow && !hasMoved) fit();
 }
 
-let listed = 0;
+/* Changes of one instant are one entry of the list, which opens. */
+let listed = 0, changeTimes = [];
 function addChanges() {
+  const list = element("changes");
   for (const [time, path, after, why] of data.changes.slice(listed)) {
-    const item = make("li", "", element("changes"), { title: path, className: "future" });
-    const button = make("button", `${time.toFixed(2)} s  ${path.split("/").pop()} → ${after}`, item, { type: "button" });
-    if (why) make("span", why, button);
-    button.onclick = () => seek(time);
+    if (changeTimes[changeTimes.length - 1] !== time) {
+      changeTimes.push(time);
+      make("summary", "", make("details", "", make("li", "", list, { className: "future" }))).onclick = () => seek(time);
+      marked = -1;
+    }
+    const details = list.lastElementChild.firstElementChild, line = make("p", `${path.split("/").pop()} → ${after}`, details, { title: path });
+    if (why) make("span", why, line);
+    const count = details.children.length - 1;
+    details.open = count === 1;
+    details.firstElementChild.textContent = `${time.toFixed(2)} s` + (count > 1 ? ` ${count} changes` : "");
   }
   listed = data.changes.length;
 }
@@ -186,10 +205,10 @@ function showDecisive() {
   decisive.hidden = mark.hidden = !data.decisive;
   if (!data.decisive) return;
   const { time, text } = data.decisive;
-  decisive.textContent = `Decisive instant${running ? " so far" : ""}: ${time.toFixed(2)} s`;
+  decisive.textContent = `Decisive instant${other ? " of A" : ""}${running ? " so far" : ""}: ${time.toFixed(2)} s`;
   decisive.title = mark.title = text;
   decisive.onclick = () => seek(time);
-  mark.style.left = `${duration > 0 ? 100 * (time - data.times[0]) / duration : 0}%`;
+  mark.style.left = percent(instants.length > 1 ? indexAt(time, instants) / (instants.length - 1) : 0);
 }
 
 /* Show the first frames. */
@@ -211,7 +230,7 @@ function setUp() {
   element("play").onclick = () => playing ? pause() : play();
   element("back").onclick = () => step(-1);
   element("forward").onclick = () => step(1);
-  element("slider").oninput = (event) => seek(data.times[Number(event.target.value)]);
+  element("slider").oninput = (event) => seek(instants[Number(event.target.value)]);
   element("rate").onchange = () => { if (playing) play(); };
   element("station").onchange = (event) => { hasChosen = true; selectStation(event.target.value); };
   element("view").onchange = (event) => selectView(event.target.value);
@@ -227,7 +246,7 @@ const KEYS = {
   ArrowRight: (event) => event.shiftKey ? seek(shown.time + 1) : step(1),
   ArrowLeft: (event) => event.shiftKey ? seek(shown.time - 1) : step(-1),
   Home: () => seek(data.times[0]),
-  End: () => { seek(data.times[last]); followEnd(true); },
+  End: () => { seek(instants[instants.length - 1]); followEnd(true); },
   d: () => { if (data.decisive) seek(data.decisive.time); },
   f: () => { follow(!topView.follow); draw(); },
 };
@@ -255,7 +274,8 @@ canvas.addEventListener("pointermove", (event) => {
   topView.x -= event.movementX / topView.scale; topView.y += event.movementY / topView.scale;
   draw();
 });
-addEventListener("resize", () => { if (last >= 0) { layCharts(); draw(); } });
+addEventListener("resize", () => { if (last >= 0) { layTime(); layMessages(); draw(); } });
+darkMode.addEventListener("change", () => { setColors(); laidLayers = ""; if (last >= 0) { layLayers(); layTime(); draw(); } });
 addEventListener("hashchange", () => { const time = fromAddress(); if (time !== null && time !== announced) seek(time); });
 
 setUp();

@@ -3,16 +3,27 @@ const element = (id) => document.getElementById(id);
 const page = JSON.parse(element("data").textContent);
 /* Return an object for entries by names of the scenario. It inherits nothing, so that `constructor` is no entry of it. */
 const table = (entries) => Object.assign(Object.create(null), entries);
-/* Frames of the run so far; `addPart` appends frames. */
-const data = { roads: page.roads, colors: page.colors, images: table(page.images), times: [], ticks: [], actors: table(),
-               poses: table(), stations: table(), changes: [], messages: [], timeline: [], series: table(), contact: null,
-               decisive: null };
-const C = data.colors, INK = "#334155", SELF = "#0f172a";
-const SENDERS = ["#ea580c", "#c026d3", "#0e7490", "#4d7c0f", "#be123c", "#92400e"];
+/* Return a run without frames; `addPart` appends frames. */
+const newRun = () => ({ times: [], ticks: [], actors: table(), poses: table(), stations: table(), changes: [], messages: [],
+                        timeline: [], series: table(), contacts: [], contact: null, decisive: null });
+/* The run of the page, and the run that is shown over it; null without one. */
+const data = Object.assign(newRun(), { roads: page.roads, colors: page.colors, images: table(page.images) });
+const other = page.other ? newRun() : null;
+const runs = other ? [data, other] : [data];
+const letterOf = (run) => run === other ? "B" : "A";
+/* Colors of the mode of the browser, also as variables of CSS. */
+const C = {}, darkMode = matchMedia("(prefers-color-scheme: dark)");
+function setColors() {
+  Object.assign(C, data.colors[darkMode.matches ? "dark" : "light"]);
+  for (const key of ["own", "fused", "plan", "braking", "link", "lost", "self", "paper"]) document.documentElement.style.setProperty("--map-" + key, C[key]);
+}
+setColors();
 /* Time after its outcome for which a message is drawn [s]. */
 const SHOWN = 0.15;
 /* Index of the last frame and duration [s], names of the actors and of the stations, and senders by station. */
 let last = -1, duration = 0, names = [], stations = [];
+/* Instants to which the controls lead: those of the frames, and those of the other run after its end [s]. */
+let instants = data.times;
 const senders = table();
 /* Whether the run is in progress, and whether the page shows its newest frame. */
 let running = false, atEnd = false;
@@ -31,41 +42,46 @@ function addColumn(columns, key, added, before) {
 }
 
 /* Append null to the columns that have no entries of the last frames. */
-function padColumns(columns) {
-  for (const column of Object.values(columns)) while (column.length < data.times.length) column.push(null);
+function padColumns(columns, count) {
+  for (const column of Object.values(columns)) while (column.length < count) column.push(null);
 }
 
 /* Append a part of the run in the format of the page. */
-function addPart(part) {
-  const before = data.times.length;
-  for (const key of ["times", "ticks", "changes", "messages"]) for (const entry of part[key]) data[key].push(entry);
-  for (const [name, actor] of Object.entries(part.actors)) data.actors[name] = data.actors[name] || actor;
-  for (const [name, column] of Object.entries(part.poses)) addColumn(data.poses, name, unpack(column), before);
-  padColumns(data.poses);
-  for (const [name, parts] of Object.entries(part.stations)) addStation(name, parts, before);
-  Object.values(data.stations).forEach(padColumns);
-  for (const [name, columns] of Object.entries(part.series)) addSeries(name, columns, before);
-  for (const { age, expired, ...columns } of Object.values(data.series)) for (const one of [columns, age, expired]) padColumns(one || {});
+function addPart(part, run = data) {
+  const before = run.times.length;
+  for (const key of ["times", "ticks", "changes", "contacts"]) for (const entry of part[key]) run[key].push(entry);
+  const text = (index) => part.texts[index];
+  for (const [sent, sender, receiver, arrives, reason, size, content] of part.messages)
+    run.messages.push([sent, text(sender), text(receiver), arrives, text(reason), size, text(content)]);
+  for (const [name, actor] of Object.entries(part.actors)) run.actors[name] = run.actors[name] || actor;
+  const count = run.times.length;
+  for (const [name, column] of Object.entries(part.poses)) addColumn(run.poses, name, unpack(column), before);
+  padColumns(run.poses, count);
+  for (const [name, parts] of Object.entries(part.stations)) addStation(run, name, parts, before);
+  for (const columns of Object.values(run.stations)) padColumns(columns, count);
+  for (const [name, columns] of Object.entries(part.series)) addSeries(run, name, columns, before);
+  for (const { age, expired, ...columns } of Object.values(run.series)) for (const one of [columns, age, expired]) padColumns(one || {}, count);
   for (const row of part.timeline) {
-    const known = data.timeline.findIndex(([path]) => path === row[0]);
-    if (known < 0) data.timeline.push(row); else data.timeline[known] = row;
+    const known = run.timeline.findIndex(([path]) => path === row[0]);
+    if (known < 0) run.timeline.push(row); else run.timeline[known] = row;
   }
-  data.contact = part.contact;
-  data.decisive = part.decisive;
+  run.contact = part.contact;
+  run.decisive = part.decisive;
   last = data.times.length - 1;
   duration = last < 0 ? 0 : data.times[last] - data.times[0];
   names = Object.keys(data.actors);
   stations = Object.keys(data.stations);
+  if (other) instants = [...data.times, ...other.times.filter((time) => time > data.times[last] + 1e-6)];
 }
 
-function addStation(name, parts, before) {
-  const columns = data.stations[name] || (data.stations[name] = {}), known = senders[name] || (senders[name] = new Set());
+function addStation(run, name, parts, before) {
+  const columns = run.stations[name] || (run.stations[name] = {}), known = senders[name] || (senders[name] = new Set());
   for (const [key, column] of Object.entries(parts)) addColumn(columns, key, unpack(column), before);
   for (const boxes of parts.received || []) for (const sender of Object.keys(boxes || {})) known.add(sender);
 }
 
-function addSeries(name, { age, expired, ...columns }, before) {
-  const series = data.series[name] || (data.series[name] = {});
+function addSeries(run, name, { age, expired, ...columns }, before) {
+  const series = run.series[name] || (run.series[name] = {});
   for (const [key, column] of Object.entries(columns)) addColumn(series, key, column, before);
   for (const [key, bySender] of Object.entries({ age, expired })) {
     if (bySender) series[key] = series[key] || table();
@@ -73,8 +89,8 @@ function addSeries(name, { age, expired, ...columns }, before) {
   }
 }
 
-/* What is shown: time [s], index of the frame, station ("" for none), view, and layers by name. */
-const shown = { time: 0, index: 0, station: "", view: "top", layers: {}, hidden: new Set() };
+/* What is shown: time [s], index of the frame and of that of the other run, station ("" for none), view, and layers by name. */
+const shown = { time: 0, index: 0, otherIndex: 0, station: "", view: "top", layers: {}, hidden: new Set() };
 
 function make(tag, text, parent, properties = {}) {
   const made = Object.assign(document.createElement(tag), properties);
@@ -83,25 +99,41 @@ function make(tag, text, parent, properties = {}) {
   return made;
 }
 
-/* Return the index of the last frame that is not after the time. */
-function indexAt(time) {
-  let low = 0, high = last;
+/* Return the index of the last one of ascending times that is not after the time; 0 if all are. */
+function indexAt(time, times = data.times) {
+  let low = 0, high = times.length - 1;
   while (low < high) {
     const middle = (low + high + 1) >> 1;
-    if (data.times[middle] <= time + 1e-6) low = middle; else high = middle - 1;
+    if (times[middle] <= time + 1e-6) low = middle; else high = middle - 1;
   }
   return low;
 }
 
-/* Return x, y, yaw and speed of an actor at the shown time, between two frames by linear interpolation. */
-function poseOf(name) {
-  const { time, index } = shown, poses = data.poses[name], from = poses[index], to = poses[index + 1];
-  if (!from || !to || time <= data.times[index]) return from;
+const indexOf = (run) => run === other ? shown.otherIndex : shown.index;
+const endOf = (run) => run.times[run.times.length - 1];
+
+/* Return x, y, yaw and speed of an actor at the shown time, between two frames by linear interpolation; the last ones
+   after the end of the run. */
+function poseOf(name, run = data) {
+  const { time } = shown, index = indexOf(run), poses = run.poses[name], from = poses[index], to = poses[index + 1];
+  if (!from || !to || time <= run.times[index]) return from;
   if (Math.hypot(to[0] - from[0], to[1] - from[1]) > 8) return from;
-  const part = Math.min(1, (time - data.times[index]) / (data.times[index + 1] - data.times[index]));
+  const part = Math.min(1, (time - run.times[index]) / (run.times[index + 1] - run.times[index]));
   const turn = Math.atan2(Math.sin(to[2] - from[2]), Math.cos(to[2] - from[2]));
   return [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1]), from[2] + part * turn,
           from[3] + part * (to[3] - from[3])];
+}
+
+/* Return the contacts of an actor in the shown frame of a run: time, both names, relative speed at the impact. */
+const contactsOf = (name, run = data) => run.contacts.filter(([time, first, second]) =>
+  (name === first || name === second) && Math.abs(time - run.times[indexOf(run)]) < 1e-6);
+
+/* Return the speed of an actor in the shown frame. Where a contact begins it is that before, as the pose has the speed
+   after the bounce. */
+function speedOf(name, run = data) {
+  const poses = run.poses[name] || [], index = indexOf(run), before = poses[index - 1];
+  if (before && contactsOf(name, run).length) return before[3];
+  return poses[index] ? poses[index][3] : null;
 }
 
 /* Return a part of the information of the shown station at the shown frame. */
@@ -111,7 +143,7 @@ function part(key) {
 }
 
 const isPresent = () => part("own") !== null;
-const senderColor = (name) => SENDERS[(stations.indexOf(name) + SENDERS.length - 1) % SENDERS.length];
+const senderColor = (name) => C.senders[(stations.indexOf(name) + C.senders.length - 1) % C.senders.length];
 
 /* Yield the perceived boxes that are shown: box, color, line width in m. */
 function* perceivedBoxes() {
@@ -150,3 +182,5 @@ function messagesNow() {
   }
   return [...found.values()];
 }
+
+if (other) addPart(page.other, other);

@@ -8,8 +8,8 @@ function bounds(points) {
 }
 /* Lanes and lines of each level, in the order in which they cover each other. */
 const levels = data.roads.levels.map(({ lanes, lines }) => ({
-  lanes: lanes.map(([color, points]) => ({ color, points, area: bounds(points) })),
-  lines: lines.map(([broken, color, points]) => ({ broken, color, points, area: bounds(points) })) }));
+  lanes: lanes.map(([kind, points]) => ({ get color() { return Object.hasOwn(C.lanes, kind) ? C.lanes[kind] : C.lane; }, points, area: bounds(points) })),
+  lines: lines.map(([broken, paint, points]) => ({ broken, get color() { return Object.hasOwn(C.marks, paint) ? C.marks[paint] : C.mark; }, points, area: bounds(points) })) }));
 const houses = data.roads.houses.map(([height, points]) => ({ height, points, area: bounds(points) }));
 
 function fit() {
@@ -85,24 +85,35 @@ function drawRoads([left, bottom, right, top]) {
   }
 }
 
+/* Draw the planned path as a band, with gaps while the plan demands braking. */
 function drawPath() {
   const path = shown.layers.plan && isPresent() ? part("path") : [];
   if (path.length < 2) return;
-  pen.lineWidth = 0.5; pen.lineJoin = "round"; pen.strokeStyle = part("braking") ? C.lost : C.link; pen.globalAlpha = 0.75;
+  const braking = part("braking");
+  pen.setLineDash(braking ? [1.2, 0.5] : []);
+  pen.lineWidth = 0.6; pen.lineJoin = "round"; pen.strokeStyle = braking ? C.braking : C.plan; pen.globalAlpha = 0.75;
   trace(path); pen.stroke();
   pen.globalAlpha = 1;
+  pen.setLineDash([]);
 }
 
+/* Draw messages as lines: those in flight with a point, lost ones broken and with a cross. */
 function drawMessages() {
   for (const { sender, receiver, state, share } of shown.layers.messages ? messagesNow() : []) {
     const from = poseOf(sender), to = poseOf(receiver);
     if (!from || !to) continue;
-    pen.setLineDash(state === "lost" ? [0.9, 0.9] : []);
-    pen.strokeStyle = state === "lost" ? C.lost : C.link;
+    const at = (part) => [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])], lost = state === "lost";
+    pen.setLineDash(lost ? [0.9, 0.9] : []);
+    pen.strokeStyle = lost ? C.lost : C.link;
     pen.lineWidth = state === "flying" ? 0.1 : 0.2;
     trace([from, to]); pen.stroke();
+    if (lost) {
+      const [x, y] = at(0.5);
+      pen.setLineDash([]); pen.lineWidth = 0.3;
+      for (const up of [0.8, -0.8]) { trace([[x - 0.8, y - up], [x + 0.8, y + up]]); pen.stroke(); }
+    }
     if (state === "flying") {
-      pen.beginPath(); pen.arc(from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]), 0.55, 0, 2 * Math.PI);
+      pen.beginPath(); pen.arc(...at(share), 0.55, 0, 2 * Math.PI);
       pen.fillStyle = C.link; pen.fill();
     }
   }
@@ -113,19 +124,45 @@ function drawActors(poses) {
   for (const [name, [x, y, yaw]] of poses) {
     const [length, width] = data.actors[name].size, filled = name === shown.station;
     if (Math.max(length, width) < 1) {
-      pen.beginPath(); pen.arc(x, y, 0.6, 0, 2 * Math.PI); pen.fillStyle = filled ? SELF : "#fff"; pen.fill();
-      pen.lineWidth = 0.22; pen.strokeStyle = INK; pen.stroke();
+      pen.beginPath(); pen.arc(x, y, 0.6, 0, 2 * Math.PI); pen.fillStyle = filled ? C.self : C.paper; pen.fill();
+      pen.lineWidth = 0.22; pen.strokeStyle = C.ink; pen.stroke();
       continue;
     }
-    drawBox([x, y, length, width, yaw], filled ? SELF : "#fff", INK, 0.14, filled ? 1 : 0.35);
-    const bar = 0.28 * length, dx = Math.cos(yaw), dy = Math.sin(yaw);
-    trace([[x + bar * dx - dy * width / 2, y + bar * dy + dx * width / 2], [x + bar * dx + dy * width / 2, y + bar * dy - dx * width / 2]]);
-    pen.strokeStyle = filled ? "#fff" : INK; pen.lineWidth = 0.2; pen.stroke();
+    drawBox([x, y, length, width, yaw], filled ? C.self : C.paper, C.ink, 0.14, filled ? 1 : 0.35);
+    drawFront([x, y, yaw], length, width, filled ? C.paper : C.ink);
   }
 }
 
-function outline(name, [x, y, yaw], at) {
-  const [length, width] = data.actors[name].size, cos = Math.abs(Math.cos(yaw)), sin = Math.abs(Math.sin(yaw));
+function drawFront([x, y, yaw], length, width, color) {
+  const bar = 0.28 * length, dx = Math.cos(yaw), dy = Math.sin(yaw);
+  trace([[x + bar * dx - dy * width / 2, y + bar * dy + dx * width / 2], [x + bar * dx + dy * width / 2, y + bar * dy - dx * width / 2]]);
+  pen.strokeStyle = color; pen.lineWidth = 0.2; pen.stroke();
+}
+
+/* Return the actors of the other run, with their poses, that differ from those of this run by 0.1 m or more. */
+function otherPoses() {
+  if (!other || !shown.layers.other) return [];
+  return Object.keys(other.actors).map((name) => [name, poseOf(name, other)]).filter(([name, pose]) => {
+    const here = pose && data.poses[name] && poseOf(name);
+    return pose && !(here && Math.hypot(here[0] - pose[0], here[1] - pose[1]) < 0.1);
+  });
+}
+
+/* Draw the actors of the other run as broken outlines with a halo. */
+function drawOthers() {
+  for (const [name, pose] of otherPoses()) {
+    const length = Math.max(other.actors[name].size[0], 0.9), width = Math.max(other.actors[name].size[1], 0.9);
+    const box = [pose[0], pose[1], length, width, pose[2]];
+    drawBox(box, C.paper, C.paper, 0.55, 0);
+    pen.setLineDash([0.7, 0.35]);
+    drawBox(box, C.paper, C.self, 0.25, 0);
+    pen.setLineDash([]);
+    drawFront(pose, length, width, C.self);
+  }
+}
+
+function outline([length, width], [x, y, yaw], at) {
+  const cos = Math.abs(Math.cos(yaw)), sin = Math.abs(Math.sin(yaw));
   const across = (cos * length + sin * width) / 2, up = (sin * length + cos * width) / 2;
   return [...at(x - across, y + up), ...at(x + across, y - up)];
 }
@@ -149,24 +186,29 @@ function place(width, [left, top, right, bottom], others) {
 }
 
 function writeLabel(text, left, middle) {
-  pen.lineWidth = 3.5; pen.lineJoin = "round"; pen.strokeStyle = "#fff"; pen.strokeText(text, left, middle);
-  pen.fillStyle = SELF; pen.fillText(text, left, middle);
+  pen.lineWidth = 3.5; pen.lineJoin = "round"; pen.strokeStyle = C.paper; pen.strokeText(text, left, middle);
+  pen.fillStyle = C.self; pen.fillText(text, left, middle);
 }
 
-const labelOf = (name, speed) => Math.abs(speed) > 0.05 ? name + "  " + (3.6 * speed).toFixed(0) + " km/h" : name;
+function labelOf(name, speed, run = data) {
+  const value = contactsOf(name, run).length ? speedOf(name, run) : speed;
+  return Math.abs(value) > 0.05 ? `${name}  ${value.toFixed(1)} m/s` : name;
+}
 
+/* Write the names and speeds of the actors of this run, and those of the other run where it has drawn them. */
 function drawLabels(poses, at, area) {
   pen.font = "600 12.5px system-ui, sans-serif";
   pen.textBaseline = "middle";
-  const boxes = poses.map(([name, pose]) => [name, ...outline(name, pose, at)])
-    .filter(([, l, t, r, b]) => r > 0 && l < area.width && b > 0 && t < area.height);
-  const rank = (name) => name === shown.station ? 0 : name in data.stations ? 1 : 2, labels = [];
-  for (const [name, ...box] of boxes.sort(([one], [other]) => rank(one) - rank(other))) {
-    const text = labelOf(name, poseOf(name)[3]), width = pen.measureText(text).width;
-    const others = boxes.filter(([other]) => other !== name).map(([, ...outlined]) => outlined);
-    const spot = place(width, box, [...others, ...labels]);
+  const entry = (run) => ([name, pose]) => ({ name, run, text: (run === other ? "B: " : "") + labelOf(name, pose[3], run),
+                                              box: outline(run.actors[name].size, pose, at) });
+  const entries = [...poses.map(entry(data)), ...otherPoses().map(entry(other))]
+    .filter(({ box: [l, t, r, b] }) => r > 0 && l < area.width && b > 0 && t < area.height);
+  const rank = ({ name }) => name === shown.station ? 0 : name in data.stations ? 1 : 2, labels = [];
+  for (const labeled of entries.sort((one, next) => rank(one) - rank(next))) {
+    const { text, box } = labeled, width = pen.measureText(text).width;
+    const spot = place(width, box, [...entries.filter((each) => each !== labeled).map((each) => each.box), ...labels]);
     // In dense traffic a name would cover others; it is shown after zooming in
-    if (rank(name) === 2 && labels.some((other) => covers(spot, other))) continue;
+    if (rank(labeled) === 2 && labels.some((taken) => covers(spot, taken))) continue;
     labels.push(spot);
     writeLabel(text, spot[0], spot[1] + 8);
   }
@@ -198,6 +240,7 @@ function drawTop() {
   drawMessages();
   for (const entry of perceivedBoxes()) drawPerceived(entry);
   if (shown.layers.truth) drawActors(poses); else drawActors(poses.filter(([name]) => name === shown.station));
+  drawOthers();
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   if (shown.layers.labels) drawLabels(shown.layers.truth ? poses : poses.filter(([name]) => name === shown.station), at, area);
   drawScaleBar(area);
@@ -208,8 +251,8 @@ function drawScaleBar(area) {
   const rough = 110 / topView.scale, power = 10 ** Math.floor(Math.log10(rough));
   const length = [5, 2, 1].map((k) => k * power).find((value) => value <= rough) || power;
   const width = length * topView.scale, y = area.height - 16;
-  pen.lineWidth = 2; pen.strokeStyle = INK;
+  pen.lineWidth = 2; pen.strokeStyle = C.ink;
   trace([[16, y - 5], [16, y], [16 + width, y], [16 + width, y - 5]]); pen.stroke();
   pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "bottom";
-  pen.fillStyle = INK; pen.fillText(`${length} m`, 20, y - 3);
+  pen.fillStyle = C.ink; pen.fillText(`${length} m`, 20, y - 3);
 }
