@@ -107,12 +107,13 @@ corner-cases: install  #- run the corner cases with and without messages, 10 see
 weather-sheet: install  #- render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_reports.weather_sheet
 
-pages: install  #- open a report and replays in EIDRIVE_BROWSER, with axe-playwright-python: reports/pages, docs/figures/replay.png
+pages: install  #- open a report and replays in EIDRIVE_BROWSER, with axe-playwright-python: reports/pages, two of docs/figures
 	@test -n "$$EIDRIVE_BROWSER" || { echo 'EIDRIVE_BROWSER is not set: the program of Chromium'; exit 2; }
 	$(BIN)/python -m pip install axe-playwright-python
 	mkdir -p reports/pages
 	EIDRIVE_SCREENSHOTS=reports/pages $(BIN)/python -m pytest tests/engine/cli/test_pages_in_browser.py
-	cp reports/pages/replay-third-person.png docs/figures/replay.png
+	cp reports/pages/replay.png docs/figures/replay.png
+	cp reports/pages/two-runs-desktop.png docs/figures/two_runs.png
 
 clean:          #- remove the virtual environment and all generated files
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -64,10 +64,18 @@ class Page:
     """
 
     def __init__(
-        self, browser: Any, file: Path | None, width: int, *, dark: bool = False, address: str = "", site: str = ""
+        self,
+        browser: Any,
+        file: Path | None,
+        width: int,
+        *,
+        dark: bool = False,
+        address: str = "",
+        site: str = "",
+        height: int = 900,
     ) -> None:
         scheme = "dark" if dark else "light"
-        self._context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        self._context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
         self.page = self._context.new_page()
         self.faults: list[str] = []
         self.page.on("console", lambda message: self._note(message.type in ("error", "warning"), message.text))
@@ -257,7 +265,7 @@ def two_runs(eidrive: Eidrive, tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("size", WIDTHS)
 def test_two_runs_have_one_cursor_until_the_longer_one_ends(browser: Any, two_runs: Path, size: str) -> None:
-    page = Page(browser, two_runs, WIDTHS[size], address="#t=4.7")
+    page = Page(browser, two_runs, WIDTHS[size], address="#t=4.7", height=1460)
     assert page.time() == 4.7
     speed = page.page.locator("#charts b").first
     before = "data.poses.Ego[shown.index - 1][3].toFixed(2)"
@@ -276,17 +284,17 @@ def test_two_runs_have_one_cursor_until_the_longer_one_ends(browser: Any, two_ru
     assert not page.page.is_visible("#end-B")
     assert not page.wide()
     page.page.keyboard.press("d")
-    page.close(f"two-runs-{size}")
+    page.close(f"two-runs-{size}", full=size == "phone")
 
 
 def test_views_of_replay_show_different_pictures(browser: Any, report: Path) -> None:
     page = Page(browser, replay_of(report, "ideal"), 1440, address="#t=3.9")
     pictures = set()
-    for view in ("top", "driver", "follow", "third"):
+    for view in ("driver", "follow", "third", "top"):
         page.page.select_option("#view", view)
         pictures.add(page.page.evaluate("document.getElementById('street').toDataURL()"))
     assert len(pictures) == 4
-    page.close("replay-third-person", full=False)
+    page.close("replay", full=False)
 
 
 SCRUB = """async () => {

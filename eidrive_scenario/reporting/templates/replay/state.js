@@ -115,7 +115,7 @@ const endOf = (run) => run.times[run.times.length - 1];
 /* Return x, y, yaw and speed of an actor at the shown time, between two frames by linear interpolation; the last ones
    after the end of the run. */
 function poseOf(name, run = data) {
-  const { time } = shown, index = indexOf(run), poses = run.poses[name], from = poses[index], to = poses[index + 1];
+  const { time } = shown, index = indexOf(run), poses = run.poses[name] || [], from = poses[index], to = poses[index + 1];
   if (!from || !to || time <= run.times[index]) return from;
   if (Math.hypot(to[0] - from[0], to[1] - from[1]) > 8) return from;
   const part = Math.min(1, (time - run.times[index]) / (run.times[index + 1] - run.times[index]));

@@ -2,7 +2,7 @@
 /* Length of the axis [s]; width of a row's plot [pixels]; functions that show the values at the cursor. */
 let axis = 0, plotWidth = 0, cursors = [];
 /* Distance below which marks of a track are one mark [pixels]. */
-const NEAR_MARKS = 20;
+const NEAR_MARKS = 26;
 
 const shareOf = (time) => axis > 0 ? Math.max(0, Math.min(1, (time - data.times[0]) / axis)) : 0;
 const percent = (share) => `${(100 * share).toFixed(3)}%`;
