@@ -226,6 +226,7 @@ def test_messages_of_replay_follow_the_cursor_and_name_lost_ones(browser: Any, r
     assert "lost: " in current.nth(4).inner_text()
     assert page.time() == float(current.first.inner_text().removesuffix(" s"))
     assert page.page.locator("#tracks .mark.lost").count() > 3
+    assert page.page.evaluate("poseOf('sender that is no actor') === undefined")
     page.close("replay-messages")
 
 

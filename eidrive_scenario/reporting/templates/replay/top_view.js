@@ -14,9 +14,8 @@ const houses = data.roads.houses.map(([height, points]) => ({ height, points, ar
 
 function fit() {
   let left = Infinity, right = -Infinity, bottom = Infinity, top = -Infinity;
-  const around = shown.station ? data.poses[shown.station] : null;
-  for (const poses of Object.values(data.poses)) for (const [i, pose] of poses.entries()) {
-    const center = around && around[i];
+  for (const run of runs) for (const poses of Object.values(run.poses)) for (const [i, pose] of poses.entries()) {
+    const around = run.poses[shown.station], center = around && around[i];
     if (!pose || (center && Math.hypot(pose[0] - center[0], pose[1] - center[1]) > NEAR)) continue;
     left = Math.min(left, pose[0]); right = Math.max(right, pose[0]); bottom = Math.min(bottom, pose[1]); top = Math.max(top, pose[1]);
   }
