@@ -22,15 +22,20 @@ from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSetti
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.sensor import view_sectors
-from eidrive_scenario.sensing.settings import ImuSettings
+from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
 
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """Return the sensors of a station. Raise SettingError if the settings omit a sensor that the detector needs."""
+    return Rig(spec, station_sensors(settings), seed=seed)
+
+
+def station_sensors(settings: AgentSettings) -> dict[str, SensorSettings]:
+    """Return the sensors of a station by name. Raise SettingError as `build_rig`."""
     kind: type[Detector] = _detector_class(settings.detector)
-    return Rig(spec, settings.rig_sensors(kind.needs, kind.default_sensors), seed=seed)
+    return settings.rig_sensors(kind.needs, kind.default_sensors)
 
 
 def _detector_class(name: str) -> type[Detector]:

@@ -148,6 +148,7 @@ def _record(
         CONTEXT,
         RunRecorder,
         axle_metadata,
+        body_metadata,
         criteria_context_text,
         trailer_metadata,
     )
@@ -164,6 +165,7 @@ def _record(
         CONTEXT: criteria_context_text(scenario),
         **trailer_metadata(scenario),
         **axle_metadata(scenario),
+        **body_metadata(scenario),
     }
     text = scenario.text if scenario.text is not None else _text(source)
     # The text of the scenario and its road, so that a replay needs no other files

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -51,7 +51,7 @@ class Roadside:
         self._heads = tuple(heads)
         self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
         self._unlit = [
-            MeshInstance(_head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), place, FIRST_SIGNAL_LABEL - row)
+            MeshInstance(head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), place, FIRST_SIGNAL_LABEL - row)
             for row, (head, place) in enumerate(zip(heads, self._places, strict=True))
         ]
 
@@ -67,18 +67,23 @@ class Roadside:
 
 def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
     """Return all road objects as one model; equal objects are placed together."""
-    equal: dict[tuple[str, str, float, float, float, float], list[RoadObjectBody]] = {}
-    for piece in pieces:
-        key = (piece.kind, piece.name, piece.length, piece.width, piece.height, piece.radius)
-        equal.setdefault(key, []).append(piece)
     triangles: dict[str, list[Array]] = {}
-    for key, group in equal.items():
-        poses = np.array([piece.pose for piece in group])
-        for material, part in road_object_mesh(*key).items():
+    for mesh, poses in equal_road_objects(pieces):
+        for material, part in mesh.items():
             triangles.setdefault(material, []).append(_placed(part, poses))
     if not triangles:
         return None
     return gridded(model({material: np.concatenate(parts) for material, parts in triangles.items()}, {}))
+
+
+def equal_road_objects(pieces: Iterable[RoadObjectBody]) -> Iterator[tuple[Mapping[str, Array], Array]]:
+    """Yield the mesh of each different road object, and the poses (N, 6) of all objects that equal it."""
+    equal: dict[tuple[str, str, float, float, float, float], list[RoadObjectBody]] = {}
+    for piece in pieces:
+        key = (piece.kind, piece.name, piece.length, piece.width, piece.height, piece.radius)
+        equal.setdefault(key, []).append(piece)
+    for key, group in equal.items():
+        yield road_object_mesh(*key), np.array([piece.pose for piece in group])
 
 
 def _placed(part: Array, poses: Array) -> Array:
@@ -90,7 +95,8 @@ def _placed(part: Array, poses: Array) -> Array:
     return corners.reshape(-1, 3, 3)
 
 
-def _head_model(head: SignalHead) -> Model:
+def head_model(head: SignalHead) -> Model:
+    """Return a traffic light with unlit lamps, or a sign."""
     colors = lamp_colors(head.signal)
     if not colors:
         return model(sign(sign_face(head.signal), head.width, head.height), {})
@@ -107,9 +113,9 @@ def _glow(head: SignalHead, state: str | None, time: float) -> Mapping[str, Ligh
     return {f"lamp_{c} {number}": LAMPS[c] for number, c in enumerate(colors) if c in shining}
 
 
-_BESIDE_ROADS = 1500.0
+BESIDE_ROADS = 1500.0
 """Extent of the ground around the roads [m]."""
-_BELOW_ROADS = 0.06
+BELOW_ROADS = 0.06
 """Distance of the ground below the roads, which prevents that it is visible through them [m]."""
 _LIT_WINDOWS = 0.3
 """Share of the windows of a building that are lit at night."""
@@ -149,7 +155,7 @@ class Visuals:
         """Return the image of a camera. Actors that the scenario makes invisible cast no shadows and emit no light."""
         if self._shown_buildings < len(self._scenery.buildings):
             self._shown_buildings = len(self._scenery.buildings)
-            self._buildings = gridded(merged(_building_model(each) for each in self._scenery.buildings))
+            self._buildings = gridded(merged(building_model(each) for each in self._scenery.buildings))
         weather, time = state.weather, state.time
         actors: list[MeshInstance] = []
         ignored: list[MeshInstance] = []
@@ -186,8 +192,8 @@ class Visuals:
             parts = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
             points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
             low, high = points.min(axis=0), points.max(axis=0)
-        (x0, y0, z), (x1, y1, _) = (low - _BESIDE_ROADS).tolist(), (high + _BESIDE_ROADS).tolist()
-        z += _BESIDE_ROADS - _BELOW_ROADS
+        (x0, y0, z), (x1, y1, _) = (low - BESIDE_ROADS).tolist(), (high + BESIDE_ROADS).tolist()
+        z += BESIDE_ROADS - BELOW_ROADS
         kind = "grass" if self._scenery.roads is not None else "asphalt"
         land = model({kind: polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])}, {})
         pieces = [land, gridded(merged(parts))] if parts else [land]
@@ -196,11 +202,11 @@ class Visuals:
 
 def _actor_model(spec: ActorSpec, motion: str) -> Model:
     axles = spec.wheelbase, spec.wheel_radius, spec.extra_axles
-    return _shared_model(spec.shape, spec.size, spec.offset, axles, spec.color or paint(spec.name, spec.shape), motion)
+    return shared_model(spec.shape, spec.size, spec.offset, axles, spec.color or paint(spec.name, spec.shape), motion)
 
 
 @lru_cache(maxsize=256)
-def _shared_model(
+def shared_model(
     shape: str,
     size: Vector3,
     offset: Vector3,
@@ -222,7 +228,7 @@ def _stance(spec: ActorSpec, at: ActorState) -> tuple[Array, Array]:
     return rotation, foot
 
 
-def _building_model(building: Building) -> Model:
+def building_model(building: Building) -> Model:
     """Return a building; its name determines the lit windows."""
     own = building.color or by_name(building.name, FACADES)
     mesh = dict(building_mesh(building.size))

@@ -18,7 +18,7 @@ from eidrive_scenario.rendering.shadows import ShadowGrid, Shadows
 from eidrive_scenario.rendering.surfaces import DARKENING, grit, patches
 from eidrive_scenario.world.weather import Weather
 
-_STREET_LAMP = np.array([1.08, 1.0, 0.78])
+STREET_LAMP = np.array([1.08, 1.0, 0.78])
 """Color of street lamps, linear sRGB."""
 _GLINT = 350.0
 """Exponent of the reflection of the sun in car paint: a spot of some four degrees."""
@@ -58,7 +58,7 @@ def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
     incoming = up * _single(light.sky) + (np.float32(1.0) - up) * _single(GROUND_ALBEDO * light.ground)
     if weather.street_lighting > 0.0 and weather.lamps_on:
         level = np.float32(0.35) + np.float32(0.65) * np.maximum(nz, np.float32(0.0))
-        incoming += level * _single(weather.street_lighting * _STREET_LAMP)
+        incoming += level * _single(weather.street_lighting * STREET_LAMP)
     sx, sy, sz = light.towards.astype(np.float32)
     facing = np.maximum(sx * nx + sy * ny + sz * nz, np.float32(0.0))
     return Lit(surfaces, reflected * incoming + surfaces.glow, reflected * facing * _single(light.sun))

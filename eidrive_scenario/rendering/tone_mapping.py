@@ -31,7 +31,11 @@ def white_level(luminance: Floats) -> float:
     (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
     """
     sampled = np.maximum(_luma(np.ascontiguousarray(luminance[::2, ::2])), np.float32(BLACK))
-    mean = math.exp(float(np.log(sampled).mean()))
+    return white_of_mean(math.exp(float(np.log(sampled).mean())))
+
+
+def white_of_mean(mean: float) -> float:
+    """Return the luminance that becomes white by the mean of log luminance, as `white_level` [cd/m²]."""
     key = max(BRIGHTNESS * (1.03 - 2.0 / (2.0 + math.log10(mean + 1.0))), DARKEST)
     return HEADROOM * mean / key
 

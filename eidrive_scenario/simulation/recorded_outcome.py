@@ -15,7 +15,7 @@ from eidrive_scenario.evaluation.criteria_parser import CriteriaContext
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import Axle, Vehicle
+from eidrive_scenario.openscenario.model import Axle, MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
@@ -26,6 +26,8 @@ from eidrive_scenario.simulation.commands import criteria_context
 from eidrive_scenario.simulation.result import RunResult
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+from eidrive_scenario.world.actor import ExtraAxle, Vector3
+from eidrive_scenario.world.specs import actor_spec
 
 _Entry = TypeVar("_Entry")
 
@@ -37,6 +39,20 @@ TRAILERS = "trailers"
 """Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
 AXLES = "axles"
 """Entry of the metadata with the axles of the vehicles of the scenario, by name."""
+
+BODIES = "bodies"
+"""Entry of the metadata with the bodies of the actors of the scenario, by name."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """Part of the specification of an actor (`ActorSpec`) on which its model in pictures depends beside its box."""
+
+    shape: str
+    color: Vector3 | None = None
+    wheelbase: float = 0.0
+    wheel_radius: float = 0.3
+    extra_axles: tuple[ExtraAxle, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -174,6 +190,24 @@ def axle_metadata(scenario: Scenario) -> dict[str, str]:
     return {AXLES: canonical_json(codec(Mapping[str, AxleCenters]).encode(centers))} if centers else {}
 
 
+def bodies(scenario: Scenario) -> dict[str, Body]:
+    """Return the bodies of the vehicles, pedestrians and other objects of a scenario, by name."""
+    specs = {
+        name: actor_spec(name, entity)
+        for name, entity in scenario.entities.items()
+        if isinstance(entity, Vehicle | Pedestrian | MiscObject)
+    }
+    return {
+        name: Body(spec.shape, spec.color, spec.wheelbase, spec.wheel_radius, spec.extra_axles)
+        for name, spec in specs.items()
+    }
+
+
+def body_metadata(scenario: Scenario) -> dict[str, str]:
+    """Return the entry `BODIES` of the metadata of a run."""
+    return {BODIES: canonical_json(codec(Mapping[str, Body]).encode(bodies(scenario)))}
+
+
 def _center(axle: Axle) -> tuple[float, float]:
     return axle.position_x, axle.position_z
 
@@ -181,6 +215,11 @@ def _center(axle: Axle) -> tuple[float, float]:
 def recorded_axles(recording: Recording) -> Mapping[str, AxleCenters]:
     """Return the axles of vehicles by name. Those of an older or damaged recording are unknown."""
     return _metadata(recording, AXLES, Mapping[str, AxleCenters], {})
+
+
+def recorded_bodies(recording: Recording) -> Mapping[str, Body]:
+    """Return the bodies of actors by name. Those of an older or damaged recording are unknown."""
+    return _metadata(recording, BODIES, Mapping[str, Body], {})
 
 
 def recorded_trailers(recording: Recording) -> Mapping[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -187,12 +188,22 @@ def _drawn(parts: Iterable[tuple[_Part, Sequence[_Edges]]], window: Window | Non
 
 def recorded_roads(recording: Recording) -> RoadDrawing:
     """Return the roads in the attachments of a recording, with houses; an empty drawing without a road file."""
+    return network_drawing(recorded_network(recording))
+
+
+def recorded_network(recording: Recording) -> RoadNetwork | None:
+    """Return the road network in the attachments of a recording, None without one. Raise InputError."""
     text = recording.attachments.get(ROAD_FILE)
     if text is None:
-        return RoadDrawing()
+        return None
     if len(text) > _LARGEST_ROAD_FILE:
         raise _too_large(f"{recording.path}/{ROAD_FILE}")
-    return network_drawing(RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}"))
+    return _parse(text, f"{recording.path}/{ROAD_FILE}")
+
+
+@lru_cache(maxsize=1)
+def _parse(text: bytes, source: str) -> RoadNetwork:
+    return RoadNetwork.parse(text, source)
 
 
 def network_drawing(network: RoadNetwork | None) -> RoadDrawing:

@@ -30,9 +30,12 @@ from eidrive_scenario.reporting.replay.frame_data import (
     packed,
     replay_data,
 )
+from eidrive_scenario.reporting.replay.light import LightChanges, parse_weather
+from eidrive_scenario.reporting.replay.models import ActorModels, street_models
 from eidrive_scenario.reporting.replay.page import TEMPLATE, decisive_instant, page_values, station_settings
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
+from eidrive_scenario.simulation.recorded_outcome import bodies
 from eidrive_scenario.simulation.result import RunResult
 
 if TYPE_CHECKING:
@@ -167,7 +170,9 @@ class LiveView:
         if self._builder is not None:
             raise SimulationError("the live view has shown a run; a second run needs a second LiveView")
         settings = json.loads(simulation.resolved.canonical)
-        self._builder = ReplayBuilder(self._report, station_settings(settings))
+        models = ActorModels(bodies(simulation.scenario), settings.get("stations"))
+        light = LightChanges(parse_weather(settings.get("weather_profile")))
+        self._builder = ReplayBuilder(self._report, station_settings(settings), models, light)
         self._values = page_values(
             simulation.scenario.name,
             simulation.seed,
@@ -176,6 +181,7 @@ class LiveView:
             command=command_of_source(simulation.scenario, simulation.seed, simulation.settings),
             result=None,
             roads=self._roads(simulation),
+            street=_street(simulation),
             data=replay_data([]),
             images={},
             live=True,
@@ -267,6 +273,13 @@ class LiveView:
             if self._page[0] is not values:
                 self._page = values, render_page(TEMPLATE, **values).encode(errors="replace")
             return self._page[1]
+
+
+def _street(simulation: Simulation) -> Data:
+    try:
+        return street_models(simulation.roads)
+    except (InputError, *UNDRAWABLE):  # as `_roads` reports
+        return street_models(None)
 
 
 def _write_address(address: str) -> None:

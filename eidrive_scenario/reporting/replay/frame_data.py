@@ -16,12 +16,14 @@ from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
+from eidrive_scenario.reporting.replay.light import LightChanges
+from eidrive_scenario.reporting.replay.models import ActorModels
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.storyboard.state.element_states import ElementState, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message
-from eidrive_scenario.world.view import Contact
+from eidrive_scenario.world.view import Contact, WorldView
 
 MOST = 40_000
 """Maximum number of messages in a page."""
@@ -143,6 +145,8 @@ _ABSENT = len("null, ")
 """Size of the entry of a station for a frame before its first one [bytes]."""
 _VALUE = len("12.34, ")
 """Size of a value of a series [bytes]."""
+_LEVEL = (0.01, 5e-4)
+"""Height [m] and angles [rad] below which an actor is level at height 0."""
 PATH_POINTS = 12
 """Maximum number of points of a planned path in the page."""
 UNDRAWABLE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
@@ -177,11 +181,20 @@ class ReplayBuilder:
 
     report    a frame that cannot be drawn is skipped and reported; without a report its error is raised
     settings  of stations, by name; they define the lifetime of reports
+    models    of the actors, and their sensors; by default those of their categories
+    light     changes of the light; by default those of the scenario
     """
 
-    def __init__(self, report: DamageReport | None = None, settings: Mapping[str, AgentSettings] | None = None) -> None:
+    def __init__(
+        self,
+        report: DamageReport | None = None,
+        settings: Mapping[str, AgentSettings] | None = None,
+        models: ActorModels | None = None,
+        light: LightChanges | None = None,
+    ) -> None:
         self._report = report
         self._settings = settings or {}
+        self._models, self._light = models or ActorModels(), light or LightChanges()
         self._builders: dict[str, SnapshotBuilder] = {}
         self._series, self._messages, self._timeline = SeriesBuilder(), MessageList(), Timeline()
         self._budget, self._width = _Budget(report), 0
@@ -209,7 +222,7 @@ class ReplayBuilder:
         if not self._budget.take(_size(part) + _VALUE * self._width + _ABSENT * added * self._frames, frame.view.time):
             self.is_full = True
             return
-        self._append(part)
+        self._append(part, frame)
         self._series.keep()
         for step in frame.steps.values():
             self._messages.observe_sent(step.outbox)
@@ -241,12 +254,13 @@ class ReplayBuilder:
             **part,
             "messages": self._messages.take(),
             "timeline": self._timeline.take(),
+            "models": self._models.take(),
             "series": self._series.take(),
             "contact": self._series.contact,
             "decisive": self._series.decisive,
         }
 
-    def _append(self, added: Mapping[str, Any]) -> None:
+    def _append(self, added: Mapping[str, Any], frame: Frame) -> None:
         part = self._part
         before = len(part["times"])
         part["times"].append(added["time"])
@@ -257,7 +271,11 @@ class ReplayBuilder:
         for name, actor in added["actors"].items():
             if name not in self._actors:
                 self._actors.add(name)
-                part["actors"][name] = actor
+                offset = tuple(frame.view.offset[frame.view.row(name)].round(3).tolist())
+                part["actors"][name] = actor | self._models.describe(
+                    name, actor["category"], tuple(actor["size"]), offset
+                )
+        part["light"].extend(self._light.observe(frame))
         for name, station in added["stations"].items():
             self._stations.add(name)
             part["stations"].setdefault(name, [None] * before).append(station)
@@ -269,12 +287,16 @@ def replay_data(
     report: DamageReport | None = None,
     settings: Mapping[str, AgentSettings] | None = None,
     final_links: Iterable[LinkEvent] = (),
+    models: ActorModels | None = None,
+    light: LightChanges | None = None,
 ) -> Data:
     """Return the frames as plain lists, with lengths in cm and angles in mrad resolution.
 
     times      of the frames [s], and their ticks
-    actors     category and size [length, width, height] by name
-    poses      [x, y, yaw of the box center, speed] by frame and name
+    actors     category, size [length, width, height], and the values of `ActorModels.describe` by name
+    models     see `ActorModels.take`; light  see `light_entry`
+    poses      [x, y, yaw of the box center, speed] by frame and name; also [height of the center of the bottom,
+               pitch, roll] of actors that are not level at height 0
     stations   by name, for each frame: own boxes, boxes `received` by sender, `fused` boxes with the semi-axes and
                the direction of their 95 % ellipse, links [sender, delivered], and the plan: its reason, path, whether
                it demands braking, and the rows of the fused objects that are the reason. None: absent.
@@ -284,9 +306,10 @@ def replay_data(
     changes    [time, path, after, why] of the storyboard transitions
     contacts   [time, name, other name, relative speed at the impact [m/s]] of all contacts
 
-    For `report` and `settings` see `ReplayBuilder`. `final_links` are the message outcomes of the last tick.
+    For `report`, `settings`, `models` and `light` see `ReplayBuilder`. `final_links` are the message outcomes of the
+    last tick.
     """
-    builder = ReplayBuilder(report, settings)
+    builder = ReplayBuilder(report, settings, models, light)
     for frame in frames:
         builder.observe(frame)
         if builder.is_full:
@@ -321,11 +344,20 @@ def overlay(data: Data) -> Data:
         for name, steps in data["stations"].items()
     }
     lost = [row for row in data["messages"] if row[3] is None]
-    return {**data, "stations": plans, "messages": lost, "changes": [], "timeline": []}
+    return {**data, "stations": plans, "messages": lost, "changes": [], "timeline": [], "models": {}, "light": []}
 
 
 def _empty_part() -> Data:
-    return {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": [], "contacts": []}
+    return {
+        "times": [],
+        "ticks": [],
+        "actors": {},
+        "poses": [],
+        "stations": {},
+        "changes": [],
+        "contacts": [],
+        "light": [],
+    }
 
 
 def _column(entries: list[Any]) -> list[Any]:
@@ -342,8 +374,10 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
     boxes, speeds = view.boxes.tolist(), view.speed.tolist()
     bodies = list(zip(view.names, view.categories, boxes, speeds, strict=True))
     shown = [body for body in bodies if math.isfinite(sum(body[2]) + body[3])]
+    raised = _raised(view)
     poses = {
-        name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)] for name, _, box, speed in shown
+        name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2), *raised.get(name, ())]
+        for name, _, box, speed in shown
     }
     for name in frame.steps:
         if name not in builders:
@@ -371,6 +405,18 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
 
 def _impact_speed(contact: Contact) -> float | None:
     return round(contact.impact_speed, 2) if math.isfinite(contact.impact_speed) else None
+
+
+def _raised(view: WorldView) -> dict[str, list[float]]:
+    """Return height of the center of the bottom [m], pitch and roll of the actors that are not level at height 0."""
+    (ahead, left, up), half = view.offset.T, view.size[:, 2] / 2.0
+    sin, cos = np.sin(view.pitch), np.cos(view.pitch)
+    height = view.position[:, 2] - sin * ahead + cos * (np.sin(view.roll) * left + np.cos(view.roll) * (up - half))
+    angles = np.column_stack([view.pitch, view.roll])
+    is_raised = (np.abs(height) >= _LEVEL[0]) | (np.abs(angles) >= _LEVEL[1]).any(axis=1)
+    rows = np.flatnonzero(is_raised & np.isfinite(height) & np.isfinite(angles).all(axis=1)).tolist()
+    stances = np.column_stack([height.round(2), angles.round(3)]).tolist()
+    return {view.names[row]: stances[row] for row in rows}
 
 
 def _size(part: Mapping[str, Any]) -> int:

@@ -22,16 +22,18 @@ from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, is_partial, result_of
 from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
+from eidrive_scenario.reporting.drawing.road_drawing import recorded_network, recorded_roads
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, is_broken
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.replay.colors import COLORS
-from eidrive_scenario.reporting.replay.frame_data import Data, describe_error, overlay, packed, replay_data
+from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, Data, describe_error, overlay, packed, replay_data
+from eidrive_scenario.reporting.replay.light import LightChanges, parse_weather
+from eidrive_scenario.reporting.replay.models import ActorModels, street_models, three_library
 from eidrive_scenario.reporting.replay.series import closest_approach
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
-from eidrive_scenario.simulation.recorded_outcome import CONTEXT, TRAILERS, recorded_outcome
+from eidrive_scenario.simulation.recorded_outcome import BODIES, CONTEXT, TRAILERS, recorded_bodies, recorded_outcome
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
 _NAME = re.compile(r"(?P<camera>.+)-(?P<tick>\d+)\.jpg")
@@ -74,6 +76,7 @@ def page_values(
     command: str,
     result: ReportedRun | None,
     roads: RoadDrawing,
+    street: Data,
     data: Data,
     images: Mapping[str, Any],
     notices: Sequence[str] = (),
@@ -86,6 +89,7 @@ def page_values(
 
     settings  resolved settings of the run; empty if they are unknown
     facts     facts about the run that the page lists
+    street    see `street_models`
     data      of all frames, see `replay_data`; of no frame for a live page
     images    see `camera_files`
     notices   damage of a recording, or what a live page does not show
@@ -94,7 +98,7 @@ def page_values(
     other     run that the page shows over this one
     labels    what distinguishes this run and the other one
     """
-    shown = {**packed(data), "roads": _roads(roads), "colors": COLORS, "images": images}
+    shown = {**packed(data), "roads": _roads(roads), "street": street, "colors": COLORS, "images": images}
     if other is not None:
         shown["other"] = packed(overlay(other.data))
     return {
@@ -107,6 +111,7 @@ def page_values(
         "complete": complete,
         "live": live,
         "data": shown,
+        "three": three_library(),
         "other": other,
         "differences": [] if other is None else _differences(facts, other.facts),
         "labels": labels,
@@ -217,6 +222,7 @@ def make_replay(
         notices=damage,
         complete=complete and (second is None or second.complete),
         roads=roads,
+        street=_readable_street(recording),
         data=run.data,
         images=camera_files(recording.path.parent, out.parent),
         other=second,
@@ -250,7 +256,11 @@ def _read_run(
     trace = TraceHash()
     settings = run_settings(recording, report)
     frames = _drawable(recording, report, trace)
-    data = replay_data(frames, report, station_settings(settings), _final_links(recording, report))
+    models = ActorModels(recorded_bodies(recording), settings.get("stations"))
+    light = LightChanges(parse_weather(settings.get("weather_profile")))
+    data = replay_data(
+        frames, report, station_settings(settings), _final_links(recording, report), models=models, light=light
+    )
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
         raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
@@ -291,6 +301,14 @@ def readable_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
         return RoadDrawing()
 
 
+def _readable_street(recording: Recording) -> Data:
+    """Return the models of the roads of a recording; bare ground for those that `readable_roads` reports."""
+    try:
+        return street_models(recorded_network(recording))
+    except (InputError, *UNDRAWABLE, MemoryError, RecursionError):
+        return street_models(None)
+
+
 def run_settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
     """Return the resolved settings of the metadata."""
     settings = _object(recording.metadata.get("settings", "{}"))
@@ -324,7 +342,7 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the facts about the run that the page lists."""
     if settings:
         return run_facts(settings)
-    hidden = ("format", "parameters", "settings", "command", CONTEXT, TRAILERS)
+    hidden = ("format", "parameters", "settings", "command", CONTEXT, TRAILERS, BODIES)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
 

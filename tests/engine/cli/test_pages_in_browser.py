@@ -16,6 +16,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from command_fixtures import Eidrive
 
@@ -28,6 +30,8 @@ from eidrive_scenario.reporting.live.live_view import LiveView
 BROWSER = os.environ.get("EIDRIVE_BROWSER")
 SCREENSHOTS = os.environ.get("EIDRIVE_SCREENSHOTS")
 WIDTHS = {"phone": 390, "desktop": 1440}
+SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL without a graphics card."""
 SERIOUS = ("serious", "critical")
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="EIDRIVE_BROWSER is not set")
@@ -39,7 +43,7 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        chromium = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", *SOFTWARE])
         yield chromium
         chromium.close()
 
@@ -57,10 +61,16 @@ def report(eidrive: Eidrive, tmp_path: Path) -> Path:
     return tmp_path / "report" / "report.html"
 
 
+def _is_fault(kind: str, text: str) -> bool:
+    # Without a graphics card, Chromium warns of copies from one canvas to another
+    return kind in ("error", "warning") and "GPU stall due to ReadPixels" not in text
+
+
 class Page:
     """Page of a browser with the messages of its console and its requests other than to files.
 
     site  address below which a live view may request
+    script  executed before those of the page
     """
 
     def __init__(
@@ -73,14 +83,16 @@ class Page:
         address: str = "",
         site: str = "",
         height: int = 900,
+        script: str = "",
     ) -> None:
         scheme = "dark" if dark else "light"
         self._context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
         self.page = self._context.new_page()
+        self.page.add_init_script(script)
         self.faults: list[str] = []
-        self.page.on("console", lambda message: self._note(message.type in ("error", "warning"), message.text))
+        self.page.on("console", lambda message: self._note(_is_fault(message.type, message.text), message.text))
         self.page.on("pageerror", lambda error: self._note(True, str(error)))
-        allowed = ("file:", "data:", *([site] if site else []))
+        allowed = ("file:", "data:", "blob:", *([site] if site else []))
         self.page.on("request", lambda request: self._note(not request.url.startswith(allowed), request.url))
         self.page.goto((site if file is None else file.as_uri()) + address)
 
@@ -159,7 +171,7 @@ def test_replay_is_controlled_by_keyboard(browser: Any, report: Path) -> None:
     assert page.time() == pytest.approx(2.05)
     keys.press("Home")
     assert page.time() == 0.0
-    for key, view in (("2", "follow"), ("3", "third"), ("4", "driver"), ("1", "top")):
+    for key, view in (("2", "follow"), ("3", "third"), ("4", "driver"), ("5", "orbit"), ("1", "top")):
         keys.press(key)
         assert page.page.input_value("#view") == view
     page.close("replay-keyboard")
@@ -298,6 +310,72 @@ def test_views_of_replay_show_different_pictures(browser: Any, report: Path) -> 
     page.close("replay", full=False)
 
 
+def colors(page: Page) -> int:
+    """Return the number of colors of the street as shown."""
+    picture = cv2.imdecode(np.frombuffer(page.page.locator("#street").screenshot(), np.uint8), cv2.IMREAD_COLOR)
+    return len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0))
+
+
+@pytest.mark.parametrize("size", WIDTHS)
+def test_replay_draws_models_in_three_dimensions(browser: Any, report: Path, size: str) -> None:
+    page = Page(browser, replay_of(report, "ideal"), WIDTHS[size], address="#t=3.9")
+    views = page.page.eval_on_selector_all("#view option", "options => options.map((option) => option.value)")
+    assert views == ["top", "follow", "third", "driver", "orbit", "camera 0"]
+    for view in views[1:]:
+        page.page.select_option("#view", view)
+        page.wait("space.state === 'ready' && !space.isDue && [...space.models.values()].every(Boolean)")
+        assert page.page.evaluate("space.renderer.info.render.triangles") > 5000
+        assert colors(page) > 4000, view
+        assert not page.wide()
+        page.check(f"replay-3d-{view.replace(' ', '-')}-{size}", full=False)
+    drawn = page.page.evaluate("space.renderer.info.render.frame")
+    page.page.wait_for_timeout(300)
+    assert page.page.evaluate("space.renderer.info.render.frame") == drawn
+    page.close(f"replay-3d-{size}")
+
+
+def test_orbit_turns_moves_and_zooms_by_pointer(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440, address="#t=3.9")
+    page.page.select_option("#view", "orbit")
+    page.wait("space.state === 'ready'")
+    state = "[orbit.azimuth, orbit.elevation, topView.x, topView.y, topView.scale]"
+    area, mouse = page.page.locator("#street").bounding_box(), page.page.mouse
+    states = [page.page.evaluate(state)]
+    for button, ahead in (("left", 0), ("right", 0), ("left", 240)):
+        mouse.move(area["x"] + 300, area["y"] + 200)
+        if ahead:
+            mouse.wheel(0, -ahead)
+        else:
+            mouse.down(button=button)
+            mouse.move(area["x"] + 360, area["y"] + 230)
+            mouse.up(button=button)
+        page.page.wait_for_timeout(50)
+        states.append(page.page.evaluate(state))
+    first, after_turn, after_move, after_zoom = states
+    assert after_turn[:2] == pytest.approx([first[0] - 0.3, first[1] + 0.15])
+    assert after_move[:2] == after_turn[:2]
+    assert math.dist(after_move[2:4], after_turn[2:4]) == pytest.approx(math.hypot(60, 30) / first[4])
+    assert after_zoom[4] == pytest.approx(first[4] * math.exp(240 / 600))
+    page.close("replay-orbit", full=False)
+
+
+NO_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, {
+  apply: (given, canvas, [kind, ...rest]) =>
+    kind.startsWith("webgl") ? null : Reflect.apply(given, canvas, [kind, ...rest]) });"""
+
+
+def test_replay_without_webgl_keeps_the_drawing_in_perspective(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440, address="#t=3.9", script=NO_WEBGL)
+    page.page.select_option("#view", "orbit")
+    page.wait("space.state === 'failed' && shown.view === 'top'")
+    views = page.page.eval_on_selector_all("#view option", "options => options.map((option) => option.value)")
+    assert views == ["top", "follow", "third", "driver"]
+    page.page.select_option("#view", "third")
+    assert colors(page) > 1000
+    page.faults = [fault for fault in page.faults if "WebGL" not in fault]  # three.js reports the missing context
+    page.close("replay-without-webgl", full=False)
+
+
 SCRUB = """async () => {
   const slider = document.getElementById("slider"), times = [];
   for (let step = 0; step < 200; step += 1) {
@@ -388,6 +466,9 @@ def test_live_view_fills_and_becomes_the_replay(browser: Any, eidrive: Eidrive, 
         page.wait("last === 40 && shown.time === 2")
         assert page.page.inner_text("#state") == "live"
         page.check("live-desktop")
+        page.page.select_option("#view", "third")
+        page.wait("space.state === 'ready' && space.actors.size === 4")
+        assert colors(page) > 4000
 
         late = Page(browser, None, 390, site=live.address, dark=True)
         late.wait("last === 40")

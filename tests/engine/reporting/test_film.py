@@ -126,7 +126,7 @@ def test_picture_draws_one_frame_only(street: Play, tmp_path: Path, monkeypatch:
 
 def test_film_without_encoder_states_the_extra(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    with pytest.raises(SettingError, match=r"eidrive-scenario\[film\]"):
+    with pytest.raises(SettingError, match=r"\[film\]"):
         write_mp4(recorded(street(1)[:3], tmp_path), tmp_path / "a.mp4")
 
 

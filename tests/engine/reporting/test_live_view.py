@@ -24,8 +24,10 @@ from eidrive_scenario.recording.run_files import result_of
 from eidrive_scenario.reporting.live import live_view
 from eidrive_scenario.reporting.live.live_view import Pace
 from eidrive_scenario.reporting.replay.frame_data import replay_data
+from eidrive_scenario.reporting.replay.models import ActorModels
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+from eidrive_scenario.simulation.recorded_outcome import recorded_bodies
 
 ONE = "coop/scenario_1"
 SHORT = RunSettings(channel="latency_300ms", time_limit=6.0)
@@ -86,7 +88,8 @@ def join_parts(events: list[Event]) -> dict[str, Any]:
     parts = [data for kind, data in events if kind == "part"]
     times = [time for part in parts for time in part["times"]]
     found: dict[str, Any] = {"times": times, "actors": {}, "poses": {}, "stations": {}, "series": {}, "timeline": {}}
-    for key in ("ticks", "changes", "contacts"):
+    found["models"] = {number: model for part in parts for number, model in part["models"].items()}
+    for key in ("ticks", "changes", "contacts", "light"):
         found[key] = [entry for part in parts for entry in part[key]]
     found["messages"] = [message for part in parts for message in messages_of(part)]
     before = 0
@@ -129,7 +132,7 @@ def columns(data: Mapping[str, Any]) -> dict[str, Any]:
         for name, steps in data["stations"].items()
         for key in next(step for step in steps if step is not None)
     }
-    kept = ("times", "ticks", "actors", "changes", "contacts", "messages", "timeline")
+    kept = ("times", "ticks", "actors", "changes", "contacts", "messages", "timeline", "models", "light")
     return {**{key: data[key] for key in kept}, "poses": poses, "stations": stations,
             "series": dict(leaves(data["series"]))}  # fmt: skip
 
@@ -139,7 +142,9 @@ def test_live_frames_equal_those_of_the_replay(tmp_path: Path) -> None:
         run_and_save(ONE, settings=SHORT, out=tmp_path, observers=[live])
         events = live.events()
     assert sum(kind == "part" for kind, _ in events) >= 120 // 10
-    data = replay_data(read_recording(tmp_path).frames())
+    recording = read_recording(tmp_path)
+    stations = json.loads(recording.metadata["settings"])["stations"]
+    data = replay_data(recording.frames(), models=ActorModels(recorded_bodies(recording), stations))
     assert join_parts(events) == json.loads(json.dumps(columns(data)))
     assert len(data["times"]) == 121
 

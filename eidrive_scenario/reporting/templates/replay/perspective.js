@@ -1,9 +1,11 @@
-/* Views in perspective: behind, above or inside the vehicle of the shown station. The ground is level at height 0. */
+/* Views in perspective: behind, above or inside the vehicle of the shown station. This drawing is shown where a browser
+   has no WebGL, and until three.js is loaded. Its ground is level at height 0. */
 const VIEWS = {
   follow: { back: 14, up: 6, ahead: 16, side: 0, field: 60 },
   third: { back: 22, up: 15, ahead: 9, side: 7, field: 55 },
   driver: { back: -0.2, up: null, ahead: 40, side: 0, field: 75 },
 };
+const needsStation = (view) => view in VIEWS;
 const CLIP = 0.4, FAR_AWAY = 220;
 const SIDES = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]];
 const EDGES = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
@@ -45,10 +47,10 @@ function clipped(points, closed) {
   return kept;
 }
 
-/* Return the corners (8) of a box on the ground: the bottom, then the top. */
-function corners(x, y, length, width, yaw, height) {
+/* Return the corners (8) of a box on the ground of height `base`: the bottom, then the top. */
+function corners(x, y, length, width, yaw, height, base = 0) {
   const cos = Math.cos(yaw), sin = Math.sin(yaw), found = [];
-  for (const z of [0, height]) for (const [u, v] of [[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
+  for (const z of [base, base + height]) for (const [u, v] of [[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
     found.push([x + cos * u * length - sin * v * width, y + sin * u * length + cos * v * width, z]);
   return found;
 }
@@ -60,7 +62,7 @@ function shade(color, share) {
 
 function drawPerspective() {
   const own = shown.station && poseOf(shown.station);
-  if (!own) { drawTop(); return; }
+  if (!own || !needsStation(shown.view)) { drawTop(); return; }
   const area = prepare(), camera = cameraOf(shown.view, own, data.actors[shown.station].size);
   const focal = area.width / 2 / Math.tan(camera.field * Math.PI / 360);
   const flat = ([x, y, z]) => [area.width / 2 + focal * x / z, area.height / 2 - focal * y / z];
@@ -84,7 +86,7 @@ function drawPerspective() {
   }
   const path = shown.layers.plan && isPresent() ? part("path") : [];
   if (path.length > 1 && polygon(ribbon(path, 0.9), true)) {
-    pen.fillStyle = part("braking") ? C.lost : C.link; pen.globalAlpha = 0.55; pen.fill(); pen.globalAlpha = 1;
+    pen.fillStyle = part("braking") ? C.braking : C.plan; pen.globalAlpha = 0.55; pen.fill(); pen.globalAlpha = 1;
   }
   drawBodies(camera, polygon, near);
   for (const { box, color, kind } of perceivedBoxes()) drawWire(box, color, kind, camera, flat);
@@ -147,10 +149,10 @@ function drawBodies(camera, polygon, near) {
   }
 }
 
-function drawWire([x, y, length, width, yaw, height, existence], color, kind, camera, flat) {
+function drawWire([x, y, length, width, yaw, height, existence], color, kind, camera, flat, base = 0) {
   const dx = camera.eye[0] - x, dy = camera.eye[1] - y, cos = Math.cos(yaw), sin = Math.sin(yaw);
   if (Math.abs(cos * dx + sin * dy) < length / 2 && Math.abs(cos * dy - sin * dx) < width / 2) return;  // around the eye
-  const points = corners(x, y, length, width, yaw, height).map((point) => seen(camera, point));
+  const points = corners(x, y, length, width, yaw, height, base).map((point) => seen(camera, point));
   pen.strokeStyle = color; pen.lineWidth = 1 + (typeof existence === "number" ? existence : 1);
   pen.setLineDash(kind === "fused" ? [6, 4] : []);
   for (const [i, k] of EDGES) {
@@ -162,10 +164,10 @@ function drawWire([x, y, length, width, yaw, height, existence], color, kind, ca
   pen.setLineDash([]);
 }
 
-function drawLink(sender, receiver, state, polygon) {
+function drawLink(sender, receiver, state, polygon, baseOf = () => 0) {
   const ends = [sender, receiver].map((name) => [poseOf(name), name]);
   if (!ends.every(([pose]) => pose)) return;
-  const line = ends.map(([pose, name]) => [pose[0], pose[1], Math.max(data.actors[name].size[2], 1.5)]);
+  const line = ends.map(([pose, name]) => [pose[0], pose[1], baseOf(name) + Math.max(data.actors[name].size[2], 1.5)]);
   pen.setLineDash(state === "lost" ? [8, 7] : state === "flying" ? [2, 5] : []);
   pen.strokeStyle = state === "lost" ? C.lost : C.link; pen.lineWidth = 2;
   if (polygon(line, false)) pen.stroke();
@@ -173,11 +175,11 @@ function drawLink(sender, receiver, state, polygon) {
 }
 
 /* Write the names of the actors, near ones first, without those that would cover another one. */
-function drawNames(camera, flat, area) {
+function drawNames(camera, flat, area, baseOf = () => 0) {
   pen.font = "600 12px system-ui, sans-serif"; pen.textBaseline = "bottom";
   const taken = [];
   const points = names.filter((name) => name !== shown.station && shown.layers.truth && poseOf(name))
-    .map((name) => { const pose = poseOf(name); return [name, pose[3], seen(camera, [pose[0], pose[1], data.actors[name].size[2] + 0.4])]; })
+    .map((name) => { const pose = poseOf(name); return [name, pose[3], seen(camera, [pose[0], pose[1], baseOf(name) + data.actors[name].size[2] + 0.4])]; })
     .filter(([, , point]) => point[2] > 2 && point[2] < 120).sort((a, b) => a[2][2] - b[2][2]);
   for (const [name, speed, point] of points) {
     const [x, y] = flat(point), text = labelOf(name, speed), half = pen.measureText(text).width / 2;
@@ -187,5 +189,3 @@ function drawNames(camera, flat, area) {
     writeLabel(text, x - half, y);
   }
 }
-
-function draw() { if (shown.view === "top") drawTop(); else drawPerspective(); }

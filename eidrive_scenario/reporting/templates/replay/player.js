@@ -2,7 +2,8 @@
 /* Layers: key, and its signs of the legend with their texts. */
 const LAYERS = [["truth", ["", "true boxes"]], ["labels", ["", "names and speeds"]], ["own", ["box own", "own detections"]],
                 ["fused", ["box fused", "fused objects, 95 % ellipse"]], ["plan", ["band plan", "planned path"], ["band braking", "if it brakes"]],
-                ["messages", ["line link", "messages"], ["line lost", "lost ones"]], ...(other ? [["other", ["box other", "run B"]]] : [])];
+                ["messages", ["line link", "messages"], ["line lost", "lost ones"]],
+                ["sensors", ["band ranges", "sensor ranges"]], ...(other ? [["other", ["box other", "run B"]]] : [])];
 let playing = false, startedAt = 0, startedFrom = 0, announced = 0;
 
 function showTime(time) {
@@ -128,15 +129,15 @@ function selectView(view) {
   shown.view = view;
   element("view").value = view;
   canvas.setAttribute("aria-label", element("view").selectedOptions[0].textContent + " of the street");
-  for (const id of ["fit", "following"]) element(id).disabled = view !== "top";
+  for (const id of ["fit", "following"]) element(id).disabled = !["top", "orbit"].includes(view);
   draw();
 }
 
 function selectStation(name) {
   shown.station = name;
   element("station").value = name;
-  for (const option of element("view").options) option.disabled = !name && option.value !== "top";
-  if (!name && shown.view !== "top") selectView("top");
+  for (const option of element("view").options) option.disabled = !name && needsStation(option.value);
+  if (!name && needsStation(shown.view)) selectView("top");
   layLayers();
   layTime();
   layMessages();
@@ -170,6 +171,7 @@ function layLayers() {
 /* Add the parts of the page that new frames contain. */
 function grow() {
   const choice = element("station");
+  addCameraViews();
   for (const name of stations.slice(choice.options.length - 1)) choice.add(new Option(name, name), choice.options.length - 1);
   if (!shown.station && stations.length && !hasChosen) selectStation(stations[0]);
   document.querySelector(".stations").hidden = !stations.length;
@@ -250,7 +252,9 @@ const KEYS = {
   d: () => { if (data.decisive) seek(data.decisive.time); },
   f: () => { follow(!topView.follow); draw(); },
 };
-["top", "follow", "third", "driver"].forEach((view, i) => { KEYS[String(i + 1)] = () => { if (shown.station) selectView(view); }; });
+["top", "follow", "third", "driver", "orbit"].forEach((view, i) => {
+  KEYS[String(i + 1)] = () => { if (shown.station || !needsStation(view)) selectView(view); };
+});
 
 addEventListener("keydown", (event) => {
   const tag = event.target.tagName;

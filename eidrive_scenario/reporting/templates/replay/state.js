@@ -5,9 +5,9 @@ const page = JSON.parse(element("data").textContent);
 const table = (entries) => Object.assign(Object.create(null), entries);
 /* Return a run without frames; `addPart` appends frames. */
 const newRun = () => ({ times: [], ticks: [], actors: table(), poses: table(), stations: table(), changes: [], messages: [],
-                        timeline: [], series: table(), contacts: [], contact: null, decisive: null });
+                        timeline: [], series: table(), models: {}, light: [], contacts: [], contact: null, decisive: null });
 /* The run of the page, and the run that is shown over it; null without one. */
-const data = Object.assign(newRun(), { roads: page.roads, colors: page.colors, images: table(page.images) });
+const data = Object.assign(newRun(), { roads: page.roads, street: page.street, colors: page.colors, images: table(page.images) });
 const other = page.other ? newRun() : null;
 const runs = other ? [data, other] : [data];
 const letterOf = (run) => run === other ? "B" : "A";
@@ -49,7 +49,8 @@ function padColumns(columns, count) {
 /* Append a part of the run in the format of the page. */
 function addPart(part, run = data) {
   const before = run.times.length;
-  for (const key of ["times", "ticks", "changes", "contacts"]) for (const entry of part[key]) run[key].push(entry);
+  for (const key of ["times", "ticks", "changes", "contacts", "light"]) for (const entry of part[key]) run[key].push(entry);
+  Object.assign(run.models, part.models);
   const text = (index) => part.texts[index];
   for (const [sent, sender, receiver, arrives, reason, size, content] of part.messages)
     run.messages.push([sent, text(sender), text(receiver), arrives, text(reason), size, text(content)]);
