@@ -11,6 +11,7 @@ import pytest
 from eidrive_reports.demo import demo, main
 from eidrive_reports.paper import SCENARIOS, evaluate_claims, run_settings
 from lxml import html
+from report_table import listed_runs
 from rich.console import Console
 
 
@@ -53,12 +54,12 @@ def test_demo_page_contains_camera_images_of_ego_and_helper(done: tuple[Path, st
 def test_demo_page_ends_in_the_report_with_replays(done: tuple[Path, str, tuple[bool, ...]]) -> None:
     page: Any = html.parse(str(done[0])).getroot()
     assert page.find_class("lead")[1].text_content().startswith("14 runs: ")
-    links = [link.get("href") for link in page.iterfind(".//td/a") if link.text == "replay"]
-    assert len(links) == len(SCENARIOS) * len(run_settings())
-    assert all((done[0].parent / str(link)).is_file() for link in links)
+    runs = listed_runs(done[0])
+    assert len(runs) == len(SCENARIOS) * len(run_settings())
+    assert all(run["replay"] and (done[0].parent / run["replay"]).is_file() for run in runs)
     (matrix,) = page.find_class("matrix")
     assert [str(cell.text_content()) for cell in matrix.iterfind("tbody/tr/th")] == list(SCENARIOS)
-    commands = [set(str(text.text_content()).split()) for text in page.iterfind(".//details/pre")]
+    commands = [set(run["command"].split()) for run in runs]
     assert {"eidrive", "run", "coop/scenario_1", "--detector", "oracle", "--channel", "none", "--seed", "1"} in commands
 
 

@@ -15,7 +15,10 @@ _LEFT_OUT = {"seed", "run", "drawn", "varied", "scenario"} | {
     option.name for option in OPTIONS if option.detail in ("channel_profile", "stations")
 }
 """Settings that differ within a group, and options that the settings of channel and stations contain."""
-_NAMES = ("channel_profile.name", "channel_profile.description")
+_NAMES = ("channel_profile.name", "channel_profile.description", "channel_profile")
+"""Settings that the name of the channel states."""
+_EMPTY = ("", "[]", "{}")
+"""Texts of settings without a value, which headings omit."""
 _OPTIONS = [option.name for option in OPTIONS if option.detail and option.name != "channel"]
 """Options of a run that change many of its settings; the channel is in each heading."""
 _SHOWN = 200
@@ -57,10 +60,12 @@ class RunGroup:
 
     @property
     def distinct(self) -> tuple[ReportedRun, ...]:
-        """Runs for statistics: a run in several folders counts once."""
+        """Runs each once: of a run in several folders the first, or the first with a replay."""
         found: dict[object, ReportedRun] = {}
         for index, run in enumerate(self.runs):
-            found.setdefault((run.settings_sha256, run.trace_hash) if run.settings_sha256 else index, run)
+            key = (run.settings_sha256, run.trace_hash) if run.settings_sha256 else index
+            if key not in found or (run.replay and not found[key].replay):
+                found[key] = run
         return tuple(found.values())
 
 
@@ -86,7 +91,7 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     for run, one in zip(runs, settings, strict=True):
         found.setdefault((run.channel, *(one.get(name, "") for name in differing)), []).append(run)
     chosen = _differing_options([(channel, members[0]) for (channel, *_), members in found.items()])
-    short = len({(key[0], *options.values()) for key, options in zip(found, chosen, strict=True)}) == len(found)
+    short = len({(key[0], *options.items()) for key, options in zip(found, chosen, strict=True)}) == len(found)
     return [
         RunGroup(
             scenario,
@@ -98,7 +103,7 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
                 **{
                     name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
                     for name, value in zip(differing, values, strict=True)
-                    if value and name not in _NAMES
+                    if value not in _EMPTY and name not in _NAMES and name not in options
                 },
             },
             channel_text(*(run.settings for run in members)),
@@ -141,7 +146,7 @@ def _differing_options(first: Sequence[tuple[str, ReportedRun]]) -> list[dict[st
     """Return the options and text axes in which groups differ, by the channel and the first run of each."""
     options = []
     for channel, run in first:
-        given = {name: flow_text(run.settings[name]) for name in _OPTIONS if name in run.settings}
+        given = {name: text for name in _OPTIONS if (text := flow_text(run.settings.get(name, []))) not in _EMPTY}
         swept = {name: value for name, value in run.axes.items() if isinstance(value, str) and value != channel}
         options.append({**given, **swept})
     names = dict.fromkeys(name for one in options for name in one)

@@ -26,6 +26,7 @@ from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.live.live_view import LiveView
+from eidrive_scenario.reporting.run_report.report import write_report
 
 BROWSER = os.environ.get("EIDRIVE_BROWSER")
 SCREENSHOTS = os.environ.get("EIDRIVE_SCREENSHOTS")
@@ -428,6 +429,212 @@ def test_report_links_to_replay_of_a_run(browser: Any, report: Path) -> None:
     page.page.wait_for_function("typeof shown !== 'undefined'")
     assert "/replays/" in page.page.url
     page.close("replay-from-report")
+
+
+LONG = "über_" + 120 * "x"
+ATTACK = "</script><img src=x onerror=alert(1)>"
+
+
+def reported_run(seed: int, *, passed: bool, scenario: str = "street", reason: str = "") -> dict[str, Any]:
+    gap = {"name": "gap", "passed": passed, "value": 0.001 * seed, "limit": 2.0, "unit": "m", "reason": reason}
+    return {
+        "scenario": scenario,
+        "seed": seed,
+        "channel": "ideal" if seed % 2 else "lossy",
+        "passed": passed,
+        "end_reason": "stop trigger",
+        "criteria": [gap, {"name": "speed", "passed": True}],
+        "metrics": {"gap.Ego.center": 0.001 * seed, "gap.Ego.box": 0.0005 * seed},
+        "settings": {"stations": {"Ego": {"detector": "oracle", "range": 50 + seed % 3}}},
+        "settings_sha256": f"{seed:064}",
+        "trace_hash": f"{seed}",
+        "simulated_s": 10.0,
+        "command": f"eidrive run {scenario} --seed {seed}",
+    }
+
+
+class ReportPage(Page):
+    """Page of a report and what its table shows."""
+
+    def seeds(self) -> list[int]:
+        """Return the seeds of the rows that exist."""
+        cells = self.page.locator("#table tbody[class] > tr:first-child > td[data-title=seed]").all_inner_texts()
+        return [int(text.split()[-1]) for text in cells]
+
+    def count(self) -> int:
+        """Return the number of runs that the filters show."""
+        assert self.page.inner_text("#shown").split()[0] == str(self.rows() - 1)
+        return self.rows() - 1
+
+    def rows(self) -> int:
+        return int(self.page.get_attribute("#table", "aria-rowcount"))
+
+
+@pytest.fixture
+def runs_page(browser: Any, tmp_path: Path) -> Iterator[ReportPage]:
+    """Report of 60 runs: seeds 7, 14, … failed."""
+    runs = [
+        reported_run(
+            seed,
+            passed=seed % 7 > 0,
+            scenario="bridge" if seed > 50 else "street",
+            reason=f"Ego came as near as {seed} mm" if seed % 7 == 0 else "",
+        )
+        for seed in range(1, 61)
+    ]
+    page = ReportPage(browser, write_report(runs, tmp_path), 1440)
+    yield page
+    page.close("report-used", full=False)
+
+
+def test_report_shows_failed_runs_first_with_their_reasons(runs_page: ReportPage) -> None:
+    assert runs_page.page.inner_text("h1") == "8 of 60 runs failed: gap (8)"
+    assert runs_page.count() == 60
+    first = runs_page.page.locator("#table tbody[class]").first
+    assert first.locator("td.reason").inner_text() == "gap Ego came as near as 56 mm"
+    assert set(runs_page.seeds()[:8]) == {7, 14, 21, 28, 35, 42, 49, 56}
+
+
+def test_report_is_filtered_by_outcome_scenario_criterion_and_words(runs_page: ReportPage) -> None:
+    page = runs_page.page
+    page.get_by_role("button", name="failed 8").click()
+    assert sorted(runs_page.seeds()) == [7, 14, 21, 28, 35, 42, 49, 56]
+    page.select_option("#scenario", "bridge")
+    assert (runs_page.seeds(), runs_page.count()) == ([56], 1)
+    page.get_by_role("button", name="Show all runs").click()
+    page.select_option("#criterion", "gap")
+    assert runs_page.count() == 8
+    for words, seeds in (
+        ("as NEAR 42", [42]),
+        ("--seed 33", []),
+        ("speed lossy bridge", [56]),
+        ("speed lossy 28", [28]),
+    ):
+        page.fill("#search", words)
+        assert runs_page.seeds() == seeds, words
+    page.select_option("#criterion", "")
+    page.fill("#search", "run street --seed 33")
+    assert runs_page.seeds() == [33]
+    page.fill("#search", "52")
+    assert all(seed == 52 or seed % 3 == 2 for seed in runs_page.seeds())
+    assert runs_page.count() == 21
+    page.fill("#search", "nobody")
+    assert (runs_page.seeds(), runs_page.count()) == ([], 0)
+
+
+def test_report_is_sorted_by_a_click_on_a_title(runs_page: ReportPage) -> None:
+    page = runs_page.page
+    head = page.get_by_role("columnheader", name="seed")
+    head.get_by_role("button").click()
+    assert runs_page.seeds()[:4] == [1, 2, 3, 4]
+    assert head.get_attribute("aria-sort") == "ascending"
+    head.get_by_role("button").press("Enter")
+    assert runs_page.seeds()[:4] == [60, 59, 58, 57]
+    assert head.get_attribute("aria-sort") == "descending"
+    assert page.locator("th[aria-sort]").count() == 1
+    assert head.get_by_role("button").evaluate("node => node === document.activeElement")
+
+
+def test_row_of_report_opens_by_keyboard_with_criteria_metrics_settings_and_command(runs_page: ReportPage) -> None:
+    page = runs_page.page
+    page.fill("#search", "came 14")
+    button = page.locator("#table .open")
+    button.focus()
+    page.keyboard.press("Enter")
+    assert button.get_attribute("aria-expanded") == "true"
+    details = page.locator("#table .details").inner_text()
+    assert "gap failed 0.01 m, limit 2.00 m" in details
+    assert "Ego center 0.014 m · Ego box 0.007 m" in details
+    assert "speed passed" in details
+    assert "eidrive run street --seed 14" in details
+    page.get_by_text("Settings (2)").click()
+    page.locator("#table .details dt", has_text="stations.Ego.range").wait_for()
+    assert "stations.Ego.range\n52" in page.locator("#table .details").inner_text()
+    page.keyboard.press("Shift+Tab")
+    button.press("Space")
+    assert page.locator("#table .details").count() == 0
+
+
+def test_columns_and_filters_of_report_are_in_its_address(browser: Any, runs_page: ReportPage) -> None:
+    page = runs_page.page
+    page.locator("#columns summary").click()
+    page.get_by_role("checkbox", name="gap Ego center [m]").check()
+    page.get_by_role("checkbox", name="reason").uncheck()
+    page.locator("#columns summary").click()
+    page.fill("#search", "lossy")
+    page.get_by_role("columnheader", name="gap Ego center [m]").get_by_role("button").click()
+    titles = page.get_by_role("columnheader").all_inner_texts()
+    assert "gap Ego center [m]" in titles
+    assert "reason" not in titles
+    assert runs_page.seeds()[:3] == [2, 4, 6]
+    address = page.url
+    page.goto("about:blank")
+    page.goto(address)
+    assert page.get_by_role("columnheader").all_inner_texts() == titles
+    assert (runs_page.seeds()[:3], runs_page.count()) == ([2, 4, 6], 30)
+    page.locator(".overview a").first.click()
+    assert runs_page.count() < 30
+    assert "with the settings" in page.inner_text("#shown")
+
+
+@pytest.mark.parametrize("size", WIDTHS)
+def test_report_of_ten_thousand_runs_has_few_rows_and_reaches_all(browser: Any, tmp_path: Path, size: str) -> None:
+    """Heights of rows differ; scrolling to the end and back neither skips nor repeats a run."""
+    runs = [
+        reported_run(seed, passed=seed % 10 > 0, reason=(seed % 9 + 1) * "word " if seed % 10 == 0 else "")
+        for seed in range(1, 10_001)
+    ]
+    page = ReportPage(browser, write_report(runs, tmp_path), WIDTHS[size])
+    assert page.count() == 10_000
+    assert not page.wide()
+    assert page.page.locator("#table tbody").count() < 100
+    page.page.evaluate("sortBy(columns.find(({ title }) => title === 'seed'))")
+    seen: list[int] = []
+    for _ in range(40):
+        seen = sorted({*seen, *page.seeds()})
+        page.page.evaluate("rowBox.scrollTop += 400; showRows()")
+    assert seen == list(range(1, len(seen) + 1))
+    assert len(seen) > 150
+    for _ in range(5):
+        page.page.evaluate("rowBox.scrollTop = 1e9; showRows()")
+    assert page.seeds()[-1] == 10_000
+    page.page.fill("#search", "7777")
+    assert page.seeds() == [7777]
+    assert page.page.locator("#table tbody[class] tr").first.get_attribute("aria-rowindex") == "2"
+    page.close(f"report-of-many-{size}", full=False)
+
+
+@pytest.mark.parametrize("size", WIDTHS)
+def test_unusual_names_in_report_are_texts(browser: Any, tmp_path: Path, size: str) -> None:
+    runs = [
+        reported_run(seed, passed=seed > 2, scenario=name) for seed, name in enumerate((LONG, ATTACK, "__proto__"), 1)
+    ]
+    runs[0]["criteria"][0] |= {"name": LONG, "reason": LONG}
+    runs[1] |= {"metrics": {"constructor": 1.0, ATTACK: 2.0, LONG: 3.0}, "settings": {LONG: LONG, ATTACK: ATTACK}}
+    runs[2] |= {"criteria": [], "passed": False, "metrics": {}, "settings": {}, "command": ""}
+    page = ReportPage(browser, write_report(runs, tmp_path), WIDTHS[size])
+    assert page.count() == 3
+    for button in page.page.locator("#table .open").all():
+        button.click()
+    for summary in page.page.locator("#table .details summary").all():
+        summary.click()
+        summary.locator("+ dl").wait_for()
+    assert ATTACK in page.page.locator("#table").inner_text()
+    assert page.page.locator("img").count() == 0
+    assert not page.wide()
+    page.page.select_option("#scenario", ATTACK)
+    assert page.seeds() == [2]
+    page.close(f"report-names-{size}")
+
+
+def test_report_without_script_lists_failures(browser: Any, tmp_path: Path) -> None:
+    file = write_report([reported_run(seed, passed=seed > 1, reason="too near") for seed in (1, 2)], tmp_path)
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(file.as_uri())
+    assert page.locator("noscript .failures tbody .reason").all_inner_texts() == ["gap too near"]
+    assert not page.locator("#runs").is_visible()
+    context.close()
 
 
 DATA = """(() => {

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from lxml import html
+from report_table import listed_runs
 
 pytestmark = pytest.mark.process
 
@@ -19,8 +20,7 @@ def lead(page: Path) -> str:
 
 
 def replays(page: Path) -> list[Path]:
-    links = html.parse(str(page)).getroot().iterfind(".//a")
-    return [page.parent / str(link.get("href")) for link in links if link.text == "replay"]
+    return [page.parent / run["replay"] for run in listed_runs(page) if run["replay"]]
 
 
 @pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])

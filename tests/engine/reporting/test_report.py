@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 from lxml import html
+from report_table import listed_runs, report_data
 
 from eidrive_scenario import reporting
 from eidrive_scenario.errors import InputError
@@ -42,10 +44,11 @@ def result(seed: int, channel: str, passed: bool, **changes: Any) -> dict[str, A
     return {**run, **changes}
 
 
-def rows(page: Path) -> list[list[str]]:
+def overview(page: Path) -> list[list[str]]:
+    """Return the rows of the table of settings."""
     return [
-        [" ".join(str(cell.xpath("string()")).split()) for cell in row.iterfind("td")]
-        for row in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//tbody/tr")
+        [" ".join(" ".join(map(str, cell.itertext())).split()) for cell in row.iterfind("td")]
+        for row in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//table[@class='overview']/tbody/tr")
     ]
 
 
@@ -53,26 +56,139 @@ def test_report_overview_has_one_row_per_scenario_and_channel(tmp_path: Path) ->
     results = [result(seed, "ideal", True) for seed in (2, 1)] + [result(1, "none", False)]
     page = write_report(results, tmp_path)
     assert page == tmp_path / "report.html"
-    overview = rows(page)[:2]
-    assert overview[0] == ["coop/scenario_1", "ideal", "2/2", "0.34 … 1.00", "2.50 (2.00 … 3.00)"]
-    assert overview[1] == ["coop/scenario_1", "none", "0/1", "0.00 … 0.79", "2.00"]
+    assert overview(page) == [
+        ["coop/scenario_1", "ideal", "2/2", "0.34 … 1.00", "2.50 2.00 … 3.00"],
+        ["coop/scenario_1", "none", "0/1", "0.00 … 0.79", "2.00"],
+    ]
 
 
 def test_report_shows_verdict_and_reason_of_each_run(tmp_path: Path) -> None:
     page = write_report([result(3, "none", False), result(1, "none", True)], tmp_path / "page.html")
     assert page.name == "page.html"
-    passed, failed = rows(page)[1:]
-    assert passed == ["1", "passed", "min_distance", "4.20 m", "3.50 m", "", "stop trigger", "12.50"]
-    assert failed[:2] == ["3", "failed"]
-    assert failed[5] == "Ego and <Incoming> came as near as 0.00 m at 3.10 s"
+    failed, passed = listed_runs(page)
+    assert [failed[title] for title in ("outcome", "seed", "end", "simulated [s]")] == [
+        "failed",
+        3,
+        "stop trigger",
+        12.5,
+    ]
+    reason = "Ego and <Incoming> came as near as 0.00 m at 3.10 s"
+    assert failed["criteria"] == {"min_distance": (False, 0, 3.5, "m", reason)}
+    assert (passed["outcome"], passed["seed"]) == ("passed", 1)
+    assert passed["criteria"] == {"min_distance": (True, 4.2, 3.5, "m", "")}
 
 
-def test_report_counts_run_at_time_limit_as_unfinished(tmp_path: Path) -> None:
-    page = write_report(
-        [result(1, "none", False, end_reason="time limit", criteria=[]), result(2, "none", True)], tmp_path
-    )
-    text = html.fromstring(page.read_text(encoding="utf-8")).findtext(".//p/span[@class='broken']")
-    assert text == "1 did not finish"
+def verdict(name: str, passed: bool, **values: Any) -> dict[str, Any]:
+    return {"name": name, "passed": passed, **values}
+
+
+TIME_LIMIT: dict[str, Any] = {"end_reason": "time limit", "criteria": []}
+
+
+@pytest.mark.parametrize(
+    ("runs", "headline"),
+    [
+        ([result(1, "none", True)], "The run passed"),
+        ([result(1, "none", False)], "The run failed: min_distance"),
+        ([result(seed, "none", True) for seed in range(3)], "All 3 runs passed"),
+        ([result(1, "none", False, **TIME_LIMIT), result(2, "none", True)], "1 of 2 runs did not finish"),
+        (
+            [
+                result(1, "none", False, criteria=[verdict("speed", False), verdict("collision", False)]),
+                result(2, "none", False, criteria=[verdict("speed", True), verdict("collision", False)]),
+                result(3, "none", False, criteria=[]),
+                result(4, "none", False, **TIME_LIMIT),
+                result(5, "none", True),
+            ],
+            "2 of 5 runs failed: collision (2), speed (1); 1 did not finish; 1 was not judged",
+        ),
+        (
+            [result(1, "none", False, criteria=[verdict(name, False) for name in "abcdef"]), result(2, "none", True)],
+            "1 of 2 runs failed: a (1), b (1), c (1), d (1), 2 more criteria",
+        ),
+    ],
+)
+def test_report_is_titled_by_what_failed(runs: list[dict[str, Any]], headline: str, tmp_path: Path) -> None:
+    tree = html.fromstring(write_report(runs, tmp_path).read_text(encoding="utf-8"))
+    assert (tree.findtext(".//h1"), tree.findtext(".//title")) == (headline, headline)
+
+
+def test_report_states_version_date_machine_and_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["/usr/bin/eidrive", "report", "my runs"])
+    monkeypatch.chdir(tmp_path)
+    settings = {"versions": {"eidrive-scenario": "0.1.9"}}
+    page = write_report([result(1, "none", True, settings=settings)], tmp_path)
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    entries = {str(entry.findtext("dt")): str(entry.xpath("string(dd)")) for entry in tree.iterfind(".//dl/div")}
+    assert list(entries) == ["version", "date", "machine", "command"]
+    assert (entries["version"], entries["command"]) == ("eidrive-scenario 0.1.9", "eidrive report 'my runs'")
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d[+-]\d\d:\d\d", entries["date"])
+
+
+def test_report_in_a_repository_states_its_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def git(*arguments: str) -> str:
+        user = ("-c", "user.name=a", "-c", "user.email=a@example.org")
+        return subprocess.run(
+            ["git", *user, *arguments], cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout
+
+    git("init", "--quiet")
+    (tmp_path / "file").write_text("1")
+    git("add", "file")
+    git("commit", "--quiet", "--message", "first")
+    commit = git("rev-parse", "HEAD")[:10]
+    monkeypatch.chdir(tmp_path)
+    page = write_report([result(1, "none", True)], tmp_path / "out")
+    assert f"<dd>{commit}</dd>" in page.read_text(encoding="utf-8")
+    (tmp_path / "file").write_text("2")
+    page = write_report([result(1, "none", True)], tmp_path / "out")
+    assert f"<dd>{commit}-dirty</dd>" in page.read_text(encoding="utf-8")
+
+
+def test_page_without_script_lists_runs_that_did_not_pass(tmp_path: Path) -> None:
+    runs = [result(seed, "none", seed > 2) for seed in range(1, 5)] + [result(9, "none", False, **TIME_LIMIT)]
+    (summary,) = html.fromstring(write_report(runs, tmp_path).read_text(encoding="utf-8")).iterfind(".//noscript")
+    assert str(summary.xpath("string(p)")) == "5 runs: 2 passed, 1 did not finish, 2 failed."
+    rows = [[str(cell.xpath("string()")) for cell in row] for row in summary.iterfind(".//tbody/tr")]
+    reason = "min_distance Ego and <Incoming> came as near as 0.00 m at 3.10 s"
+    assert [row[2:5] for row in rows] == [["1", "failed", reason], ["2", "failed", reason], ["9", "did not finish", ""]]
+
+
+def test_data_of_report_cannot_end_its_element(tmp_path: Path) -> None:
+    attack = "</script><script>alert(1)</script><!--"
+    runs = [result(1, attack, False, scenario=attack, command=attack, end_reason=attack, settings={attack: attack})]
+    page = write_report(runs, tmp_path)
+    assert page.read_text(encoding="utf-8").count("<script") == 2
+    assert listed_runs(page)[0]["settings of the run"] == {attack: attack}
+
+
+def test_settings_metrics_and_texts_of_equal_runs_are_stored_once(tmp_path: Path) -> None:
+    """Runs that differ by their seed add no settings to the data, but the changed one."""
+    settings = {f"setting {number}": f"value {number}" for number in range(100)}
+    runs = [result(seed, "none", True, settings={**settings, "seed": seed}) for seed in range(50)]
+    page = write_report(runs, tmp_path)
+    data = report_data(page)
+    assert data["settings"][0] == [0]
+    assert {len(changes) for changes in data["settings"][1:]} == {3}
+    assert data["texts"].count("value 7") == 1
+    assert listed_runs(page)[49]["settings of the run"] == {**settings, "seed": "49"}
+
+
+def test_numbers_that_json_and_javascript_lack(tmp_path: Path) -> None:
+    """Infinite and undefined numbers are absent, and seeds beyond 2^53 are texts."""
+    metrics = {"far": float("inf"), "undefined": float("nan"), "exact": 0.1234567891, "large": 1e300}
+    runs = [result(10**30, "none", False, metrics=metrics, criteria=[verdict("gap", False, value=float("inf"))])]
+    (run,) = listed_runs(write_report(runs, tmp_path))
+    assert run["metrics"] == {"far": None, "undefined": None, "exact": 0.123457, "large": 1e300}
+    assert run["criteria"]["gap"][1] is None
+    assert run["seed"] == "1" + 30 * "0"
+
+
+def test_criterion_without_reason_has_value_and_limit_as_reason(tmp_path: Path) -> None:
+    """Stores of sweeps have no reasons."""
+    runs = [result(1, "none", False, criteria=[verdict("gap", False, value=0.5, limit=1.0, unit="m")])]
+    (run,) = listed_runs(write_report(runs, tmp_path))
+    assert run["criteria"]["gap"][-1] == "0.50 m, limit 1.00 m"
 
 
 def warnings_of(page: Path) -> list[str]:
@@ -120,7 +236,7 @@ def test_report_of_result_with_invalid_warnings_is_an_error(tmp_path: Path) -> N
 
 def test_report_omits_null_metrics(tmp_path: Path) -> None:
     results = [result(1, "ideal", True, metrics={"ttc": None}), result(2, "ideal", True, metrics={"ttc": 1.5})]
-    assert rows(write_report(results, tmp_path))[0][-1] == "1.50"
+    assert overview(write_report(results, tmp_path))[0][-1] == "1.50"
 
 
 def test_replay_of_run_folder_with_undecodable_name_is_linked(tmp_path: Path) -> None:
@@ -130,7 +246,7 @@ def test_replay_of_run_folder_with_undecodable_name_is_linked(tmp_path: Path) ->
     except OSError:
         pytest.skip("this file system takes no such name")
     page = report_files([tmp_path], tmp_path / "report.html")
-    assert b'href="replays/r%FFn.html"' in page.read_bytes()
+    assert [run["replay"] for run in listed_runs(page)] == ["replays/r%FFn.html"]
     assert (tmp_path / "replays" / f"{folder.name}.html").is_file()
 
 
@@ -151,7 +267,8 @@ def test_report_has_no_external_resources(tmp_path: Path) -> None:
 def test_report_shows_distances_first_and_omits_times(tmp_path: Path) -> None:
     metrics = {"collision.time": 3.0, "collision.count": 1.0, "a": 1.0, "b": 2.0, "min_distance.A.B.box": 0.5, "c": 0.0}
     page = write_report([result(1, "ideal", False, metrics=metrics)], tmp_path)
-    heads = [head.text for head in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//thead/tr/th")][4:8]
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    heads = [head.text for head in tree.iterfind(".//table[@class='overview']/thead/tr/th")][4:8]
     assert heads == ["min_distance A B box [m]", "collision count", "a", "b"]
 
 
@@ -161,10 +278,10 @@ def test_report_of_distribution_shows_varied_parameters(tmp_path: Path) -> None:
         for number, speed in ((11, "30"), (2, "20"))
     ]
     page = write_report(runs, tmp_path)
-    assert [row[:4] for row in rows(page)[1:]] == [["2", "20", "1", "passed"], ["11", "30", "1", "passed"]]
-    headings = [cell.text for cell in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//th")]
-    assert "Speed" in headings
-    assert "End" not in headings
+    assert [(run["run"], run["Speed"]) for run in listed_runs(page)] == [(2, 20), (11, 30)]
+    shown = [column["title"] for column in report_data(page)["columns"] if column["shown"]]
+    assert shown == ["scenario", "run", "Speed"]
+    assert "End" not in listed_runs(page)[0]
 
 
 def test_report_metrics_have_units_of_criteria(tmp_path: Path) -> None:
@@ -182,7 +299,15 @@ def test_style_defines_all_colors_for_both_schemes() -> None:
     named = [re.findall(r"(--\w+): #", colors) for colors in (light, dark)]
     assert named[0] == named[1]
     rest = style.replace(light, "").replace(dark, "")
-    pages = [rest, *(path.read_text(encoding="utf-8") for path in templates.glob("*.jinja"))]
+    pages = [
+        rest,
+        *(path.read_text(encoding="utf-8") for path in (*templates.glob("*.jinja"), *templates.glob("report/*"))),
+    ]
     fixed = re.compile(r"(?:color|background|border)[^;:}]*:[^;}]*#[0-9a-f]{3}")
     assert not [found for page in pages for found in fixed.findall(page)]
-    assert {name for page in pages for name in re.findall(r"var\((--\w+)", page)} <= {*named[0], "--arm", "--share"}
+    assert {name for page in pages for name in re.findall(r"var\((--\w+)", page)} <= {
+        *named[0],
+        "--arm",
+        "--share",
+        "--least",
+    }

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from lxml import html
+from report_table import listed_runs
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
@@ -49,7 +50,7 @@ def test_group_runs_separates_channel_contents_but_not_seeds() -> None:
     [
         ({"parameters": {"OtherY": "6"}}, {"parameters.OtherY": ("5.0", "6")}),
         ({"dt": 0.1}, {"dt": ("0.05", "0.1")}),
-        ({"user_values": {"mood": "3"}}, {"user_values": ("{}", ""), "user_values.mood": ("", "3")}),
+        ({"user_values": {"mood": "3"}}, {"user_values": ("",), "user_values.mood": ("", "3")}),
         ({"weather": "storm"}, {"weather": ("null", "storm")}),
     ],
 )
@@ -151,21 +152,29 @@ def test_runs_of_a_distribution_are_one_group_with_its_varied_parameters() -> No
 
 def test_report_counts_copied_result_once(tmp_path: Path) -> None:
     one = run()
-    page = write_report([one, dict(one), run(seed=2)], tmp_path).read_text(encoding="utf-8")
-    tree = html.fromstring(page)
-    assert tree.xpath("string((//tbody)[1]/tr/td[3])") == "0/2"
-    assert page.count(f"<summary>{one['settings_sha256'][:10]}</summary>") == 2
-    assert "1 of these results is a copy of another" in page
+    page = write_report([one, dict(one), run(seed=2)], tmp_path)
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    assert tree.xpath("string(//table[@class='overview']/tbody/tr/td[3])") == "0/2"
+    assert [listed["seed"] for listed in listed_runs(page)] == [1, 2]
+    assert "1 result is a copy of another" in str(tree.xpath("string()"))
     assert (tree.findtext(".//p[@class='lead']") or "").startswith("2 runs: ")
 
 
+def test_copy_with_a_replay_is_the_one_that_is_listed(tmp_path: Path) -> None:
+    (one,) = reports(run())
+    page = write_report([one, one.model_copy(update={"replay": "replays/one.html"})], tmp_path)
+    assert [listed["replay"] for listed in listed_runs(page)] == ["replays/one.html"]
+
+
 def test_report_contains_channel_settings_and_command_of_each_run(tmp_path: Path) -> None:
-    page = write_report([run(channel=late(0.1)), run(channel=late(0.25))], tmp_path).read_text(encoding="utf-8")
-    text = str(html.fromstring(page).xpath("string()"))
+    page = write_report([run(channel=late(0.1)), run(channel=late(0.25))], tmp_path)
+    text = str(html.fromstring(page.read_text(encoding="utf-8")).xpath("string()"))
     assert "channel.delay.seconds: 0.1" in text
     assert "delay: {kind: constant, seconds: 0.25}" in text
-    assert f"eidrive run {PASSING_BY} --channel '{late(0.25)}' --seed 1 --time-limit 0.1" in text
-    assert '"sha256"' in text
+    last = listed_runs(page)[-1]
+    assert last["command"] == f"eidrive run {PASSING_BY} --channel '{late(0.25)}' --seed 1 --time-limit 0.1"
+    assert last["settings of the run"]["channel_profile.delay.seconds"] == "0.25"
+    assert "sha256" in last["settings of the run"]["files"]
 
 
 def test_report_escapes_names(tmp_path: Path) -> None:

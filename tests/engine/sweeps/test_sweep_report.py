@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from command_fixtures import Eidrive, eidrive
 from lxml import html
+from report_table import listed_runs
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
@@ -90,10 +91,11 @@ def test_sweep_with_out_keeps_recordings_of_failed_runs(eidrive: Eidrive, scenar
     assert tables(page) == [
         [["Speed", "10", "30"], ["none", "100 % 2/2 0.34 … 1.00", "0 % 0/2 0.00 … 0.66"]],
     ]
-    links = [link.get("href") for link in page.iterfind(".//a") if link.text == "replay"]
+    runs = listed_runs(Path(printed.stdout.strip()))
+    links = [run["replay"] for run in runs if run["replay"]]
     assert len(links) == 2
-    assert all((tmp_path / "report" / str(link)).is_file() for link in links)
-    assert f"eidrive run {scenario} --param Speed=30 --seed 2" in page.text_content()
+    assert all((tmp_path / "report" / link).is_file() for link in links)
+    assert f"eidrive run {scenario} --param Speed=30 --seed 2" in [run["command"] for run in runs]
     assert "Ego drove up to 30.00 m/s" in page.text_content(), "the reason of the kept result"
 
 
@@ -226,13 +228,25 @@ def test_shards_with_equal_runs_are_combined(tmp_path: Path) -> None:
     assert sorted(run.seed for run in runs) == [1, 2, 3]
 
 
-def test_large_sweep_lists_failed_runs_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(report, "MOST_LISTED", 3)
-    page = page_of(tmp_path, [row(number, number != 4, Speed=number % 2) for number in range(6)])
-    text = page.text_content()
-    assert "3 runs are counted, but not listed" in text
+def test_sweep_lists_failed_runs_first(tmp_path: Path) -> None:
+    text = page_of(tmp_path, [row(number, number != 4, Speed=number % 2) for number in range(6)]).text_content()
     assert "6 runs: 5 passed, 1 failed." in text
-    assert page.findall(".//td[@class='words failed']")
+    runs = listed_runs(tmp_path / "report" / "report.html")
+    assert [run["seed"] for run in runs] == [4, 0, 1, 2, 3, 5]
+    assert runs[0]["criteria"] == {"gap": (False, 1.5, 1, "", "1.5, limit 1")}
+
+
+def test_overview_of_many_settings_shows_those_with_the_lowest_rates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "MOST_GROUPS", 2)
+    page = page_of(tmp_path, [row(number, number > 2, detector=f"d{number}") for number in range(1, 6)])
+    (table,) = page.iterfind(".//table[@class='overview']")
+    assert [str(line.text_content()) for line in table.iterfind(".//div[@class='setting']")] == [
+        "detector: d1",
+        "detector: d2",
+    ]
+    assert "3 more combinations of settings" in page.text_content()
 
 
 def test_too_large_sweep_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,212 @@
+"""Table of all runs of a report as compact data, from which a script of the page creates the visible rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedCriterion, ReportedRun
+from eidrive_scenario.reporting.run_report.run_groups import RunGroup
+from eidrive_scenario.reporting.run_report.settings_text import flatten
+
+OUTCOMES = ("failed", "did not finish", "not judged", "passed")
+"""Outcomes of a run in the order of the page: what needs attention comes first."""
+_SHOWN_SETTINGS = 4
+"""Maximum number of settings that differ, and of varied values, that have a column from the start."""
+_SHOWN_LETTERS = 24
+"""Maximum number of characters of the values of such a column."""
+_EXACT = 2**53
+"""Integers below are exact in JavaScript; others, such as large seeds, are texts."""
+_UNITS = {"count": "", "at_fault": "", "impact_speed": "m/s", "time": "s", "margin": "", "changed": "s"}
+"""Units that differ from the unit of the criterion, by the last part of the name of the metric."""
+
+
+def outcome(run: ReportedRun) -> str:
+    """Return the outcome of a run, one of OUTCOMES."""
+    if run.passed:
+        return "passed"
+    if not run.finished:
+        return "did not finish"
+    return "failed" if run.is_judged else "not judged"
+
+
+def failure_reason(criterion: ReportedCriterion) -> str:
+    """Return why a criterion failed: its reason, else its value and limit, as stores of sweeps have no reasons."""
+    if criterion.reason or criterion.value is None:
+        return criterion.reason
+    limit = f", limit {number_text(criterion.limit, criterion.unit)}" if criterion.limit is not None else ""
+    return f"{number_text(criterion.value, criterion.unit)}{limit}"
+
+
+def number_text(value: float, unit: str) -> str:
+    """Return a measured value with two decimals, or a count without decimals."""
+    return f"{value:.2f} {unit}" if unit else f"{value:g}"
+
+
+def metric_titles(runs: Sequence[ReportedRun]) -> dict[str, str]:
+    """Return the names of all metrics with their units, which are usually those of their criteria."""
+    units = {criterion.name: criterion.unit for run in reversed(runs) for criterion in run.criteria}
+    titles = {}
+    for name in dict.fromkeys(name for run in runs for name in run.metrics):
+        last = name.split(".")[-1]
+        unit = _UNITS[last] if last in _UNITS else units.get(name.split(".")[0], "")
+        titles[name] = f"{name.replace('.', ' ')} [{unit}]" if unit else name.replace(".", " ")
+    return titles
+
+
+def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
+    """Return the runs of groups as an object of JSON, each run once, those that did not pass first.
+
+    Each entry is a list over the runs, or over the groups. Texts are numbers in the list `texts`, which contains each
+    once. Metrics and settings of runs refer to sets of names, which most runs of a scenario share; of settings, only
+    those that differ from the first run with the same set follow.
+    """
+    entries = [(run, number) for number, group in enumerate(groups) for run in group.distinct]
+    entries.sort(key=lambda entry: OUTCOMES.index(outcome(entry[0])))
+    runs = [run for run, _ in entries]
+    numbers = [number for _, number in entries]
+    texts = _Numbered()
+    titles = metric_titles(runs)
+    kinds, metric_sets, setting_sets = _Numbered(), _Numbered(), _Numbered()
+    base: list[list[str]] = []
+    metrics: list[list[Any]] = []
+    settings: list[list[int]] = []
+    for run in runs:
+        metrics.append([metric_sets[tuple(titles[name] for name in run.metrics)], *map(_rounded, run.metrics.values())])
+        flat = flatten(run.settings)
+        number = setting_sets[tuple(flat)]
+        if number == len(base):
+            base.append(list(flat.values()))
+        changes = [(at, value) for at, value in enumerate(flat.values()) if value != base[number][at]]
+        settings.append([number, *(part for at, value in changes for part in (at, texts[value]))])
+    return {
+        "columns": _columns(groups, runs, texts),
+        "facts": [
+            _column("end", [run.end_reason for run in runs], texts, is_shown=False),
+            _column("simulated [s]", [run.simulated_s for run in runs], texts),
+            _column("settings", [run.settings_sha256[:10] for run in runs], texts, is_shown=False),
+        ],
+        "outcomes": [OUTCOMES.index(outcome(run)) for run in runs],
+        "groups": numbers,
+        "groupNames": [" · ".join([group.scenario, group.channel, *_settings_of(group)]) for group in groups],
+        "criteria": [[_verdict(criterion, kinds, texts) for criterion in run.criteria] for run in runs],
+        "kinds": [[name, _rounded(limit), unit] for name, limit, unit in kinds.values],
+        "metrics": metrics,
+        "metricSets": metric_sets.values,
+        "settings": settings,
+        "settingSets": [
+            {"paths": paths, "values": [texts[value] for value in values]}
+            for paths, values in zip(setting_sets.values, base, strict=True)
+        ],
+        "warnings": [[texts[warning] for warning in run.warnings] for run in runs],
+        "commands": [texts[run.command] for run in runs],
+        "replays": [texts[run.replay] for run in runs],
+        "texts": texts.values,
+    }
+
+
+class _Numbered:
+    """Values that get a number each, in the order of their first use."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[Any, int] = {}
+
+    def __getitem__(self, value: Any) -> int:
+        return self._numbers.setdefault(value, len(self._numbers))
+
+    @property
+    def values(self) -> list[Any]:
+        return list(self._numbers)
+
+
+def _verdict(criterion: ReportedCriterion, kinds: _Numbered, texts: _Numbered) -> list[Any]:
+    """Return kind (name, limit, unit), whether the criterion passed, its value, and its reason."""
+    reason = criterion.reason if criterion.passed else failure_reason(criterion)
+    kind = kinds[criterion.name, criterion.limit, criterion.unit]
+    return [kind, int(criterion.passed), _rounded(criterion.value), texts[reason]]
+
+
+def _columns(groups: Sequence[RunGroup], runs: Sequence[ReportedRun], texts: _Numbered) -> list[dict[str, Any]]:
+    """Return the columns that identify a run: scenario, channel, what differs between and within groups, seed.
+
+    Those of groups have a value per group. The page makes columns of other settings from the settings of the runs.
+    """
+    names = list(dict.fromkeys(name for group in groups for name in group.differing))
+    differing = names if len(names) <= _SHOWN_SETTINGS else [name for name in names if "." not in name]
+    varied = list(dict.fromkeys(name for group in groups for name in group.varied if name not in differing))
+    of_groups: dict[str, list[Any]] = {name: [group.differing.get(name) for group in groups] for name in differing}
+    of_runs: dict[str, list[Any]] = {name: [run.value_of(name) for run in runs] for name in varied}
+    short = [name for name, values in (of_groups | of_runs).items() if max(map(_length, values)) <= _SHOWN_LETTERS]
+    shown = short[:_SHOWN_SETTINGS]
+    by_group = [
+        _column("scenario", [group.scenario for group in groups], texts, is_shown=True),
+        _column("channel", [group.channel for group in groups], texts),
+        *(_column(name, values, texts, is_shown=name in shown) for name, values in of_groups.items()),
+    ]
+    return [
+        *({**column, "grouped": True} for column in by_group),
+        _column("run", [run.run for run in runs], texts),
+        *(_column(name, values, texts, is_shown=name in shown) for name, values in of_runs.items()),
+        _column("seed", [run.seed for run in runs], texts),
+    ]
+
+
+def _length(value: object) -> int:
+    return len(f"{value:.6g}") if isinstance(value, float) else len(str(value))
+
+
+def _column(
+    title: str, values: Sequence[int | float | str | None], texts: _Numbered, *, is_shown: bool | None = None
+) -> dict[str, Any]:
+    """Return a column, shown by default if its values differ."""
+    is_number = all(value is None or _is_number(value) for value in values)
+    shown = len(set(values)) > 1 if is_shown is None else is_shown
+    listed = [_rounded(value) if is_number else texts["" if value is None else str(value)] for value in values]
+    return {"title": title, "number": is_number, "shown": shown, "values": listed}
+
+
+def _rounded(value: Any) -> int | float | None:
+    """Return a number with six significant digits; None without a finite one, which JSON does not have."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return int(value) if _is_number(value) and value == int(value) else float(f"{value:.6g}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _EXACT
+
+
+def _settings_of(group: RunGroup) -> list[str]:
+    return [f"{name}: {value}" for name, value in group.differing.items()]
+
+
+def common_failures(runs: Sequence[ReportedRun]) -> Mapping[str, int]:
+    """Return the number of failed runs of each criterion that failed, the most frequent ones first."""
+    counts: dict[str, int] = {}
+    for run in runs:
+        if outcome(run) == "failed":
+            for name in dict.fromkeys(criterion.name for criterion in run.criteria if not criterion.passed):
+                counts[name] = counts.get(name, 0) + 1
+    return dict(sorted(counts.items(), key=lambda entry: -entry[1]))
+
+
+_NAMED = 4
+"""Maximum number of criteria that a headline names."""
+
+
+def headline(runs: Sequence[ReportedRun]) -> str:
+    """Return what failed in one line, such as `3 of 40 runs failed: collision (2), min_distance (1)`."""
+    counts = {name: sum(outcome(run) == name for run in runs) for name in OUTCOMES}
+    several = len(runs) > 1
+    if counts["passed"] == len(runs):
+        return f"All {len(runs)} runs passed" if several else "The run passed"
+    failures = common_failures(runs)
+    names = [f"{name} ({count})" if several else name for name, count in failures.items()][:_NAMED]
+    names += [f"{len(failures) - _NAMED} more criteria"] * (len(failures) > _NAMED)
+    verbs = {"failed": f"failed: {', '.join(names)}" if names else "failed", "did not finish": "did not finish"}
+    verbs["not judged"] = "were not judged" if counts["not judged"] > 1 else "was not judged"
+    parts = [f"{counts[name]} {verb}" if several else verb for name, verb in verbs.items() if counts[name]]
+    if not several:
+        return f"The run {parts[0]}"
+    return "; ".join([parts[0].replace(" ", f" of {len(runs)} runs ", 1), *parts[1:]])
