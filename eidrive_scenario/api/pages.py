@@ -4,10 +4,11 @@ All names may change in a minor version.
 """
 
 from eidrive_scenario.reporting.drawing.canvas import Canvas as Canvas
-from eidrive_scenario.reporting.drawing.canvas import Image as Image
 from eidrive_scenario.reporting.drawing.charts import ChartSeries as ChartSeries
 from eidrive_scenario.reporting.drawing.charts import heat_cells as heat_cells
 from eidrive_scenario.reporting.drawing.charts import line_chart as line_chart
+from eidrive_scenario.reporting.drawing.image_canvas import Image as Image
+from eidrive_scenario.reporting.drawing.image_canvas import ImageCanvas as ImageCanvas
 from eidrive_scenario.reporting.drawing.road_drawing import house_outline as house_outline
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing as road_drawing
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing as RoadDrawing

@@ -31,6 +31,7 @@ FUNCTIONS = {
     "check": "check:check",
     "list": "show:list_names",
     "tree": "show:tree",
+    "draw": "show:draw",
     "view": "show:view",
     "judge": "recordings:judge",
     "export": "recordings:export",

@@ -1,4 +1,4 @@
-"""Commands that display data: `list`, `tree`, `view`, `report`."""
+"""Commands that display data: `list`, `tree`, `draw`, `view`, `report`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,11 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 
 if TYPE_CHECKING:
     from eidrive_scenario.recording.recording import Recording
+
+
+PictureSize = Annotated[
+    str | None, typer.Option(metavar="WxH", help="Width and height of the picture in mm.", show_default="160x90")
+]
 
 
 class Names(StrEnum):
@@ -122,6 +127,41 @@ def tree(
         console().print(storyboard_tree(storyboard))
 
 
+def draw(
+    file: Annotated[str, typer.Argument(help="An .xosc or .xodr file, or a library name.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="PICTURE", help="A .svg, .pdf or .png file.", show_default="NAME.svg"),
+    ] = None,
+    size: PictureSize = None,
+    station: Annotated[
+        str | None, typer.Option(help="Station whose view is shaded.", show_default="the first that drives")
+    ] = None,
+) -> None:
+    """Draw a scenario before its run, or roads, from above.
+
+    Example: eidrive draw coop/scenario_1 --out scenario.svg
+
+    The picture has ids of roads and lanes, marks of s, starts, paths, trigger zones and the ranges of sensors.
+    """
+    from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition, resolve_scenario
+    from eidrive_scenario.reporting.drawing.scenario_figure import roads_figure, scenario_figure
+    from eidrive_scenario.reporting.drawing.vector_canvas import check_format, parse_size, write_figure
+
+    path = Path(file)
+    is_roads = path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads"
+    if not is_roads:
+        path = resolve_scenario(file)
+    elif station is not None:
+        raise SettingError(Diagnostic("--station: a road file has no stations", "give a scenario"))
+    picture = out or Path(f"{path.stem}.svg")
+    check_format("--out", picture)
+    check_output_paths({"--out": picture}, [path])
+    millimeters = parse_size(size)
+    write_figure(roads_figure(path, millimeters) if is_roads else scenario_figure(path, millimeters, station), picture)
+    echo(str(picture))
+
+
 def view(
     recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
     other: Annotated[
@@ -132,9 +172,12 @@ def view(
     ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
     png: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture of one instant.")] = None,
+    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it as a vector figure.")] = None,
+    pdf: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it as a vector figure.")] = None,
     at: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Instant of --png.", show_default="the decisive one")
+        float | None, typer.Option(metavar="SECONDS", help="Instant of the picture.", show_default="the decisive one")
     ] = None,
+    size: PictureSize = None,
     gif: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an animated picture.")] = None,
     mp4: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a film.")] = None,
     station: Annotated[
@@ -150,28 +193,38 @@ def view(
 
     path = recording_in(recording)
     complete = not is_partial(path)
-    has_pictures = any(path is not None for path in (png, gif, mp4))
+    stills = {"--png": png, "--svg": svg, "--pdf": pdf}
+    has_stills = any(path is not None for path in stills.values())
+    has_pictures = has_stills or gif is not None or mp4 is not None
     page = out or (None if has_pictures and not browser else path.with_name(TWO_RUNS if other else f"{path.stem}.html"))
-    if at is not None and png is None:
-        raise SettingError(Diagnostic("--at without --png has no effect", "add --png FILE"))
+    for option, value in (("--at", at), ("--size", size)):
+        if value is not None and not has_stills:
+            message = f"{option} without a picture has no effect"
+            raise SettingError(Diagnostic(message, "add --png, --svg or --pdf FILE"))
     if station is not None and not has_pictures:
-        raise SettingError(Diagnostic("--station has no effect on the page", "add --png, --gif or --mp4"))
+        raise SettingError(Diagnostic("--station has no effect on the page", "add --png, --svg, --pdf, --gif or --mp4"))
     if other is not None and has_pictures:
         raise SettingError(Diagnostic("pictures and films show one recording (got two)", "omit the second one"))
     second = None if other is None else recording_in(other)
-    check_output_paths({"--out": page, "--png": png, "--gif": gif, "--mp4": mp4}, [path, *([second] if second else [])])
+    outputs = {"--out": page, **stills, "--gif": gif, "--mp4": mp4}
+    check_output_paths(outputs, [path, *([second] if second else [])])
     opened = open_recording(path)
     if has_pictures:
         from eidrive_scenario.recording.run_files import RESULT, result_of
+        from eidrive_scenario.reporting.drawing.vector_canvas import check_format, parse_size, write_figure
         from eidrive_scenario.reporting.replay import film
         from eidrive_scenario.reporting.run_report.reported_runs import parse_run
 
+        for option, file in stills.items():
+            check_format(option, file, (option.replace("--", "."),))
         result = result_of(path)
         outcome = parse_run(result, path.with_name(RESULT)) if result is not None else None
         recorded = film.RecordedStation(opened, station, result=outcome)
         damage = recorded.damage
-        if png is not None:
-            film.write_png(recorded, png, at)
+        if has_stills:
+            figure = recorded.figure(at, parse_size(size))
+            for file in filter(None, stills.values()):
+                write_figure(figure, file)
         if gif is not None:
             film.write_gif(recorded, gif)
         if mp4 is not None:
@@ -182,7 +235,7 @@ def view(
         echo(f"warning: {path} is damaged: {line}", color="yellow", err=True)
     for partial in filter(is_partial, [path, *([second] if second else [])]):
         echo(f"warning: {partial}: the run did not end, the recording is incomplete", color="yellow", err=True)
-    for written in (png, gif, mp4, page):
+    for written in (*stills.values(), gif, mp4, page):
         if written is not None:
             echo(str(written))
     if browser and page is not None:

@@ -54,6 +54,17 @@ class LinesOfSight:
         hidden = _hidden(np.array([x, y, top]), boxes[targets], others, _exempt(targets, boxes, numbers, others))
         return {row for row, covered in zip(targets, hidden, strict=True) if not covered}
 
+    def hidden_points(self, view: WorldView, observer: int, origin: Array, points: Array) -> Bools:
+        """Return whether each point (M, 3) is hidden from a sensor at `origin` (3,) on the actor in row `observer`."""
+        x, y, *_ = view.boxes[observer].tolist()
+        reach = float(np.hypot(*(points[:, :2] - (x, y)).T).max(initial=0.0))
+        solid = [row for row, name in enumerate(view.names) if row != observer and name not in view.unseen]
+        hidden: Bools = np.zeros(len(points), dtype=bool)
+        for blocker in np.concatenate([view.boxes[solid], self._near(x, y, reach)]):
+            enter, leave = crossing(origin[None, None], points[None], blocker[None])
+            hidden |= ((enter < leave) & (leave > 0.0) & (enter < 1.0))[0]
+        return hidden
+
     def _near(self, x: float, y: float, reach: float) -> Array:
         """Return the boxes of the scenery within reach that do not contain the observer."""
         away = np.hypot(self._scenery[:, 0] - x, self._scenery[:, 1] - y)

@@ -18,7 +18,7 @@ import typer
 
 from eidrive_scenario.api.common import InputError, write_atomically
 from eidrive_scenario.api.experiments import LibraryScenario, describe_scenarios
-from eidrive_scenario.api.pages import Canvas, Image, RoadDrawing, Window, house_outline, road_drawing
+from eidrive_scenario.api.pages import Image, ImageCanvas, RoadDrawing, Window, house_outline, road_drawing
 from eidrive_scenario.api.run import Simulation, buildings
 
 EGO, SENDER, OTHER, WALKER, TRAFFIC = "#2563eb", "#ea580c", "#334155", "#dc2626", "#94a3b8"
@@ -59,7 +59,7 @@ def run_picture(
     size    width and height [pixels]
     """
     window = _window(run, colors, size[0] / size[1])
-    canvas = Canvas(window, size)
+    canvas = ImageCanvas(window, size)
     canvas.roads(roads)
     for name, color in colors.items():
         path = run.paths.get(name, ())
@@ -75,11 +75,7 @@ def _window(run: RunPaths, colors: Mapping[str, str], ratio: float) -> Window:
     """Return the section with the actors and the path of the last one, in the ratio of width to height."""
     points = [box[:2] for name, box in run.boxes.items() if name in colors]
     points += run.paths.get(next(reversed(list(colors)), ""), [])
-    found = Window.enclosing(points or [(0.0, 0.0)], MARGIN)
-    width, height = found.right - found.left, found.top - found.bottom
-    shown = max(width, ratio * height, LEAST_WIDTH)
-    wider, higher = (shown - width) / 2.0, (shown / ratio - height) / 2.0
-    return Window(found.left - wider, found.right + wider, found.bottom - higher, found.top + higher)
+    return Window.enclosing(points or [(0.0, 0.0)], MARGIN).widened(ratio, LEAST_WIDTH)
 
 
 PAGE = "docs/library.md"

@@ -1,15 +1,16 @@
-"""Top view of one instant as an image: ground truth, and the information of one station."""
+"""Top view of one instant: ground truth, and the information of one station, as an image or on any canvas."""
 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import footprint
-from eidrive_scenario.reporting.drawing.canvas import Canvas, Image, ellipse_of_95_percent
+from eidrive_scenario.reporting.drawing.canvas import Canvas, ellipse_of_95_percent
+from eidrive_scenario.reporting.drawing.image_canvas import Image, ImageCanvas
+from eidrive_scenario.reporting.drawing.labels import Rectangle, wrapped, write_labels
 from eidrive_scenario.reporting.drawing.top_view import (
     FUSED,
     LINK,
@@ -27,12 +28,6 @@ EXTENT = 90.0
 """Default width of the section that is shown [m]."""
 STROKE = 1.0
 """Length of the strokes of the line of a lost message [m]."""
-GAP = 6
-"""Distance of a label from its actor [pixels]."""
-MOST_PLACED = 100
-"""Maximum number of actors in a picture whose labels avoid each other."""
-Rectangle: TypeAlias = tuple[int, int, int, int]
-"""Left, top, right and bottom [pixels]."""
 
 
 def snapshot_picture(
@@ -45,34 +40,42 @@ def snapshot_picture(
 ) -> Image:
     """Return the picture (height, width, 3) in the channel order of OpenCV.
 
-    Boxes are blue if the station detects them itself, orange if it received them, violet after fusion. The planned path
-    and delivered messages are green; a path with demanded braking and lost messages are red.
-
     center  of the section [m]
     size    width and height [pixels]
     extent  width of the section [m]
     """
-    half, high = extent / 2.0, extent * size[1] / size[0] / 2.0
-    canvas = Canvas(Window(center[0] - half, center[0] + half, center[1] - high, center[1] + high), size)
+    canvas = ImageCanvas(Window.around(center, extent, size[0] / size[1]), size)
+    draw_snapshot(canvas, snapshot, roads)
+    return canvas.image
+
+
+def draw_snapshot(canvas: Canvas, snapshot: StationSnapshot, roads: RoadDrawing) -> None:
+    """Draw a snapshot on its roads.
+
+    Boxes are blue if the station detects them itself, orange if it received them, violet after fusion. The planned path
+    and delivered messages are green; a path with demanded braking and lost messages are red.
+    """
     canvas.roads(roads)
     _draw_plan(canvas, snapshot)
     _draw_links(canvas, snapshot)
     for received in snapshot.received:
-        _draw_boxes(canvas, received.message.detections, RECEIVED, 0.5)
-    _draw_boxes(canvas, snapshot.own, OWN, 0.25)
-    _draw_boxes(canvas, snapshot.fused, FUSED, 0.0)
+        _draw_boxes(canvas, received.message.detections, RECEIVED, 0.5, "received from others")
+    _draw_boxes(canvas, snapshot.own, OWN, 0.25, f"detected by {snapshot.station}")
+    _draw_boxes(canvas, snapshot.fused, FUSED, 0.0, "after fusion")
     view = snapshot.view
     for name, box in zip(view.names, view.boxes.tolist(), strict=True):
-        if math.isfinite(sum(box)):
-            canvas.body(box, STATION if name == snapshot.station else WHITE, 1.0 if name == snapshot.station else 0.35)
+        if math.isfinite(sum(box)) and canvas.shows(footprint(np.array(box))):
+            is_station = name == snapshot.station
+            color, opacity = (STATION, 1.0) if is_station else (WHITE, 0.35)
+            canvas.body(box, color, opacity, legend=name if is_station else "other actors")
     _write_labels(canvas, snapshot)
-    return canvas.image
 
 
 def _draw_plan(canvas: Canvas, snapshot: StationSnapshot) -> None:
     plan = snapshot.step.plan if snapshot.step else None
     if plan is not None and len(plan.points) > 1 and np.isfinite(plan.points).all():
-        canvas.line(plan.points, LINK if plan.braking is None else LOST, 0.4)
+        color, legend = (LINK, "planned path") if plan.braking is None else (LOST, "planned path, braking")
+        canvas.line(plan.points, color, 0.4, legend=legend)
 
 
 def _draw_links(canvas: Canvas, snapshot: StationSnapshot) -> None:
@@ -83,63 +86,48 @@ def _draw_links(canvas: Canvas, snapshot: StationSnapshot) -> None:
             if not np.isfinite(ends).all():
                 continue
             if event.outcome == "lost":
-                canvas.dashes(ends[0], ends[1], LOST, 0.2, STROKE)
+                canvas.line(ends, LOST, 0.2, stroke=STROKE, legend="message lost")
             else:
-                canvas.line(ends, LINK, 0.2)
+                canvas.line(ends, LINK, 0.2, legend="message delivered")
 
 
-def _draw_boxes(canvas: Canvas, detections: Detections, color: str, width: float) -> None:
+def _draw_boxes(canvas: Canvas, detections: Detections, color: str, width: float, legend: str) -> None:
     for box, covariance in zip(detections.boxes, detections.covariance, strict=True):
         if not np.isfinite(box).all():
             continue
         corners = footprint(box)
-        canvas.fill(corners, color, 0.2)
+        canvas.fill(corners, color, 0.2, legend=legend)
         canvas.line(corners, color, width, closed=True)
         axes = ellipse_of_95_percent(covariance) if color == FUSED else None
         if axes is not None:
-            canvas.ellipse(box, axes[:2], axes[2], color)
+            canvas.ellipse(box, axes[:2], axes[2], color, legend="95 % of the position")
 
 
 def _write_labels(canvas: Canvas, snapshot: StationSnapshot) -> None:
-    """Write the title, and a label beside each actor where it covers least of other actors and labels."""
+    """Write the title, and labels beside the actors: of the station, of senders, and of others from near to far."""
     plan = snapshot.step.plan if snapshot.step else None
-    lines = [(f"t = {snapshot.time:.2f} s", 32, 0.8)]
+    margin = 1.5 * canvas.label_size("t")[1]
+    lines = [(f"t = {snapshot.time:.2f} s", 1.6)]
     if plan is not None:
-        lines.append((f"{snapshot.station}: {plan.reason}", 60, 0.6))
-    labels = []
-    for text, base, size in lines:
+        reason = wrapped(canvas, f"{snapshot.station}: {plan.reason}", canvas.size[0] - 2.0 * margin, 1.2)
+        lines += [(line, 1.2) for line in reason]
+    base, titles = margin, list[Rectangle]()
+    for text, size in lines:
         width, height = canvas.label_size(text, size)
-        labels.append((16, base - height, 16 + width, base))
-        canvas.label(text, 16, base, size, STATION)
+        base += height
+        canvas.label(text, margin, base, size, STATION)
+        titles.append((margin, base - height, margin + width, base))
+        base += 0.7 * height
     view = snapshot.view
-    outlines: dict[str, Rectangle] = {}
-    for name, box in zip(view.names, view.boxes, strict=True):
-        if np.isfinite(box).all():
-            corners = footprint(box)
-            left, bottom = canvas.pixel(corners.min(axis=0))
-            right, top = canvas.pixel(corners.max(axis=0))
-            if _overlap((left, top, right + 1, bottom + 1), (0, 0, *canvas.image.shape[1::-1])):
-                outlines[name] = left, top, right, bottom
-    for name, outline in outlines.items():
-        speed = float(view.speed[view.row(name)])
-        text = f"{name}  {3.6 * speed:.0f} km/h" if abs(speed) > 0.05 else name
-        others = [*(other for named, other in outlines.items() if named != name), *labels]
-        place = _place(canvas.label_size(text), outline, others if len(outlines) <= MOST_PLACED else [])
-        labels.append(place)
-        canvas.label(text, place[0], place[3])
-
-
-def _place(size: tuple[int, int], outline: Rectangle, others: list[Rectangle]) -> Rectangle:
-    """Return the place of a label of this size right, left, above or below an outline with the least overlap."""
-    (width, height), (left, top, right, bottom) = size, outline
-    middle, base = (left + right - width) // 2, (top + bottom + height) // 2
-    starts = [(right + GAP, base), (left - GAP - width, base), (middle, top - GAP), (middle, bottom + GAP + height)]
-    places = [(x, y - height, x + width, y) for x, y in starts]
-    return min(places, key=lambda place: sum(_overlap(place, other) for other in others))
-
-
-def _overlap(first: Rectangle, second: Rectangle) -> int:
-    """Return the common area of two rectangles."""
-    width = min(first[2], second[2]) - max(first[0], second[0])
-    height = min(first[3], second[3]) - max(first[1], second[1])
-    return max(width, 0) * max(height, 0)
+    senders = {event.sender for event in snapshot.links}
+    middle = np.array([canvas.window.left + canvas.window.right, canvas.window.bottom + canvas.window.top]) / 2.0
+    away = np.hypot(*(view.boxes[:, :2] - middle).T)
+    order = sorted(
+        np.flatnonzero(np.isfinite(view.boxes).all(axis=1)).tolist(),
+        key=lambda row: (view.names[row] != snapshot.station, view.names[row] not in senders, away[row]),
+    )
+    texts = []
+    for row in order:
+        speed = float(view.speed[row])
+        texts.append(f"{view.names[row]}  {3.6 * speed:.0f} km/h" if abs(speed) > 0.05 else view.names[row])
+    write_labels(canvas, texts, [footprint(view.boxes[row]) for row in order], titles)

@@ -1,4 +1,4 @@
-"""Pictures and films of a recorded run: the top view that follows a station, as PNG, GIF or MP4."""
+"""Pictures and films of a recorded run: the top view that follows a station, as PNG, SVG, PDF, GIF or MP4."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from subprocess import PIPE, Popen
 from tempfile import TemporaryDirectory
 
-import cv2
+from matplotlib.figure import Figure
 
 from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
@@ -18,9 +18,10 @@ from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording
-from eidrive_scenario.reporting.drawing.canvas import Image
-from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
-from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.reporting.drawing.image_canvas import Image
+from eidrive_scenario.reporting.drawing.snapshot_picture import EXTENT, draw_snapshot, snapshot_picture
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
+from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, scene_figure
 from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
 from eidrive_scenario.reporting.replay.page import decisive_instant, readable_roads, run_settings, station_settings
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
@@ -94,17 +95,33 @@ class RecordedStation:
                 continue
             yield snapshot
 
-    def picture(self, time: float) -> Image:
-        """Return the picture of the last frame up to a time [s]. Raise InputError if it cannot be drawn."""
+    def figure(self, time: float | None = None, size: Size = DEFAULT_SIZE) -> Figure:
+        """Return the picture of the last frame up to a time [s], by default up to the decisive instant.
+
+        size  width and height [mm]
+
+        Raise SettingError for a time out of the run, InputError if the frame cannot be drawn.
+        """
+        first, last = self.times[0], self.times[-1]
+        wanted = self.decisive if time is None else time
+        if not first - TIME_TOLERANCE <= wanted <= last + TIME_TOLERANCE:
+            raise SettingError(Diagnostic(f"--at {wanted:g} s is not in the run", f"give {first:g} to {last:g} s"))
         newest = None
         for snapshot, center in self._centered():
-            if snapshot.time > time + TIME_TOLERANCE:
+            if snapshot.time > wanted + TIME_TOLERANCE:
                 break
             newest = snapshot, center
-        picture = None if newest is None else self._draw(*newest, FILM_SIZE)
-        if picture is None:
-            raise InputError(Diagnostic("this frame of the recording cannot be drawn", "give another --at"))
-        return picture
+        try:
+            if newest is not None:
+                snapshot, center = newest
+                return scene_figure(
+                    lambda canvas: draw_snapshot(canvas, snapshot, self.roads),
+                    lambda ratio: Window.around(center, EXTENT, ratio),
+                    size,
+                )
+        except UNDRAWABLE:
+            pass
+        raise InputError(Diagnostic("this frame of the recording cannot be drawn", "give another --at"))
 
     def pictures(self, size: tuple[int, int], rate: float) -> Iterator[Image]:
         """Yield the pictures of `rate` instants per second. Raise InputError for more than MOST_PICTURES."""
@@ -146,20 +163,6 @@ def _add_entries(actors: dict[str, tuple[float, float]], view: WorldView) -> Non
         if name not in actors:
             x, y = view.centers[view.row(name), :2].tolist()
             actors[name] = (x, y) if math.isfinite(x + y) else (0.0, 0.0)
-
-
-def write_png(station: RecordedStation, path: Path, time: float | None = None) -> None:
-    """Write the picture of an instant [s], by default the decisive one.
-
-    Raise SettingError for a time out of the run, or if the file cannot be written.
-    """
-    first, last = station.times[0], station.times[-1]
-    wanted = station.decisive if time is None else time
-    if not first - TIME_TOLERANCE <= wanted <= last + TIME_TOLERANCE:
-        raise SettingError(Diagnostic(f"--at {wanted:g} s is not in the run", f"give {first:g} to {last:g} s"))
-    _, data = cv2.imencode(".png", station.picture(wanted))
-    with write_atomically(path) as stream:
-        stream.write(data.tobytes())
 
 
 def write_gif(station: RecordedStation, path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
-from eidrive_scenario.reporting.drawing.canvas import Canvas
+from eidrive_scenario.reporting.drawing.image_canvas import ImageCanvas
 from eidrive_scenario.reporting.drawing.road_drawing import Strip, bridge_spans, road_drawing
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.reading.document import parse_road_map
@@ -36,9 +36,9 @@ def drawing_of(*roads: str) -> RoadDrawing:
 
 
 def colors(drawing: RoadDrawing, *points: tuple[float, float]) -> list[list[int]]:
-    canvas = Canvas(Window(-20.0, 20.0, -20.0, 20.0), (800, 800))
+    canvas = ImageCanvas(Window(-20.0, 20.0, -20.0, 20.0), (800, 800))
     canvas.roads(drawing)
-    return [canvas.image[y, x].tolist() for x, y in map(canvas.pixel, points)]
+    return [canvas.image[y, x].tolist() for x, y in np.array([*map(canvas.position, points)]).astype(int)]
 
 
 @pytest.mark.parametrize("bridge_first", [False, True])

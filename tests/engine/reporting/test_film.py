@@ -14,12 +14,11 @@ from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import open_recording
-from eidrive_scenario.reporting.drawing.canvas import Canvas, Image
-from eidrive_scenario.reporting.drawing.snapshot_picture import _place
+from eidrive_scenario.reporting.drawing.image_canvas import ImageCanvas
+from eidrive_scenario.reporting.drawing.labels import label_places, overlaps, write_labels
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.reporting.replay import film
-from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4, write_png
-from eidrive_scenario.reporting.snapshot import StationSnapshot
+from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4
 
 Play = Callable[..., list[Frame]]
 
@@ -54,12 +53,9 @@ def test_recording_without_frames_is_refused(tmp_path: Path) -> None:
         recorded([], tmp_path)
 
 
-def test_picture_shows_station_in_its_middle(street: Play, tmp_path: Path) -> None:
+def test_film_shows_station_in_its_middle(street: Play, tmp_path: Path) -> None:
     """The body of the station is dark, the ground is light."""
-    station = recorded(street(1), tmp_path)
-    write_png(station, tmp_path / "a.png", 2.0)
-    picture = cv2.imread(str(tmp_path / "a.png"))
-    assert picture is not None
+    picture = list(recorded(street(1), tmp_path).pictures(film.FILM_SIZE, film.FILM_RATE))[40]
     height, width = picture.shape[:2]
     assert (width, height) == film.FILM_SIZE
     assert picture[height // 2, width // 2].max() < 60
@@ -82,8 +78,7 @@ def test_picture_before_the_entry_of_the_station_shows_its_place(street: Play, t
 @pytest.mark.parametrize("time", [-1.0, 99.0])
 def test_picture_outside_of_run_is_refused(street: Play, tmp_path: Path, time: float) -> None:
     with pytest.raises(SettingError, match="not in the run"):
-        write_png(recorded(street(1), tmp_path), tmp_path / "a.png", time)
-    assert not (tmp_path / "a.png").exists()
+        recorded(street(1), tmp_path).figure(time)
 
 
 @pytest.mark.usefixtures("small")
@@ -111,19 +106,6 @@ def test_film_of_run_with_far_time_is_refused(street: Play, tmp_path: Path) -> N
     assert not (tmp_path / "a.gif").exists()
 
 
-def test_picture_draws_one_frame_only(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    station = recorded(street(1), tmp_path)
-    drawn: list[float] = []
-
-    def note(snapshot: StationSnapshot, *_: object, **__: object) -> Image:
-        drawn.append(snapshot.time)
-        return np.zeros((9, 16, 3), dtype=np.uint8)
-
-    monkeypatch.setattr(film, "snapshot_picture", note)
-    write_png(station, tmp_path / "a.png", 2.0)
-    assert drawn == [pytest.approx(2.0)]
-
-
 def test_film_without_encoder_states_the_extra(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     with pytest.raises(SettingError, match=r"\[film\]"):
@@ -131,7 +113,7 @@ def test_film_without_encoder_states_the_extra(street: Play, tmp_path: Path, mon
 
 
 def test_canvas_fills_polygon_with_opacity() -> None:
-    canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
+    canvas = ImageCanvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
     before = canvas.image[50, 50].astype(float)
     canvas.fill(np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]), "#000000", 0.25)
     assert canvas.image[50, 50] == pytest.approx(0.75 * before, abs=1.0)
@@ -139,26 +121,52 @@ def test_canvas_fills_polygon_with_opacity() -> None:
 
 
 def test_canvas_draws_far_points_without_overflow() -> None:
-    canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
+    canvas = ImageCanvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
     canvas.roads(RoadDrawing(lanes=(("driving", np.array([(-1e9, -1.0), (1e9, -1.0), (1e9, 1.0), (-1e9, 1.0)])),)))
     assert (canvas.image[50] != canvas.image[5]).any(axis=1).all()
 
 
 @pytest.mark.parametrize("place", [(30_000, 30_000), (-(10**6), 50), (50, -(10**9)), (50, 50)])
 def test_canvas_writes_labels_at_any_place(place: tuple[int, int]) -> None:
-    canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
+    canvas = ImageCanvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
     before = canvas.image.copy()
     for text in ("name " * 1000, "\x00\n\ud800", "車\U0001f697é"):
         canvas.label(text, *place)
     assert (canvas.image != before).any() == (place == (50, 50))
 
 
-def test_labels_avoid_actors_and_each_other() -> None:
-    """Of right, left, above and below, the first place without an overlap, or that with the smallest."""
-    outline = (100, 100, 140, 120)
-    assert _place((50, 10), outline, []) == (146, 105, 196, 115)
-    assert _place((50, 10), outline, [(140, 100, 160, 120)]) == (44, 105, 94, 115)
-    beside = [(140, 100, 160, 120), (80, 100, 100, 120)]
-    assert _place((50, 10), outline, beside) == (95, 84, 145, 94)
-    assert _place((50, 10), outline, [*beside, (90, 90, 150, 95)]) == (95, 126, 145, 136)
-    assert _place((50, 10), outline, [(0, 0, 143, 300), (150, 0, 300, 300)]) == (146, 105, 196, 115)
+@pytest.mark.parametrize(
+    ("others", "side"),
+    [
+        ([], 0),
+        ([(140, 100, 160, 120)], 1),
+        ([(140, 100, 160, 120), (80, 100, 100, 120)], 2),
+        ([(140, 100, 160, 120), (80, 100, 100, 120), (90, 90, 150, 95)], 3),
+        ([(0, 0, 143, 300), (150, 0, 300, 300)], 0),
+    ],
+)
+def test_place_of_label_has_least_overlap(others: list[tuple[float, ...]], side: int) -> None:
+    """Right, left, above, below: the first place without an overlap, or that with the smallest."""
+    places = label_places((50.0, 10.0), np.array([100.0, 100.0, 140.0, 120.0]))
+    assert places.tolist() == [[146, 105, 196, 115], [44, 105, 94, 115], [95, 84, 145, 94], [95, 126, 145, 136]]
+    assert int(np.argmin(overlaps(places, np.array(others).reshape(-1, 4)))) == side
+
+
+def test_labels_of_a_crowd_do_not_cover_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 400 bodies in a grid of 1 m only some have labels; the first one has."""
+    canvas = ImageCanvas(Window(0.0, 40.0, 0.0, 40.0), (400, 400))
+    corners = np.array([(-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)])
+    outlines = [corners + np.array([10.0 + x, 10.0 + y]) for x in range(20) for y in range(20)]
+    written: list[tuple[str, float, float]] = []
+    monkeypatch.setattr(canvas, "label", lambda text, left, base, **_: written.append((text, left, base)))
+    write_labels(canvas, [f"car {number}" for number in range(400)], outlines)
+    rectangles = [
+        (left, base - size[1], left + size[0], base)
+        for text, left, base in written
+        for size in [canvas.label_size(text)]
+    ]
+    assert written[0][0] == "car 0"
+    assert 10 < len(written) < 200
+    common = overlaps(np.array(rectangles), np.array(rectangles))
+    area = [(right - left) * (bottom - top) for left, top, right, bottom in rectangles]
+    assert (common <= 1.5 * np.array(area)).all()

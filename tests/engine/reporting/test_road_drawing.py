@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
-from eidrive_scenario.reporting.drawing.canvas import Canvas
+from eidrive_scenario.reporting.drawing.image_canvas import ImageCanvas
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing, simplify_line
 from eidrive_scenario.reporting.drawing.top_view import Window
 from eidrive_scenario.roads.model.road_map import Road
@@ -78,11 +78,11 @@ def test_helical_ramp_is_filled_in_pictures(turns: float) -> None:
     length = 2.0 * math.pi * 20.0 * turns
     lanes = section_xml("", lane_xml(-1, 4.0))
     text = map_xml(road_xml(length=length, y=-20.0, curvature=0.05, lanes=lanes))
-    canvas = Canvas(Window(-30.0, 30.0, -30.0, 30.0), (300, 300))
+    canvas = ImageCanvas(Window(-30.0, 30.0, -30.0, 30.0), (300, 300))
     canvas.roads(road_drawing(parse_road_map(text.encode(), "helix.xodr").roads.values()))
     for degrees in range(5, 360, 10):
         angle = math.radians(degrees)
-        x, y = canvas.pixel((22.0 * math.cos(angle), 22.0 * math.sin(angle)))
+        x, y = map(int, canvas.position((22.0 * math.cos(angle), 22.0 * math.sin(angle))))
         assert canvas.image[y, x].tolist() == [0xD1, 0xC7, 0xC1], degrees
 
 
@@ -96,11 +96,11 @@ def test_lane_beyond_the_center_of_a_curve_is_filled_in_pictures() -> None:
     )
     lanes = section_xml(lane_xml(2, 5.0, kind="sidewalk") + lane_xml(1, 3.0), "")
     text = map_xml(road_xml(length=40.0 + corner, geometry=parts, lanes=lanes))
-    canvas = Canvas(Window(-20.0, 10.0, -10.0, 20.0), (300, 300))
+    canvas = ImageCanvas(Window(-20.0, 10.0, -10.0, 20.0), (300, 300))
     canvas.roads(road_drawing(parse_road_map(text.encode(), "corner.xodr").roads.values()))
     # Beside both straight parts, each 3 to 8 m from its reference line, where both overlap, and near the center
     straight = [(-10.0, y) for y in (-1.5, 1.5)] + [(x, 10.0) for x in (-2.5, 1.5)]
     inside = [(x, y) for x in (-2.5, -1.5, -0.5, 0.5, 1.0) for y in (-1.0, -0.5, 0.5, 1.5, 2.5)]
     for x, y in straight + inside:
-        column, row = canvas.pixel((x, y))
+        column, row = map(int, canvas.position((x, y)))
         assert canvas.image[row, column].tolist() == [0xD5, 0xE1, 0xE7], (x, y)

@@ -1,0 +1,46 @@
+"""Figures of scenarios before their run, and of road files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from eidrive_scenario.reporting.drawing.canvas import Canvas
+from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
+from eidrive_scenario.reporting.drawing.road_labels import RoadLabels
+from eidrive_scenario.reporting.drawing.scenario_picture import ScenarioPicture
+from eidrive_scenario.reporting.drawing.top_view import Window
+from eidrive_scenario.reporting.drawing.vector_canvas import Size, scene_figure
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation import Simulation
+
+
+def scenario_figure(path: Path, size: Size, station: str | None = None) -> Figure:
+    """Return the picture of a scenario before its run. Raise InputError if it cannot be run.
+
+    size     width and height [mm]
+    station  whose shadow is drawn; by default the first that drives, else the first
+    """
+    simulation = Simulation(path, load_weights=False)
+    try:
+        picture = ScenarioPicture.of(simulation, station)
+    finally:
+        simulation.close()
+    roads = network_drawing(simulation.roads)
+    labels = RoadLabels(simulation.roads) if simulation.roads is not None else None
+    return scene_figure(lambda canvas: picture.draw(canvas, roads, labels), picture.section, size)
+
+
+def roads_figure(path: Path, size: Size) -> Figure:
+    """Return the picture of a road file. Raise InputError if it is invalid or too large."""
+    network = RoadNetwork.load(path)
+    drawing, labels = network_drawing(network), RoadLabels(network)
+    left, bottom, right, top = network.bounds()
+
+    def draw(canvas: Canvas) -> None:
+        canvas.roads(drawing)
+        labels.draw(canvas)
+        labels.write(canvas, ())
+
+    return scene_figure(draw, lambda ratio: Window.enclosing([(left, bottom), (right, top)]).widened(ratio, 20.0), size)
