@@ -12,7 +12,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class DrivenDistanceSettings(CriterionSettings):
-    """Settings: `{of: Ego, at_least: 100, by: 30}` with distance [m] and deadline [s].
+    """Settings: `{of: Ego, at_least: 100, by: 30}` with distance [m] and deadline by [s].
 
     A fatal criterion ends the run at an expired deadline. Without `by` it is open until the end.
     """

@@ -11,7 +11,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, FalseTra
 
 
 class FalseBrakingSettings(CriterionSettings):
-    """Settings: `{of: Ego, at_most: 0, harder_than: 3.0}` with a number of brakings and a deceleration [m/s²]."""
+    """Settings: `{of: Ego, at_most: 0, harder_than: 3.0}` with a number of brakings, and harder_than [m/s²]."""
 
     of: str
     at_most: Annotated[int, Field(ge=0, le=10**9)] = 0

@@ -13,7 +13,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class MinSpeedSettings(CriterionSettings):
-    """Settings: `{of: Ego, at_least: 5.0, after: 3.0}` with speed [m/s] and the time from which it is required [s].
+    """Settings: `{of: Ego, at_least: 5.0, after: 3.0}` with speed [m/s], required after [s].
 
     Without `at_least` the criterion only measures and passes.
     """

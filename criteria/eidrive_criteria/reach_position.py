@@ -13,7 +13,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class ReachPositionSettings(CriterionSettings):
-    """Settings: `{of: Ego, x: 42.0, y: -3.5, within: 2.0, by: 30}` with position and tolerance [m] and deadline [s].
+    """Settings: `{of: Ego, x: 42.0, y: -3.5, within: 2.0, by: 30}` with x, y, within [m], by [s].
 
     A fatal criterion ends the run at an expired deadline. Without `by` it is open until the end.
     """

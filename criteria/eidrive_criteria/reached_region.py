@@ -14,7 +14,7 @@ Point = tuple[float, float]
 
 
 class ReachedRegionSettings(CriterionSettings):
-    """Settings: `{of: Ego, region: [[0, 0], [10, 0], [10, 5], [0, 5]], by: 30}` with corners x, y [m] and deadline [s].
+    """Settings: `{of: Ego, region: [[0, 0], [10, 0], [10, 5], [0, 5]], by: 30}` with corners of the region [m], by [s].
 
     Two corners are opposite ones of a rectangle along the axes; three or more are the corners of a polygon in order. A
     fatal criterion ends the run at an expired deadline. Without `by` it is open until the end.

@@ -11,7 +11,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class TimeLimitSettings(CriterionSettings):
-    """Settings: `{within: 60}` [s]. The run has to end by its stop trigger or by its storyboard within that time."""
+    """Settings: `{within: 60}`, within [s]. Its stop trigger or its storyboard has to end the run by then."""
 
     within: Annotated[float, Field(gt=0)]
     fatal: bool = True

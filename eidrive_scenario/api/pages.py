@@ -16,6 +16,7 @@ from eidrive_scenario.reporting.drawing.top_view import Window as Window
 from eidrive_scenario.reporting.drawing.top_view import legend as legend
 from eidrive_scenario.reporting.drawing.top_view import roads_symbol as roads_symbol
 from eidrive_scenario.reporting.drawing.top_view import top_view as top_view
+from eidrive_scenario.reporting.drawing.vector_canvas import write_figure as write_figure
 from eidrive_scenario.reporting.page import png_address as png_address
 from eidrive_scenario.reporting.page import write_page as write_page
 from eidrive_scenario.reporting.replay.page import write_replays as write_replays

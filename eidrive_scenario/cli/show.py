@@ -41,6 +41,8 @@ class Names(StrEnum):
     conditions = "conditions"
     commands = "commands"
     rules = "rules"
+    roads = "roads"
+    properties = "properties"
 
 
 def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")] = Names.scenarios) -> None:
@@ -66,6 +68,12 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
         from eidrive_scenario.checks.scenario_checks import ALL_RULES
 
         lines = _columns([(rule.name, rule.level.value, rule.summary) for rule in ALL_RULES])
+    elif what is Names.roads:
+        lines = _road_lines()
+    elif what is Names.properties:
+        from eidrive_scenario.cli.property_list import Property, properties
+
+        lines = _columns([[name.upper() for name in Property._fields], *properties()])
     elif what is Names.criteria:
         from eidrive_scenario.evaluation.criterion import describe_criteria
 
@@ -81,6 +89,26 @@ def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of texts as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def _road_lines() -> list[str]:
+    """Return one line per road network of the library: name, length, lanes of a cross section, and file."""
+    from eidrive_scenario.extensions.library import ROADS_SUFFIX, library_path
+    from eidrive_scenario.roads import RoadNetwork
+
+    rows = [("NAME", "LENGTH", "ROADS", "DRIVING LANES", "FILE")]
+    for path in sorted(library_path().rglob(f"*{ROADS_SUFFIX}")):
+        roads = RoadNetwork.load(path).roads.values()
+        counts = [
+            sum(lane.drivable and lane.id != 0 for lane in section.lanes.values())
+            for road in roads
+            if road.junction_id is None
+            for section in road.sections
+        ]
+        lanes = " to ".join(map(str, dict.fromkeys((min(counts, default=0), max(counts, default=0)))))
+        length = f"{sum(road.length for road in roads):.0f} m"
+        rows.append((path.stem, length, str(len(roads)), lanes, str(path)))
+    return _columns(rows)
 
 
 def _catalog_lines() -> list[str]:
@@ -268,6 +296,10 @@ def report(
     replays: Annotated[
         bool, typer.Option("--replays/--no-replays", help="Write the replay of each run with a recording, too.")
     ] = True,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write curves and heat maps as SVG and PDF, too.")
+    ] = None,
+    size: PictureSize = None,
 ) -> None:
     """Write an HTML report of many runs or of sweeps, with a replay of each recorded run.
 
@@ -275,12 +307,15 @@ def report(
 
     Below folders, damaged results and runs that did not end are omitted with a warning; the page lists them.
     """
+    from eidrive_scenario.reporting.drawing.vector_canvas import parse_size
     from eidrive_scenario.reporting.report_files import report_files
 
+    if size is not None and figures is None:
+        raise SettingError(Diagnostic("--size without --figures has no effect", "add --figures DIR"))
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
 
     def warn(text: str) -> None:
         echo(f"warning: {text}", color="yellow", err=True)
 
-    echo(str(report_files(runs, out, replays=replays, warn=warn)))
+    echo(str(report_files(runs, out, replays=replays, warn=warn, figures=figures, size=parse_size(size))))

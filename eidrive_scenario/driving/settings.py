@@ -85,11 +85,11 @@ _Sensor = Annotated[SerializeAsAny[SensorSettings], BeforeValidator(parse_sensor
 
 
 class AgentSettings(Settings):
-    """Settings of one station. Lengths in m, speeds in m/s, times in s, angles in degrees, rates in Hz; world frame.
+    """Settings of one station. Positions are in the world frame.
 
     detector, fusion, planner   names of extensions; planner `none` parks a vehicle. A mast has no other planner
     detector_settings  settings of the detector
-    detector_latency   computing time of the detector: detections of time t are available from t + latency on
+    detector_latency   computing time of the detector: detections of time t are available from t + latency on [s]
     fusion_settings    settings of the fusion method
     tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks detections without velocities
     localization    `oracle`, or `ekf`: pose estimation by GNSS and IMU
@@ -98,22 +98,25 @@ class AgentSettings(Settings):
     false_objects   objects that its detector reports, and that do not exist
     obey_signals    whether the vehicle stops at red traffic lights and stop signs
     sensors         kinds (`truth, camera`), or a mapping from names to settings; None uses the defaults of the detector
-    range, field_of_view, mount, visibility   of the truth sensor, unless `sensors` sets them
+    range           of the truth sensor, unless `sensors` sets it [m]
+    field_of_view   of the truth sensor, unless `sensors` sets it [degrees]
+    mount, visibility  of the truth sensor, unless `sensors` sets them
     cooperates_with senders whose messages are received; None: all. A station that does not drive receives messages
                     only with this property
-    message_rate    rate of CPMs; None: one in each tick
+    message_rate    rate of CPMs; None: one in each tick [Hz]
     message_phase   time from the entry of the station to its first message or, with `etsi`, its first evaluation of the
-                    rules; None: random, because stations are not synchronized. Not used with a message in each tick
-    report_timeout  maximum age of a report that is used; None: while its objects are predictable (REPORT_LIFETIME)
-    antenna_height  above the reference point; None: on the roof
+                    rules; None: random, because stations are not synchronized [s]. Not used with a message in each tick
+    report_timeout  maximum age of a report that is used; None: while its objects are predictable (REPORT_LIFETIME) [s]
+    antenna_height  above the reference point; None: on the roof [m]
     messages        kinds of sent messages: `cpm` (perceived objects), `cam` (ego state)
     generation      `each_tick`, `rate` (message_rate), or `etsi`: by the rules of EN 302 637-2 and TS 103 324; None
                     selects one of the first two
     mtu             maximum size of a message by the ETSI rules [bytes]
     security_bytes  size of the security envelope of every CPM [bytes]
-    clock_offset    lead of the station clock; clock_drift  its rate error [parts per million]
+    clock_offset    lead of the station clock [s]
+    clock_drift     rate error of the station clock [parts per million]
     asn1_files      ASN.1 modules that determine the sizes of messages, relative to the scenario file
-    target_speed    speed without a request of the storyboard; None keeps the initial speed
+    target_speed    speed without a request of the storyboard; None keeps the initial speed [m/s]
     follow_speed_limit  whether the speed limit of the lane replaces the initial speed; 13.9 m/s without a stated limit
     vehicle_controller  name of the controller that follows the trajectories of the planner
     vehicle_controller_settings  settings of the vehicle controller

@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.store import is_store
 from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinished_runs
+from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, write_figure
 from eidrive_scenario.reporting.replay.page import write_replays
+from eidrive_scenario.reporting.run_report.rates import rate_figures
 from eidrive_scenario.reporting.run_report.report import write_report
-from eidrive_scenario.reporting.run_report.reported_runs import read_runs
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, read_runs
+from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 
 def report_files(
-    locations: Sequence[Path], out: Path, *, replays: bool = True, warn: Callable[[str], None] = lambda text: None
+    locations: Sequence[Path],
+    out: Path,
+    *,
+    replays: bool = True,
+    warn: Callable[[str], None] = lambda text: None,
+    figures: Path | None = None,
+    size: Size | None = None,
 ) -> Path:
     """Write the report about results, folders of runs and stores of sweeps, and return the path of its page.
 
     out      file of the page if it ends in `.html`, else the folder of `report.html`
     replays  whether the replay of each run with a recording is written beside the page
     warn     function that gets a line for each run or recording that the report omits
+    figures  folder of the curves and heat maps as vector figures of a `size` [mm]
 
     Raise InputError without any result, and for a damaged file that `locations` names. Damaged files below folders are
     omitted.
@@ -47,7 +58,22 @@ def report_files(
         results, without = write_replays(results, out.parent if out.suffix == ".html" else out)
         for line in without:
             warn(line)
+    if figures is not None and not write_rate_figures(results, figures, size or DEFAULT_SIZE):
+        warn("--figures: the report has no curve and no heat map: no number varies between its runs")
     return write_report(results, out, omitted=omitted, unjudged=unjudged)
+
+
+def write_rate_figures(runs: Sequence[ReportedRun], folder: Path, size: Size) -> int:
+    """Write the curves and heat maps of a report as SVG and PDF of a size [mm], and return their number."""
+    names: list[str] = []
+    for title, figure in rate_figures(group_runs(runs), size):
+        name = re.sub(r"[^\w.-]+", "_", title)
+        while name in names:
+            name += "-"
+        names.append(name)
+        for suffix in (".svg", ".pdf"):
+            write_figure(figure, folder / f"{name}{suffix}")
+    return len(names)
 
 
 def _missing(locations: Sequence[Path], stores: Sequence[Path], unjudged: Sequence[str]) -> str:

@@ -22,7 +22,7 @@ MountName = Literal["front", "left", "right", "back", "roof"]
 
 
 class Mount(Settings):
-    """Sensor pose in the frame of the actor: position [m] and angles [degrees], yaw to the left, pitch downwards."""
+    """Sensor pose in the frame of the actor: x, y, z [m]; yaw, pitch [degrees], yaw to the left, pitch downwards."""
 
     x: Annotated[float, Field(ge=-1000.0, le=1000.0)]
     y: Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -68,7 +68,11 @@ class TruthSettings(SensorSettings):
 
 
 class NoiseSettings(Settings):
-    """Noise of an image sensor, in electrons: full-well capacity of a pixel, and standard deviation of the readout."""
+    """Noise of an image sensor.
+
+    full_well   full-well capacity of a pixel [electrons]
+    read_noise  standard deviation of the readout [electrons]
+    """
 
     full_well: Annotated[float, Field(ge=1.0, le=1e9)] = 12_000.0
     read_noise: Annotated[float, Field(ge=0.0, le=1e6)] = 4.0
@@ -89,13 +93,15 @@ def _noise(value: Any) -> Any:
 
 
 class CameraSettings(SensorSettings):
-    """Settings of a camera. Lengths in meters, `width` and `height` in pixels, times in seconds.
+    """Settings of a camera.
 
+    width, height  [pixels]
     fov            horizontal, of the undistorted image [degrees]
     distortion     k1, k2, p1, p2, k3 of Brown and Conrady, as in OpenCV
-    near, far      distances between which objects are drawn
+    near, far      distances between which objects are drawn [m]
     noise          of the image sensor; None: no noise
-    exposure_time, gain   [s], [dB]; None: automatic, within max_exposure_time and max_gain
+    exposure_time, gain   [s], [dB]; None: automatic, within the maxima
+    max_exposure_time, max_gain   [s], [dB]
     lens_drops     whether rain reaches the lens
     supersampling  rays per pixel and axis: 2 smooths edges at four times the cost
     """
@@ -170,6 +176,7 @@ class LidarSettings(SensorSettings):
     range          maximum measured distance [m]
     points_per_second  rays of all channels
     rotation       revolutions per second [Hz]
+    upper_fov, lower_fov  elevations of the highest and the lowest ring above the horizon [degrees]
     field_of_view  horizontal, about the heading of the mount [degrees]
     elevations     of the rings above the horizon, from the highest on [degrees]; None: equal spacing
     attenuation    of the intensity with distance, in addition to that of the weather [1/m]

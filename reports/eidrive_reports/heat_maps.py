@@ -19,9 +19,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted, write_atomically
+from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted
 from eidrive_scenario.api.experiments import Job, from_library, run_jobs
-from eidrive_scenario.api.pages import heat_cells
+from eidrive_scenario.api.pages import heat_cells, write_figure
 from eidrive_scenario.api.run import ConcreteRun, RunSettings, load_distribution, run_file
 
 ARMS: Mapping[str, Mapping[str, str]] = {
@@ -182,8 +182,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 console=Console(stderr=True),
             )
             path = options.out / f"{grid.name}.png"
-            with write_atomically(path) as stream:
-                heat_map(grid).savefig(stream, format="png", dpi=130)
+            figure = heat_map(grid)
+            for suffix in (".png", ".pdf"):
+                write_figure(figure, path.with_suffix(suffix), 130)
         except InputError as error:
             typer.echo(str(error), err=True)
             return 2

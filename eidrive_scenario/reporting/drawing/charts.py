@@ -1,4 +1,4 @@
-"""Line charts and heat maps as inline SVG of a page, drawn by matplotlib in the colors of the page."""
+"""Line charts and heat maps, drawn by matplotlib: as inline SVG in the colors of a page, or as figures for papers."""
 
 from __future__ import annotations
 
@@ -14,13 +14,17 @@ import matplotlib
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, PercentFormatter
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.statistics.intervals import Proportion
+from eidrive_scenario.reporting.drawing.vector_canvas import LABEL, Size, paper_style
 
 PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
 """CSS variables of the page, whose values depend on its light or dark scheme, by the color that matplotlib draws."""
@@ -113,20 +117,62 @@ def line_chart(
     with rc_context(PAGE_STYLE):
         figure = Figure(figsize=(WIDTH, HEIGHT))
         axes = figure.add_axes((LEFT, BOTTOM, (RIGHT if named else WIDE) - LEFT, TOP - BOTTOM))
-        axes.set_xlim(x_range or _extent([value for line in lines for value in line.x]))
-        axes.set_ylim(y_range or (0.0, _extent([value for line in lines for value in line.y])[1]))
+        _set_ranges(axes, lines, x_range, y_range)
         axes.set_xlabel(x_title)
         axes.set_ylabel(y_title)
         axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
-        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        axes.grid(axis="y")
-        axes.set_axisbelow(True)
-        ends = [end for line in sorted(lines, key=lambda line: line.dashed) if (end := _draw(axes, line)) is not None]
-        for line in lines if points else ():
-            axes.plot(line.x, line.y, "o", color=line.color, ms=4.0, clip_on=False, zorder=3.0, gid="mark")
+        ends = _draw_lines(axes, lines, points=points)
         if named:
             _draw_names(axes, ends)
         return inline_svg(figure, f"{y_title} over {x_title}")
+
+
+def rate_figure(
+    lines: Sequence[ChartSeries], *, x_title: str, y_title: str, x_range: tuple[float, float], size: Size
+) -> Figure:
+    """Return rates with their intervals as a figure of a size [mm], with a legend of several series below it."""
+    with paper_style():
+        figure, axes = _paper_axes(size)
+        _set_ranges(axes, lines, x_range, (0.0, 1.0))
+        axes.set_xlabel(x_title)
+        axes.set_ylabel(y_title)
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+        _draw_lines(axes, lines, points=True)
+        if len(lines) > 1:
+            handles = [Line2D([], [], color=line.color, marker="o", ms=4.0) for line in lines]
+            names = [line.name for line in lines]
+            figure.legend(handles, names, loc="outside lower center", ncols=2, fontsize=LABEL, frameon=False)
+    return figure
+
+
+def _paper_axes(size: Size) -> tuple[Figure, Axes]:
+    """Return a figure of a size [mm] and its axes."""
+    figure = Figure(figsize=(size[0] / 25.4, size[1] / 25.4), layout="constrained")
+    axes = figure.subplots()
+    axes.spines[["right", "top"]].set_visible(False)
+    return figure, axes
+
+
+def _set_ranges(
+    axes: Axes,
+    lines: Sequence[ChartSeries],
+    x_range: tuple[float, float] | None,
+    y_range: tuple[float, float] | None,
+) -> None:
+    """Set the limits of the axes, which are those of the points by default."""
+    axes.set_xlim(x_range or _extent([value for line in lines for value in line.x]))
+    axes.set_ylim(y_range or (0.0, _extent([value for line in lines for value in line.y])[1]))
+
+
+def _draw_lines(axes: Axes, lines: Sequence[ChartSeries], *, points: bool) -> list[tuple[float, float, ChartSeries]]:
+    """Draw the series on a grid, and return the last points of those that have one inside the ranges."""
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axes.grid(axis="y")
+    axes.set_axisbelow(True)
+    ends = [end for line in sorted(lines, key=lambda line: line.dashed) if (end := _draw(axes, line)) is not None]
+    for line in lines if points else ():
+        axes.plot(line.x, line.y, "o", color=line.color, ms=4.0, clip_on=False, zorder=3.0, gid="mark")
+    return ends
 
 
 def _draw(axes: Axes, line: ChartSeries) -> tuple[float, float, ChartSeries] | None:
@@ -182,12 +228,26 @@ def heat_cells(
     scale: Normalize,
     line: float = 0.5,
 ) -> QuadMesh:
-    """Draw values (len(ys), len(xs)) as rectangles around sorted xs and ys. NaN draws none.
+    """Draw values (len(ys), len(xs)) as rectangles around sorted xs and ys, which are the ticks. NaN draws none.
 
     line  width of the white lines between cells [pt]
     """
     style: dict[str, Any] = {"edgecolors": "white", "linewidth": line} if line else {}
+    _mark_values(axes, axes.xaxis, xs)
+    _mark_values(axes, axes.yaxis, ys)
     return axes.pcolormesh(cell_edges(xs), cell_edges(ys), values, cmap=colors, norm=scale, **style)
+
+
+def _mark_values(axes: Axes, axis: Axis, values: Sequence[float]) -> None:
+    """Put ticks at the measured values: all of them, or equal steps of their order in too little space."""
+    labels = [f"{value:.4g}" for value in values]
+    points = float(FontProperties(size=axis.get_tick_params().get("labelsize")).get_size_in_points())
+    width, height = 72.0 / axes.figure.dpi * np.array(axes.figure.bbox.size) * axes.get_position().size
+    across = axis is axes.xaxis
+    needed = points * (0.7 * max(map(len, labels)) + 0.7 if across else 1.6)
+    step = max(1, math.ceil(len(values) * needed / (width if across else height)))
+    axis.set_major_locator(FixedLocator(values[::step]))
+    axis.set_major_formatter(FixedFormatter(labels[::step]))
 
 
 def cell_edges(values: Sequence[float]) -> Array:
@@ -223,26 +283,53 @@ def rate_map(
 
     names  texts of the values of columns and rows, for the tooltips
     """
-    shares = np.full((len(ys), len(xs)), np.nan)
-    for (column, row), rate in rates.items():
-        shares[row, column] = rate.share
     with rc_context(PAGE_STYLE):
         figure = Figure(figsize=(MAP_WIDTH, MAP_HEIGHT), dpi=72.0)
         axes = figure.add_axes((MAP_LEFT, MAP_BOTTOM, MAP_RIGHT - MAP_LEFT, MAP_TOP - MAP_BOTTOM))
-        mesh = heat_cells(axes, xs, ys, shares, colors=COLORS, scale=Normalize(0.0, 1.0))
-        axes.set_xlabel(x_title)
-        axes.set_ylabel(y_title)
-        axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
-        axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
+        mesh = _draw_rates(axes, xs, ys, rates, (x_title, y_title))
         beside = figure.add_axes((MAP_RIGHT + 0.03, MAP_BOTTOM, 0.03, MAP_TOP - MAP_BOTTOM))
         bar = figure.colorbar(mesh, cax=beside, format=PercentFormatter(1.0))
         bar.set_label("success rate")
         beside.tick_params(length=0.0)
         bar.outline.set_visible(False)
-        if max(len(xs), len(ys)) <= MOST_NUMBERS:
-            _write_numbers(axes, xs, ys, shares)
         above = _tooltips(axes, xs, ys, rates, (x_title, y_title), names)
         return inline_svg(figure, f"success rate over {x_title} and {y_title}", kind="map", above=above)
+
+
+def rate_map_figure(
+    xs: Sequence[float],
+    ys: Sequence[float],
+    rates: Mapping[tuple[int, int], Proportion],
+    *,
+    x_title: str,
+    y_title: str,
+    size: Size,
+) -> Figure:
+    """Return the rates as a heat map of a size [mm]."""
+    with paper_style():
+        figure, axes = _paper_axes(size)
+        mesh = _draw_rates(axes, xs, ys, rates, (x_title, y_title))
+        figure.colorbar(mesh, format=PercentFormatter(1.0), label="success rate")
+    return figure
+
+
+def _draw_rates(
+    axes: Axes,
+    xs: Sequence[float],
+    ys: Sequence[float],
+    rates: Mapping[tuple[int, int], Proportion],
+    titles: tuple[str, str],
+) -> QuadMesh:
+    """Draw a heat map with its percentages, if they are few, and the values of its cells on the axes."""
+    shares = np.full((len(ys), len(xs)), np.nan)
+    for (column, row), rate in rates.items():
+        shares[row, column] = rate.share
+    mesh = heat_cells(axes, xs, ys, shares, colors=COLORS, scale=Normalize(0.0, 1.0))
+    axes.set_xlabel(titles[0])
+    axes.set_ylabel(titles[1])
+    if max(len(xs), len(ys)) <= MOST_NUMBERS:
+        _write_numbers(axes, xs, ys, shares)
+    return mesh
 
 
 def _write_numbers(axes: Axes, xs: Sequence[float], ys: Sequence[float], shares: Array) -> None:

@@ -280,7 +280,7 @@ def _draw_legend(figure: Figure, entries: dict[str, Patch | Line2D]) -> float:
             labelspacing=0.3,
         )
         box = legend.get_window_extent(renderer)
-        if box.width <= width or columns == 1:
+        if box.width <= width - 2.0 * _PAD or columns == 1:
             return float(box.height)
         legend.remove()
     return 0.0
@@ -294,12 +294,15 @@ def paper_style() -> Iterator[None]:
         yield
 
 
-def write_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, SVG or PDF by the suffix of its file. Raise SettingError if it cannot be written."""
+def write_figure(figure: Figure, path: Path, resolution: float = RESOLUTION) -> None:
+    """Write a figure as PNG, SVG or PDF by the suffix of its file. Raise SettingError if it cannot be written.
+
+    resolution  of a PNG file [dots per inch]
+    """
     suffix = path.suffix.lower()
     buffer = io.BytesIO()
     with paper_style():
-        figure.savefig(buffer, format=suffix[1:], dpi=RESOLUTION, metadata=_NO_METADATA[suffix])
+        figure.savefig(buffer, format=suffix[1:], dpi=resolution, metadata=_NO_METADATA[suffix])
     with write_atomically(path) as stream:
         stream.write(buffer.getvalue())
 
@@ -307,8 +310,8 @@ def write_figure(figure: Figure, path: Path) -> None:
 def check_format(option: str, path: Path | None, suffixes: tuple[str, ...] = tuple(_NO_METADATA)) -> None:
     """Raise SettingError if a picture has another suffix than these."""
     if path is not None and path.suffix.lower() not in suffixes:
-        expected = " or ".join(f"a file name in {suffix}" for suffix in suffixes)
-        raise SettingError(Diagnostic(f"{option}: unknown format (got {quoted(str(path))})", f"give {expected}"))
+        hint = f"give a file name in {', '.join(suffixes)}"
+        raise SettingError(Diagnostic(f"{option}: unknown format (got {quoted(str(path))})", hint))
 
 
 def parse_size(text: str | None) -> Size:

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.statistics.intervals import Proportion, wilson
-from eidrive_scenario.reporting.drawing.charts import ChartSeries, line_chart, rate_map
+from eidrive_scenario.reporting.drawing.charts import ChartSeries, line_chart, rate_figure, rate_map, rate_map_figure
+from eidrive_scenario.reporting.drawing.vector_canvas import Size
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 
@@ -167,6 +169,8 @@ def _order(text: str) -> tuple[int, float, str]:
 
 COLORS = ("#0284c7", "#d97706", "#059669", "#a855f7", "#dc2626", "#64748b", "#be185d", "#65a30d")
 """Colors of the curves, each readable on light and dark ground."""
+RATE = "success rate"
+"""Title of the axis of rates."""
 MOST_AXES = 4
 """Maximum number of axes whose pairs have heat maps."""
 
@@ -201,37 +205,40 @@ class RateMap:
 
 def rate_curves(groups: Sequence[RunGroup]) -> Iterator[RateCurves]:
     """Yield the curves of each scenario whose groups vary one number only."""
+    for scenario, axis, members, lines in _curves(groups):
+        chart = line_chart(
+            lines,
+            x_title=axis,
+            y_title=RATE,
+            x_range=_range([value for line in lines for value in line.x]),
+            y_range=(0.0, 1.0),
+            named=False,
+            points=True,
+        )
+        yield RateCurves(
+            scenario,
+            axis,
+            Markup(chart),
+            tuple((line.name, line.color) for line in lines) if len(lines) > 1 else (),
+            axis_matrix(members, axis),
+            len(members) - len(lines),
+        )
+
+
+def _curves(groups: Sequence[RunGroup]) -> Iterator[tuple[str, str, list[RunGroup], list[ChartSeries]]]:
+    """Yield scenario, axis, groups and curves of each scenario whose groups vary one number only."""
     by_axis: dict[tuple[str, str], list[RunGroup]] = defaultdict(list)
     for group in groups:
         if len(group.numbers) == 1:
             by_axis[group.scenario, group.numbers[0]].append(group)
     for (scenario, axis), members in by_axis.items():
-        names = group_names(members)
         lines = [
             line
-            for group, name, color in zip(members, names, COLORS, strict=False)
+            for group, name, color in zip(members, group_names(members), COLORS, strict=False)
             if (line := _line(group.distinct, axis, name, color)) is not None
         ]
-        if not lines:
-            continue
-        yield RateCurves(
-            scenario,
-            axis,
-            Markup(
-                line_chart(
-                    lines,
-                    x_title=axis,
-                    y_title="success rate",
-                    x_range=_range([value for line in lines for value in line.x]),
-                    y_range=(0.0, 1.0),
-                    named=False,
-                    points=True,
-                )
-            ),
-            tuple((line.name, line.color) for line in lines) if len(lines) > 1 else (),
-            axis_matrix(members, axis),
-            len(members) - len(lines),
-        )
+        if lines:
+            yield scenario, axis, members, lines
 
 
 def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> ChartSeries | None:
@@ -265,26 +272,37 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
 
 def rate_maps(group: RunGroup) -> Iterator[RateMap]:
     """Yield the heat map of each pair of numbers that vary in a group; none for more than four."""
+    for columns, rows, rates in _maps(group):
+        pair = columns.name, rows.name
+        matrix = parameter_matrix(group.distinct, pair)
+        if matrix is not None:
+            names = columns.labels, rows.labels
+            svg = rate_map(columns.centers, rows.centers, rates, x_title=pair[0], y_title=pair[1], names=names)
+            upwards = replace(matrix, rows=matrix.rows[::-1])
+            yield RateMap(Markup(svg), upwards, tuple(name for name in group.varied if name not in pair))
+
+
+def _maps(group: RunGroup) -> Iterator[tuple[Levels, Levels, dict[tuple[int, int], Proportion]]]:
+    """Yield the levels of columns and rows of each map of a group, and its rates by (column, row)."""
     if not 2 <= len(group.numbers) <= MOST_AXES:
         return
     for pair in combinations(group.numbers, 2):
-        matrix = parameter_matrix(group.distinct, pair)
         columns, rows = (levels_of(group.distinct, name) for name in pair)
-        if matrix is None or columns is None or rows is None:
-            continue
         passed: dict[tuple[int, int], list[bool]] = defaultdict(list)
-        for run in (run for run in group.distinct if run.is_judged):
-            passed[columns.index(run), rows.index(run)].append(run.passed)
-        if not passed:
-            continue
-        rates: dict[tuple[int, int], Proportion] = {place: wilson(sum(one), len(one)) for place, one in passed.items()}
-        svg = rate_map(
-            columns.centers,
-            rows.centers,
-            rates,
-            x_title=pair[0],
-            y_title=pair[1],
-            names=(columns.labels, rows.labels),
-        )
-        upwards = replace(matrix, rows=matrix.rows[::-1])
-        yield RateMap(Markup(svg), upwards, tuple(name for name in group.varied if name not in pair))
+        if columns is not None and rows is not None:
+            for run in (run for run in group.distinct if run.is_judged):
+                passed[columns.index(run), rows.index(run)].append(run.passed)
+            if passed:
+                yield columns, rows, {place: wilson(sum(verdicts), len(verdicts)) for place, verdicts in passed.items()}
+
+
+def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, Figure]]:
+    """Yield the curves and heat maps of a report as figures of a size [mm] with their names."""
+    for scenario, axis, _, lines in _curves(groups):
+        x_range = _range([value for line in lines for value in line.x])
+        yield f"{scenario}-{axis}", rate_figure(lines, x_title=axis, y_title=RATE, x_range=x_range, size=size)
+    for group in groups:
+        for columns, rows, rates in _maps(group):
+            title = f"{group.scenario}-{columns.name}-{rows.name}"
+            titles = {"x_title": columns.name, "y_title": rows.name}
+            yield title, rate_map_figure(columns.centers, rows.centers, rates, **titles, size=size)

@@ -127,7 +127,7 @@ def _is_number(text: str) -> bool:
 
 
 class ConstantDelay(Settings):
-    """Constant delay of every message."""
+    """Constant delay of every message: seconds [s]."""
 
     kind: Literal["constant"] = "constant"
     seconds: NonNegativeFloat = 0.0
@@ -148,7 +148,7 @@ class _RandomDelay(Settings):
 
 
 class UniformDelay(_RandomDelay):
-    """Delay with a uniform distribution between two bounds [s]."""
+    """Delay with a uniform distribution between two bounds: minimum, maximum [s]."""
 
     kind: Literal["uniform"]
     minimum: NonNegativeFloat
@@ -166,7 +166,7 @@ class UniformDelay(_RandomDelay):
 
 
 class TruncatedNormalDelay(_RandomDelay):
-    """Delay with a truncated normal distribution; `mean` and `sd` refer to the distribution before truncation [s]."""
+    """Delay with a truncated normal distribution: mean, sd [s] before truncation to minimum, maximum [s]."""
 
     kind: Literal["truncated_normal"]
     mean: float
@@ -202,7 +202,7 @@ class TruncatedNormalDelay(_RandomDelay):
 
 
 class ShiftedGammaDelay(_RandomDelay):
-    """Delay with a gamma distribution of shape 2 above a minimum; the standard deviation is (mean - minimum) / sqrt 2.
+    """Delay with a gamma distribution of shape 2: minimum, mean [s]; standard deviation (mean - minimum) / sqrt 2.
 
     Eclipse MOSAIC fits this shape to measured vehicular links (GammaRandomDelay).
     """
@@ -226,7 +226,7 @@ class ShiftedGammaDelay(_RandomDelay):
 
 
 class LognormalDelay(_RandomDelay):
-    """Delay with a lognormal distribution above a minimum; `mean` and `sd` refer to the part above it [s]."""
+    """Delay with a lognormal distribution above a minimum [s]; mean, sd [s] refer to the part above it."""
 
     kind: Literal["lognormal"]
     mean: Annotated[float, Field(ge=1e-9, le=1e6)]

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 from eidrive_reports.paper import COUNTS, TABLE_2
 from eidrive_reports.reproduction.layout import PartReport, Row, distinct, limits, number, scenario_title
 from eidrive_reports.reproduction.sensitivity import LIBRARY, ORIGINAL
-from eidrive_scenario.api.common import write_atomically
-from eidrive_scenario.api.pages import heat_cells
+from eidrive_scenario.api.pages import heat_cells, write_figure
 
 FAULT_COLORS = {"independent": "#0072b2", "bursty": "#d55e00", "radio": "#009e73"}
 """Colors of Okabe and Ito, which color-blind readers can distinguish."""
@@ -345,16 +344,15 @@ FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
 
 
 def draw(part: str, report: PartReport, out: Path) -> Path | None:
-    """Draw the figure of a part into a folder and return its path; None for a part without a figure.
+    """Draw the figure of a part into a folder as PNG and PDF; return the path of the PNG, None without a figure.
 
     Raise SettingError if the file cannot be written.
     """
     if part not in FIGURES:
         return None
-    path = out / f"{part}.png"
-    with write_atomically(path) as stream:
-        # Without the version of matplotlib in the file, equal results give equal files
-        FIGURES[part](report.data()).savefig(stream, format="png", dpi=130, metadata={"Software": None})
+    figure, path = FIGURES[part](report.data()), out / f"{part}.png"
+    for suffix in (".png", ".pdf"):
+        write_figure(figure, path.with_suffix(suffix), 130)
     return path
 
 

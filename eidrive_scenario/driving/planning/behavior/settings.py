@@ -13,19 +13,20 @@ Deceleration = Annotated[float, Field(gt=0.0, le=12.0)]
 
 
 class BehaviorSettings(PlannerSettings):
-    """Settings of the planner `behavior`. Lengths in m, speeds in m/s, times in s, accelerations in m/s².
+    """Settings of the planner `behavior`.
 
-    time_gap, standstill_gap, acceleration, comfortable_deceleration
-        parameters of the Intelligent Driver Model, by default those that its author advises (1.2, 2, 1.5; Treiber,
-        movsim/traffic-simulation-de) and a comfortable deceleration of 2
-    passing_gap             additional gap behind a standing vehicle, from which the vehicle can pass it
-    hard_deceleration       maximum braking without an emergency; nuPlan's limit of comfort is 4.05
-    emergency_deceleration  braking in an emergency, at most that of the vehicle
-    lateral_acceleration    maximum in curves and lane changes
-    lateral_margin          minimum distance beside vehicles;  pedestrian_margin  beside pedestrians and cyclists
-    crossing_time           minimum time between the vehicle and crossing traffic at a place that both pass
-    horizon                 time for which proposals are rolled out; PDM-Closed plans 8 s
-    period                  time between two decisions
+    time_gap, standstill_gap, acceleration  [s], [m], [m/s²] parameters of the Intelligent Driver Model, by default
+                            those that its author advises (Treiber, movsim/traffic-simulation-de)
+    comfortable_deceleration  its comfortable deceleration [m/s²]
+    passing_gap             additional gap behind a standing vehicle, from which the vehicle can pass it [m]
+    hard_deceleration       maximum braking without an emergency; nuPlan's limit of comfort is 4.05 [m/s²]
+    emergency_deceleration  braking in an emergency, at most that of the vehicle [m/s²]
+    lateral_acceleration    maximum in curves and lane changes [m/s²]
+    lateral_margin          minimum distance beside vehicles [m]
+    pedestrian_margin       minimum distance beside pedestrians and cyclists [m]
+    crossing_time           minimum time between the vehicle and crossing traffic at a place that both pass [s]
+    horizon                 time for which proposals are rolled out; PDM-Closed plans 8 s [s]
+    period                  time between two decisions [s]
     lane_changes            whether the vehicle may leave the lane of its route to pass slower traffic and obstacles
     uncertainty             multiple of the standard deviation of its position by which an object is enlarged; 1.645
                             covers 95 % on one side
@@ -33,7 +34,7 @@ class BehaviorSettings(PlannerSettings):
                             needs `min_existence`
     caution                 whether lanes and crosswalks that neither the own sensors nor those of a sender show are
                             treated as possibly occupied: the vehicle approaches them so that it can stop
-    memory                  time for which a lost object is kept; `lost_detection_timeout` of Autoware
+    memory                  time for which a lost object is kept; `lost_detection_timeout` of Autoware [s]
     """
 
     time_gap: PositiveFloat = 1.2
