@@ -155,7 +155,7 @@ def _default(field: FieldInfo) -> str:
     if default is None:
         return "none"
     if isinstance(default, BaseModel):
-        return str(getattr(default, "kind", "{…}" if default.model_fields else "{}"))
+        return str(getattr(default, "kind", "{…}" if type(default).model_fields else "{}"))
     if isinstance(default, bool):
         return str(default).lower()
     if isinstance(default, float):

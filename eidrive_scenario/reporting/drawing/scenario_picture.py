@@ -81,7 +81,7 @@ class TriggerZone:
 
 @dataclass(frozen=True)
 class ScenarioPicture:
-    """What a picture of a scenario shows at its start.
+    """Content of the picture of a scenario at its start.
 
     sectors  sectors of the sensors in the world, by station
     station  station whose shadow is drawn; "" without stations

@@ -44,7 +44,7 @@ def snapshot_picture(
     size    width and height [pixels]
     extent  width of the section [m]
     """
-    canvas = ImageCanvas(Window.around(center, extent, size[0] / size[1]), size)
+    canvas = ImageCanvas(Window.centered(center, extent, size[0] / size[1]), size)
     draw_snapshot(canvas, snapshot, roads)
     return canvas.image
 

@@ -50,7 +50,7 @@ class Window:
         return cls(float(low[0]), float(high[0]), float(low[1]), float(high[1]))
 
     @classmethod
-    def around(cls, center: tuple[float, float], width: float, ratio: float) -> Window:
+    def centered(cls, center: tuple[float, float], width: float, ratio: float) -> Window:
         """Return the window of this width [m] around a center [m], with a ratio of width to height."""
         across, along = width / 2.0, width / ratio / 2.0
         return cls(center[0] - across, center[0] + across, center[1] - along, center[1] + along)
@@ -58,7 +58,7 @@ class Window:
     def widened(self, ratio: float, least: float) -> Window:
         """Return the smallest window around this one with a ratio of width to height, at least `least` wide [m]."""
         width = max(self.right - self.left, ratio * (self.top - self.bottom), least)
-        return Window.around(((self.left + self.right) / 2.0, (self.bottom + self.top) / 2.0), width, ratio)
+        return Window.centered(((self.left + self.right) / 2.0, (self.bottom + self.top) / 2.0), width, ratio)
 
     @property
     def view_box(self) -> str:

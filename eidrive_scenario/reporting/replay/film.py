@@ -116,7 +116,7 @@ class RecordedStation:
                 snapshot, center = newest
                 return scene_figure(
                     lambda canvas: draw_snapshot(canvas, snapshot, self.roads),
-                    lambda ratio: Window.around(center, EXTENT, ratio),
+                    lambda ratio: Window.centered(center, EXTENT, ratio),
                     size,
                 )
         except UNDRAWABLE:

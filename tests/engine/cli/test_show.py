@@ -11,7 +11,9 @@ from command_fixtures import Eidrive
 from report_table import report_data
 
 from eidrive_scenario.cli.show import Names
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.experiments.sweeps.store import ResultStore
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.extensions.registry import GROUPS
 
 
@@ -47,6 +49,8 @@ def test_version_option_prints_version(eidrive: Eidrive) -> None:
         ("actions", "SpeedAction"),
         ("conditions", "SimulationTimeCondition"),
         ("rules", "unobserved-edge"),
+        ("roads", "coop_1"),
+        ("properties", "station"),
     ],
 )
 def test_list_prints_names_of_each_kind(eidrive: Eidrive, what: str, expected: str) -> None:
@@ -68,6 +72,100 @@ def test_list_of_scenarios_shows_name_family_and_description(eidrive: Eidrive) -
 
 def test_list_without_argument_prints_scenarios(eidrive: Eidrive) -> None:
     assert eidrive("list").stdout == eidrive("list", "scenarios").stdout
+
+
+def test_list_of_roads_shows_length_lanes_and_file(eidrive: Eidrive) -> None:
+    """The road two_lane_road is 420 m long, with one driving lane in each direction."""
+    rows = [re.split("  +", line) for line in eidrive("list", "roads").stdout.splitlines()]
+    assert rows[0] == ["NAME", "LENGTH", "ROADS", "DRIVING LANES", "FILE"]
+    (row,) = (row for row in rows if row[0] == "two_lane_road")
+    assert row[1:4] == ["420 m", "1", "2"]
+    assert Path(row[4]).is_file()
+
+
+def test_list_of_properties_shows_type_default_and_unit(eidrive: Eidrive) -> None:
+    """Types and defaults are those of the settings models, units those of their documentation."""
+    lines = eidrive("list", "properties").stdout.splitlines()
+    starts = [lines[0].index(name) for name in ("OWNER", "KEY", "TYPE", "DEFAULT", "UNIT", "TEXT")]
+    cells = [[line[a:b].strip() for a, b in zip(starts, [*starts[1:], None], strict=True)] for line in lines[1:]]
+    rows = {(owner, key): rest[:3] for owner, key, *rest in cells}
+    assert rows["station", "message_rate"] == ["number | none", "none", "Hz"]
+    assert rows["station", "generation"] == ["each_tick | rate | etsi | none", "none", ""]
+    assert rows["station", "clock_drift"] == ["number", "0", "parts per million"]
+    assert rows["planner behavior", "acceleration"] == ["number", "1.5", "m/s²"]
+    assert rows["sensor lidar", "channels"] == ["integer", "32", ""]
+    assert rows["sensor truth", "mount.yaw"] == ["number", "0", "degrees"]
+    assert rows["channel composed", "delay.uniform.maximum"] == ["number", "required", "s"]
+    assert rows["channel radio", "tx_power_dbm"][2] == "dBm"
+    assert rows["criterion min_distance", "at_least"][2] == "m"
+    assert rows["criterion comfort", "jerk"] == ["number", "8.37", "m/s³"]
+    assert {key for owner, key in rows if owner == "station"} >= set(AgentSettings.model_fields)
+
+
+@pytest.mark.parametrize("suffix", ["svg", "pdf", "png"])
+def test_draw_writes_picture_of_scenario(eidrive: Eidrive, tmp_path: Path, suffix: str) -> None:
+    out = tmp_path / f"picture.{suffix}"
+    result = eidrive("draw", "coop/scenario_1", "--out", out, "--size", "85x60")
+    assert (result.exit_code, result.stdout) == (0, f"{out}\n"), result.output
+    assert out.read_bytes()[:5] in (b"<?xml", b"%PDF-", b"\x89PNG\r")
+
+
+def test_draw_of_roads_has_no_stations(eidrive: Eidrive, tmp_path: Path) -> None:
+    road = library_path() / "roads" / "coop_1.xodr"
+    assert eidrive("draw", road, "-o", tmp_path / "roads.svg").exit_code == 0
+    result = eidrive("draw", road, "--station", "Ego")
+    assert (result.exit_code, "a road file has no stations" in result.stderr) == (2, True)
+
+
+def test_draw_does_not_overwrite_its_input(eidrive: Eidrive, tmp_path: Path) -> None:
+    copy = tmp_path / "scenario.svg"
+    copy.write_bytes((library_path() / "roads" / "coop_1.xodr").read_bytes())
+    result = eidrive("draw", copy, "--out", copy)
+    assert (result.exit_code, "--out would overwrite an input file" in result.stderr) == (2, True)
+
+
+def test_view_writes_vector_figures(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    files = {suffix: tmp_path / f"a.{suffix}" for suffix in ("png", "svg", "pdf")}
+    result = eidrive("view", tmp_path, *[word for suffix, file in files.items() for word in (f"--{suffix}", file)])
+    assert result.stdout.split() == [str(file) for file in files.values()]
+    assert [file.read_bytes()[:5] for file in files.values()] == [b"\x89PNG\r", b"<?xml", b"%PDF-"]
+    result = eidrive("view", tmp_path, "--png", tmp_path / "b.pdf")
+    assert (result.exit_code, "--png: unknown format" in result.stderr) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["view", "RUN", "--size", "85x60"], "--size without a picture has no effect; add --png, --svg or --pdf FILE"),
+        (["view", "RUN", "--at", "1"], "--at without a picture has no effect; add --png, --svg or --pdf FILE"),
+        (["report", "RUN", "--size", "85x60"], "--size without --figures has no effect; add --figures DIR"),
+    ],
+)
+def test_option_without_its_picture_is_refused(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    result = eidrive(*[tmp_path if word == "RUN" else word for word in arguments])
+    assert (result.exit_code, result.stderr) == (2, f"{message}\n")
+
+
+def test_report_writes_curves_as_figures(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    """Two values of one parameter with two seeds each make one curve."""
+    store = tmp_path / "sweep.db"
+    eidrive("sweep", passing_by, "--vary", "OtherY=0,8", "--seeds", "1-2", "--store", store, "--workers", "1")
+    result = eidrive("report", store, "--figures", tmp_path / "figures")
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in sorted((tmp_path / "figures").iterdir())] == [
+        "passing_by-OtherY.pdf",
+        "passing_by-OtherY.svg",
+    ]
+
+
+def test_report_without_curve_warns(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path / "run", "--no-record")
+    result = eidrive("report", tmp_path / "run", "--figures", tmp_path / "figures")
+    assert (result.exit_code, "no number varies between its runs" in result.stderr) == (0, True)
 
 
 def test_tree_prints_storyboard(eidrive: Eidrive, passing_by: Path) -> None:

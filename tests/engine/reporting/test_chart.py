@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from lxml import etree
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.statistics.intervals import Proportion
 from eidrive_scenario.reporting.drawing.charts import (
@@ -19,6 +22,7 @@ from eidrive_scenario.reporting.drawing.charts import (
     TOP,
     WIDTH,
     ChartSeries,
+    heat_cells,
     line_chart,
     rate_map,
 )
@@ -96,3 +100,21 @@ def test_line_chart_uses_colors_and_fonts_of_page() -> None:
     assert "font-family" not in text
     assert "<style" not in text
     assert not re.search(r'<g id="', text)
+
+
+def test_axes_of_heat_map_have_the_measured_values() -> None:
+    """Ticks are at the values themselves, 0.05 m apart, not at round numbers between them."""
+    axes = Figure(figsize=(6.0, 4.0)).subplots()
+    heat_cells(axes, (0.5, 0.55, 0.6), (7.0, 8.0556), np.zeros((2, 3)), colors="cividis", scale=Normalize(0.0, 1.0))
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["0.5", "0.55", "0.6"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["7", "8.056"]
+    assert axes.get_yticks().tolist() == [7.0, 8.0556]
+
+
+def test_narrow_heat_map_omits_values_that_would_overlap() -> None:
+    axes = Figure(figsize=(2.0, 4.0)).subplots()
+    xs = [value / 1000.0 for value in range(1001, 1041)]
+    heat_cells(axes, xs, (1.0,), np.zeros((1, 40)), colors="cividis", scale=Normalize(0.0, 1.0))
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert 2 <= len(labels) <= 4
+    assert labels[0] == "1.001"
