@@ -158,7 +158,7 @@ def test_labels_of_a_crowd_do_not_cover_each_other(monkeypatch: pytest.MonkeyPat
     corners = np.array([(-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)])
     outlines = [corners + np.array([10.0 + x, 10.0 + y]) for x in range(20) for y in range(20)]
     written: list[tuple[str, float, float]] = []
-    monkeypatch.setattr(canvas, "label", lambda text, left, base, **_: written.append((text, left, base)))
+    monkeypatch.setattr(canvas, "label", lambda text, left, base, *_: written.append((text, left, base)))
     write_labels(canvas, [f"car {number}" for number in range(400)], outlines)
     rectangles = [
         (left, base - size[1], left + size[0], base)
