@@ -169,7 +169,7 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
 def conflict_areas_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield conflict areas without a part on a road; invalid settings are reported by the run setup."""
     try:
-        settings = declared_settings(context.scenario, None, None)
+        settings = declared_settings(context.scenario)
     except InputError:
         return
     yield from areas_off_road(context.scenario, settings, context.roads)

@@ -48,7 +48,7 @@ def sweep(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUES",
-            help="Parameter, channel, channel.KEY, detector, planner, weather or cooperate (A+B), over "
+            help="Parameter, channel, channel.KEY, detector, fusion, planner, weather or cooperate (A+B), over "
             "A,B, LOW:HIGH:STEP or LOW:HIGH; repeatable.",
         ),
     ] = None,

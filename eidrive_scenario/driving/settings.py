@@ -31,7 +31,7 @@ from eidrive_scenario.v2x.messages.message import StationClock
 NAME_PROPERTIES = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
 """Properties whose values are names, not YAML."""
 
-_SELECTED = {
+SELECTED = {
     "detector": "detectors",
     "fusion": "fusion",
     "planner": "planners",
@@ -254,7 +254,7 @@ def agent_settings(controller: Controller) -> AgentSettings:
             data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
         except SettingError as error:
             diagnostics += error.diagnostics
-    for name, kind in _SELECTED.items():
+    for name, kind in SELECTED.items():
         also = (NO_PLANNER,) if name == "planner" else ()
         if name in data and data[name] not in (*registry(kind), *also):
             diagnostics.append(registry(kind).unknown(data[name], also=also, source=source, line=lines[name]))

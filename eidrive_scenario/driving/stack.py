@@ -34,7 +34,7 @@ class StackContext:
 
     dt         time step [s]
     channel    profile that overrides the scenario file; None uses the value of the file
-    detector   of all stations; None uses the values of the file
+    detector, fusion   of all stations; None uses the values of the file
     cooperate  senders whose messages the receiving stations use; None uses the values of the file
     load_weights       whether detectors load their weights; `eidrive check` does not
     allow_torchscript  whether weights may be TorchScript, which can execute any code
@@ -46,6 +46,7 @@ class StackContext:
     dt: float
     channel: str | Path | Mapping[str, Any] | None = None
     detector: str | None = None
+    fusion: str | None = None
     cooperate: tuple[str, ...] | None = None
     load_weights: bool = True
     allow_torchscript: bool = False

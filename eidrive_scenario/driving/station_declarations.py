@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
-from eidrive_scenario.driving.settings import AgentSettings, agent_settings
+from eidrive_scenario.driving.settings import SELECTED, AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.extensions.registry import distributions, registry
@@ -26,12 +27,19 @@ from eidrive_scenario.world.specs import actor_spec
 
 
 def declared_settings(
-    scenario: Scenario, detector: str | None, cooperate: tuple[str, ...] | None
+    scenario: Scenario, selected: Mapping[str, str] = MappingProxyType({}), cooperate: tuple[str, ...] | None = None
 ) -> dict[str, AgentSettings]:
-    """Return the settings of every station, with options applied. Raise SettingError with all diagnostics."""
-    if detector is not None and detector not in registry("detectors"):
-        raise SettingError(registry("detectors").unknown(detector, source="--detector"))
-    diagnostics: list[Diagnostic] = []
+    """Return the settings of every station, with options applied. Raise SettingError with all diagnostics.
+
+    selected  detector and fusion method of options, by the property that each replaces
+    """
+    diagnostics = [
+        registry(SELECTED[part]).unknown(name, source=f"--{part}")
+        for part, name in selected.items()
+        if name not in registry(SELECTED[part])
+    ]
+    if diagnostics:
+        raise SettingError(diagnostics)
     found: dict[str, AgentSettings] = {}
     controllers: dict[str, Controller] = {}
     for name, assigned in scenario.controllers.items():
@@ -61,9 +69,9 @@ def declared_settings(
         raise SettingError(diagnostics)
     updated = {}
     for name, settings in found.items():
-        update: dict[str, Any] = {} if detector is None else {"detector": detector}
-        if detector not in (None, settings.detector):
-            update["detector_settings"] = {}  # those of the file apply to the detector of the file
+        update: dict[str, Any] = dict(selected)
+        # Settings of the file apply to the detector and the fusion method of the file
+        update |= {f"{part}_settings": {} for part, name in selected.items() if name != getattr(settings, part)}
         if cooperate is not None and (settings.restricts_senders or _drives(scenario, name, settings)):
             update["cooperates_with"] = cooperate
         updated[name] = settings.model_copy(update=update)
@@ -98,12 +106,14 @@ def _has_wheels(scenario: Scenario, name: str) -> bool:
 def declared_detectors(
     scenario: Scenario,
     settings: Mapping[str, AgentSettings],
-    option: str | None,
+    selected: Mapping[str, str],
     *,
     load_weights: bool = True,
     allow_torchscript: bool = False,
 ) -> dict[str, Detector]:
     """Build the detector of every station, and load its weights if `load_weights`, or else check that a run may.
+
+    selected  detector and fusion method of options, by the property that each replaces
 
     Raise SettingError with all diagnostics of detectors, sensors, fusion methods and vehicle controllers.
     """
@@ -112,9 +122,7 @@ def declared_detectors(
     for name, station in settings.items():
         subject = ErrorSubject(f"station {name!r}")
         controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
-        by_option = option is not None and not station.detector_settings
-        source = "--detector" if by_option else controller.source
-        line = None if by_option else _line(controller, "detector_settings", "detector")
+        source, line = _origin(controller, station, "detector", selected)
         try:
             detectors[name] = subject.call(build_detector, station, source=source, line=line)
             weights = detectors[name].load_weights if load_weights else detectors[name].check_weights
@@ -122,10 +130,10 @@ def declared_detectors(
             source, line = controller.source, _line(controller, "sensors")
             for sensor in station.rig_sensors(detectors[name].needs, detectors[name].default_sensors).values():
                 sensor_class(sensor.kind).check_settings(sensor)
-            line = _line(controller, "fusion_settings", "fusion")
-            subject.call(build_fusion, station, detectors[name], source=controller.source, line=line)
-            line = _line(controller, "vehicle_controller_settings", "vehicle_controller")
-            vehicle_controller_settings(station, source=controller.source, line=line)
+            source, line = _origin(controller, station, "fusion", selected)
+            subject.call(build_fusion, station, detectors[name], source=source, line=line)
+            source, line = controller.source, _line(controller, "vehicle_controller_settings", "vehicle_controller")
+            vehicle_controller_settings(station, source=source, line=line)
         except SettingError as error:
             diagnostics += error.at(source, line).diagnostics
     if diagnostics:
@@ -145,6 +153,15 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
             category = actor_spec(name, scenario.entities[name]).category
             encoders[name] = Asn1Encoder(files, station.messages, station=category, source=controller.source, line=line)
     return encoders
+
+
+def _origin(
+    controller: Controller, station: AgentSettings, part: str, selected: Mapping[str, str]
+) -> tuple[str, int | None]:
+    """Return file and line of a detector or fusion method, or its option if this and no property determines it."""
+    if part in selected and not getattr(station, f"{part}_settings"):
+        return f"--{part}", None
+    return controller.source, _line(controller, f"{part}_settings", part)
 
 
 def _line(controller: Controller, *properties: str) -> int:
@@ -184,12 +201,8 @@ def _unknown_senders(
     ]
 
 
-_WITH_SETTINGS = (
-    ("detectors", "detector"),
-    ("fusion", "fusion"),
-    ("vehicle_controllers", "vehicle_controller"),
-)
-"""Registries and properties of the extensions whose settings are in a property `NAME_settings`."""
+_WITH_SETTINGS = ("detector", "fusion", "vehicle_controller")
+"""Properties that name the extensions whose settings are in a property `NAME_settings`."""
 
 
 def resolved_stations(
@@ -208,8 +221,9 @@ def resolved_stations(
     stations = {}
     for name, station in sorted(settings.items()):
         written = stations[name] = station.model_dump(mode="json")
-        for kind, part in _WITH_SETTINGS:
-            model = optional_settings_type(kind, written[part], registry(kind).load(written[part]))
+        for part in _WITH_SETTINGS:
+            kind, name_of_part = SELECTED[part], written[part]
+            model = optional_settings_type(kind, name_of_part, registry(kind).load(name_of_part))
             if model is not None:
                 own = model.model_validate(written[f"{part}_settings"])
                 written[f"{part}_settings"] = own.model_dump(mode="json")

@@ -135,13 +135,14 @@ class Stations(DrivingStack):
         self._rigs: dict[str, Rig] = {}
         self._signal_sensors: dict[str, SignalSensor] = {}
         self._overrides: dict[str, ControlOverrides] = {}
-        scenario, detector = context.scenario, context.detector
-        self._settings = declared_settings(scenario, detector, context.cooperate)
+        scenario = context.scenario
+        selected = {name: value for name in ("detector", "fusion") if (value := getattr(context, name)) is not None}
+        self._settings = declared_settings(scenario, selected, context.cooperate)
         # Detectors are built here to report unsuitable settings before the run.
         self._detectors = declared_detectors(
             scenario,
             self._settings,
-            detector,
+            selected,
             load_weights=context.load_weights,
             allow_torchscript=context.allow_torchscript,
         )

@@ -173,6 +173,7 @@ def _check_criteria(place: str, value: list[str], folder: Path) -> None:
 _CHECKS: dict[str, Callable[[str, Any, Path], None]] = {
     "channel": _check_channels,
     "detector": _check_extension("detectors"),
+    "fusion": _check_extension("fusion"),
     "planner": _check_extension("planners"),
     "drive": _check_drive,
     "criterion": _check_criteria,

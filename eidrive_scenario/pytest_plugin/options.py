@@ -108,6 +108,7 @@ OPTIONS = (
         parse_choice(WITHOUT_CRITERIA),
     ),
     _OF_RUN.pop("detector"),
+    _OF_RUN.pop("fusion"),
     _OF_RUN.pop("planner"),
     Option(
         "max_runs",

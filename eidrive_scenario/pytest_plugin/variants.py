@@ -45,7 +45,7 @@ class RunVariant:
     label     channel in the name of the test, if its short name is not unique
     added     driving stacks and criteria of the marker of the test
     rate      sequential test of the success rate over seeds, a RatioTest; None for a single run
-    options   detector and planner of options, by name
+    options   detector, fusion method and planner of options, by name
     """
 
     channel: str | None

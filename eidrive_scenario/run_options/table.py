@@ -120,6 +120,7 @@ class RunSettings:
 
     channel         profile: a name, a file, YAML text or a mapping; 'none' disables cooperation
     detector        for all stations
+    fusion          fusion method of all stations
     planner         for all driven stations; parked ones, with the planner `none`, remain parked
     weather         preset or file; it overrides weather and road condition of the scenario
     cooperate       senders whose messages the receiving stations use; () disables reception
@@ -158,6 +159,16 @@ class RunSettings:
         detail="stations",
         in_row=True,
         pytest=PytestForm(metavar="NAME", help="detector of all stations (default: the file's own)", is_named=True),
+    )
+    fusion: str | None = _option(
+        Text((str,), "the name of a fusion method"),
+        "Fusion method of all stations.",
+        commands=_RUN,
+        detail="stations",
+        in_row=True,
+        pytest=PytestForm(
+            metavar="NAME", help="fusion method of all stations (default: the file's own)", is_named=True
+        ),
     )
     planner: str | None = _option(
         Text((str,), "the name of a planner"),

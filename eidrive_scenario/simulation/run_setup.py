@@ -110,6 +110,7 @@ def set_up_run(
             settings.dt,
             channel=settings.channel,
             detector=settings.detector,
+            fusion=settings.fusion,
             cooperate=settings.cooperate,
             load_weights=load_weights,
             allow_torchscript=settings.allow_torchscript,

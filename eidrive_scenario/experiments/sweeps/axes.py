@@ -38,6 +38,8 @@ _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+_RANGE_SIGN = re.compile(r"\s*(?:\.{2,3}|…|:|\bto\b)\s*")
+"""Signs of a range, of which only the colon is one here."""
 _MOST_DIGITS = 16
 """Maximum number of digits of an integer; longer ones are identifiers."""
 
@@ -90,7 +92,7 @@ def parse_axis(text: str) -> Axis:
     """Return the axis of a text: `NAME=A,B,C` (list), `NAME=LOW:HIGH:STEP` (range), or `NAME=LOW:HIGH` (interval).
 
     A range contains its upper end if a step reaches it. Steps are exact decimals: three steps of 0.1 are 0.3.
-    Raise SettingError for other texts.
+    Raise SettingError for other texts, and for numbers with other signs of a range, such as `0..1`.
     """
     name, separator, given = text.partition("=")
     name, given = name.strip(), given.strip()
@@ -100,9 +102,14 @@ def parse_axis(text: str) -> Axis:
     if len(parts) in (2, 3) and all(_NUMBER.fullmatch(part.strip()) for part in parts):
         numbers = [Decimal(part.strip()) for part in parts]
         return _interval(name, text, numbers) if len(parts) == 2 else Axis(name, _range(text, *numbers))
-    values = tuple(_typed(part.strip()) for part in given.split(","))
-    if "" in values:
+    texts = [part.strip() for part in given.split(",")]
+    if "" in texts:
         raise _error(text, "expected a value between commas")
+    if any(map(_resembles_range, texts)):
+        raise _error(
+            text, f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH, both without commas"
+        )
+    values = tuple(map(_typed, texts))
     if len(set(values)) < len(values):
         raise _error(text, "a value is given twice")
     return Axis(name, values)
@@ -131,6 +138,12 @@ def _identity(name: str) -> str:
 def is_setting(name: str) -> bool:
     """Return whether the name of an axis is that of a setting of the run, not of a parameter."""
     return name in SETTINGS or name.startswith(f"{CHANNEL}.")
+
+
+def _resembles_range(text: str) -> bool:
+    """Return whether a text is numbers with signs of a range between them, as in `0..1`, which would be no number."""
+    limits = _RANGE_SIGN.split(text)
+    return len(limits) > 1 and any(limits) and all(not limit or _NUMBER.fullmatch(limit) for limit in limits)
 
 
 def _interval(name: str, text: str, limits: list[Decimal]) -> Axis:

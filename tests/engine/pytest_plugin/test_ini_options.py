@@ -33,7 +33,7 @@ def test_every_option_is_in_one_help_group_with_ini_option(pytester: pytest.Pyte
     lines = pytester.runpytest_inprocess("--help").outlines
     begin = lines.index("OpenSCENARIO files:")
     group = " ".join(" ".join(lines[begin : lines.index("", begin)]).split())
-    assert len(OPTIONS) == 15
+    assert len(OPTIONS) == 16
     for option in OPTIONS:
         assert f"{option.flag}=" in group
         assert f"ini option: {option.key}" in group

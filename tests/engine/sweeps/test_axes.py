@@ -44,6 +44,17 @@ def test_parse_axis_with_invalid_text_raises(text: str) -> None:
         parse_axis(text)
 
 
+@pytest.mark.parametrize("values", ["0..1", "0...1", "0.1..0.5", "0 … 1", "0 to 1", "0:1:0.1:2", "0:", ":1", "0:1,3"])
+def test_values_that_resemble_a_range_name_its_form(values: str) -> None:
+    with pytest.raises(SettingError, match="write a range as Latency=LOW:HIGH:STEP, an interval as Latency=LOW:HIGH"):
+        parse_axis(f"Latency={values}")
+
+
+@pytest.mark.parametrize("values", ["..", "a..b", "1.0.2", "2026-01-01T12:30:00", "../1", "to", "1-2", "v1..2"])
+def test_texts_that_do_not_resemble_a_range_are_values(values: str) -> None:
+    assert parse_axis(f"Name={values}").values == (values,)
+
+
 def test_parse_axes_with_one_name_twice_raises() -> None:
     with pytest.raises(SettingError, match="twice"):
         parse_axes(["Speed=1,2", "param.Speed=3,4"])
