@@ -231,7 +231,7 @@ class RunSettings:
     )
     criteria: str | Path | Mapping[str, Any] | Iterable[str | Path | Mapping[str, Any]] | None = _option(
         Criteria(),
-        "Add criteria, such as '{collision: {of: Ego}}'; repeatable.",
+        "Further criteria: '{collision: {of: Ego}}'; repeatable.",
         flag="--criterion",
         metavar="YAML|FILE",
         commands={**_ALL, "sweep": {"help": "Add criteria; repeatable.", "rare": True}},
