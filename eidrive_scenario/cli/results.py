@@ -16,7 +16,6 @@ from eidrive_scenario.errors import FAILED, PASSED, Diagnostic, SettingError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from eidrive_scenario.experiments.sweeps.comparison import Comparison
     from eidrive_scenario.experiments.sweeps.results import PointSummary
 
 
@@ -114,8 +113,18 @@ def _short(value: object) -> str:
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(metavar="STORE_A", help="Store of the reference, such as a release.")],
-    second: Annotated[Path, typer.Argument(metavar="STORE_B", help="Store that is compared with it.")],
+    stores: Annotated[
+        list[Path],
+        typer.Argument(metavar="STORE_A STORE_B", help="Stores, the reference first; folders of results, too."),
+    ],
+    between: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME[=A,B]",
+            help="Compare values of this axis of one store instead: each one with the first.",
+            show_default="none",
+        ),
+    ] = None,
     margin: Annotated[
         float, typer.Option(help="Largest decrease of the success rate that counts as not worse.")
     ] = 0.05,
@@ -123,50 +132,56 @@ def compare(
     metric: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Metric whose means are compared; repeatable.")
     ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per comparison.")] = False,
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="Print a table in Markdown, such as for a pull request.")
+    ] = False,
+    html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page.")] = None,
 ) -> None:
-    """Compare two sweeps of the same runs: exit code 0 if B is shown to be not worse than A, else 1.
+    """Compare two sweeps of the same runs, or values of an axis of one, in pairs of runs with equal seeds.
 
     Example: eidrive compare release-1.db release-2.db --margin 0.02
+
+    Values of an axis: eidrive compare s.db --between fusion. Exit code 0 if all are shown to be not worse than the
+    first, else 1.
     """
+    import json as json_text
+
+    from eidrive_scenario.experiments.sweeps.axes import typed_value
+    from eidrive_scenario.experiments.sweeps.comparison import NOT_WORSE, NamedComparison, compare_values
     from eidrive_scenario.experiments.sweeps.comparison import compare as compare_stores
+    from eidrive_scenario.reporting.comparison import as_json, as_markdown, text_lines, write_comparison
 
     if not 0.0 <= margin < 1.0:
         raise SettingError(Diagnostic(f"--margin is {margin}", "give a number from 0 to below 1"))
     if not 0.5 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0.5 and 1"))
-    found = compare_stores([first], [second], margin=margin, confidence=confidence, metrics=metric or [])
-    for line in lines_of(found):
-        echo(line)
-    raise typer.Exit(PASSED if found.is_not_worse else FAILED)
-
-
-def lines_of(found: Comparison) -> list[str]:
-    """Return the comparison as text."""
-    from eidrive_scenario.experiments.statistics.intervals import interval_text
-
-    counts, pairs = found.verdicts, found.verdicts.pairs
-    rates = [(counts.both + only) / pairs for only in (counts.only_first, counts.only_second)]
-    low, high = found.interval
-    lines = [
-        f"{pairs} pairs of runs with a verdict, {found.identical} with equal trace hashes; "
-        f"{found.unpaired} runs without a partner",
-        f"A passed {rates[0]:.1%}, B passed {rates[1]:.1%}; "
-        f"only A passed in {counts.only_first} pairs, only B in {counts.only_second}",
-        f"B - A: {counts.difference:+.1%} ({found.confidence:.0%}: {low:+.1%} to {high:+.1%}); "
-        f"McNemar's exact test: p = {found.p_value:.3g}",
-    ]
-    for name, one in found.metrics.items():
-        interval = interval_text(one.low, one.high, "+.4g")
-        lines.append(f"{name}: B - A {one.mean:+.4g} ({found.confidence:.0%}: {interval}; {one.pairs} pairs)")
-    if found.is_not_worse:
-        lines.append(f"B is not worse than A by {found.margin:.1%} or more (p = {found.p_worse:.3g})")
-    elif found.is_worse:
-        lines.append("B is worse than A")
-    elif found.lost:
-        lines.append(f"undecided: B has no verdict of {found.lost} runs with a verdict in A; repeat them by --retry")
-    else:
-        lines.append(
-            f"undecided: the runs do not show that B is not worse by {found.margin:.1%} or more "
-            f"(p = {found.p_worse:.3g}); more pairs, or a larger --margin"
+    if json and markdown:
+        raise SettingError(Diagnostic("--json and --markdown exclude each other", "give one of them"))
+    check_output_paths({"--html": html}, stores)
+    if between is not None:
+        name, equals, listed = between.partition("=")
+        values = [typed_value(text.strip()) for text in listed.split(",")] if equals else []
+        comparisons = compare_values(
+            stores, name.strip(), values, margin=margin, confidence=confidence, metrics=metric or []
         )
-    return lines
+    elif len(stores) == 2:
+        first, second = stores
+        compared = compare_stores([first], [second], margin=margin, confidence=confidence, metrics=metric or [])
+        comparisons = [NamedComparison("", str(first), str(second), compared)]
+    else:
+        hint = "give two, or --between NAME, such as --between channel, for the values of an axis"
+        raise SettingError(Diagnostic(f"the number of stores is {len(stores)}", hint))
+    if json:
+        for one in comparisons:
+            echo(json_text.dumps(as_json(one)))
+    elif markdown:
+        echo(as_markdown(comparisons))
+    else:
+        for line in text_lines(comparisons):
+            echo(line)
+    if html is not None:
+        write_comparison(comparisons, html)
+        echo(str(html), err=json or markdown)
+    is_not_worse = all(one.comparison is not None and one.comparison.conclusion == NOT_WORSE for one in comparisons)
+    raise typer.Exit(PASSED if is_not_worse else FAILED)

@@ -106,10 +106,8 @@ def parse_axis(text: str) -> Axis:
     if "" in texts:
         raise _error(text, "expected a value between commas")
     if any(map(_resembles_range, texts)):
-        raise _error(
-            text, f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH, both without commas"
-        )
-    values = tuple(map(_typed, texts))
+        raise _error(text, f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH")
+    values = tuple(map(typed_value, texts))
     if len(set(values)) < len(values):
         raise _error(text, "a value is given twice")
     return Axis(name, values)
@@ -125,11 +123,11 @@ def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
 def check_different(axes: Sequence[Axis]) -> None:
     """Raise SettingError if two axes have one name."""
     for row, axis in enumerate(axes):
-        if _identity(axis.name) in [_identity(other.name) for other in axes[:row]]:
+        if axis_identity(axis.name) in [axis_identity(other.name) for other in axes[:row]]:
             raise _error(axis.name, "the axis is given twice")
 
 
-def _identity(name: str) -> str:
+def axis_identity(name: str) -> str:
     """Return one name for a parameter with and without prefix, unless a setting has this name."""
     bare = name.removeprefix(PARAMETER)
     return name if is_setting(bare) else bare
@@ -167,7 +165,8 @@ def _range(text: str, low: Decimal, high: Decimal, step: Decimal) -> tuple[Scala
     return tuple(int(value) if whole else float(value) for value in values)
 
 
-def _typed(text: str) -> Scalar:
+def typed_value(text: str) -> Scalar:
+    """Return the value of an axis that a text is: a number if it can be written as one again."""
     if not is_number(text):
         return text
     return int(text) if _INTEGER.fullmatch(text) else float(text)

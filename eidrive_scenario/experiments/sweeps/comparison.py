@@ -1,17 +1,31 @@
-"""Comparison of two sweeps of the same runs, such as those of two releases, with equal seeds."""
+"""Comparison of two sweeps, such as those of two releases, or of the values of an axis, by runs with equal seeds."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, PairedVerdicts, paired_difference
-from eidrive_scenario.experiments.sweeps.results import Identity, identity, indistinct, stored_runs
+from eidrive_scenario.experiments.sweeps.axes import axis_identity, text_of_value
+from eidrive_scenario.experiments.sweeps.results import (
+    Identity,
+    identity,
+    indistinct,
+    partner_identity,
+    stored_runs,
+    stored_sides,
+    value_of,
+    values_of,
+)
 from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, FAILED, INVALID, NOT_JUDGED, PASSED, StoredRun
+
+NOT_WORSE, WORSE, UNDECIDED = "not worse", "worse", "undecided"
+"""Conclusions of a comparison."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +60,37 @@ class Comparison:
         return not self.lost and self.p_worse < 1.0 - self.confidence
 
     @property
+    def rates(self) -> tuple[float, float]:
+        """Success rates of both sweeps in the pairs."""
+        counts = self.verdicts
+        return (counts.both + counts.only_first) / counts.pairs, (counts.both + counts.only_second) / counts.pairs
+
+    @property
+    def conclusion(self) -> str:
+        """The decision in a word or two: `not worse`, `worse` or `undecided`."""
+        return NOT_WORSE if self.is_not_worse else WORSE if self.is_worse else UNDECIDED
+
+    @property
     def is_worse(self) -> bool:
         """Whether the runs show that the second sweep has a lower success rate."""
         return self.interval[1] < 0.0
+
+
+@dataclass(frozen=True)
+class NamedComparison:
+    """Comparison with the names of what is compared.
+
+    axis        axis whose values are compared; "" for stores
+    first, second  values of the axis, the first one is the reference; paths of stores
+    comparison  None if no pair of runs has verdicts
+    counts      number of runs of the second one by status
+    """
+
+    axis: str
+    first: Any
+    second: Any
+    comparison: Comparison | None
+    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 def compare(
@@ -66,11 +108,79 @@ def compare(
 
     Raise SettingError if a file is not a store, if no runs are equal, or for an unknown metric.
     """
-    one, other = _by_identity(first), _by_identity(second)
-    pairs = [(one[key], other[key]) for key in one if key in other]
+    sides = stored_sides(first, second)
+    one, other = (_by_identity(runs, paths) for runs, paths in zip(sides, (first, second), strict=True))
+    comparison = _compared(one, other, margin, confidence, metrics)
+    if comparison is None:
+        raise SettingError(Diagnostic("the stores have no run with a verdict in common", "sweep both over equal seeds"))
+    _check_metrics(metrics, [comparison], [*one.values(), *other.values()])
+    return comparison
+
+
+def compare_values(
+    paths: Sequence[Path],
+    axis: str,
+    values: Sequence[Any] = (),
+    *,
+    margin: float = 0.05,
+    confidence: float = 0.95,
+    metrics: Sequence[str] = (),
+) -> list[NamedComparison]:
+    """Compare the values of an axis of one sweep: each one with the first, by runs that are equal otherwise.
+
+    paths   stores or folders of results, which are combined
+    axis    axis, or a parameter that a distribution varies
+    values  values of the axis, the reference first; () for all, numbers in ascending order
+
+    Raise SettingError if a file is not a store, without such an axis or value, with a single value, if no runs are
+    equal, or for an unknown metric.
+    """
+    runs = list(stored_runs(paths))
+    known = values_of(runs)
+    name = next((name for name in known if axis_identity(name) == axis_identity(axis)), None)
+    if name is None:
+        hint = suggestion(axis, known) if known else "the runs vary by their seeds only"
+        raise SettingError(Diagnostic(f"--between: no axis {quoted(axis)}", hint))
+    for value in values:
+        if value not in known[name]:
+            hint = f"the runs have {', '.join(map(text_of_value, known[name]))}"
+            raise SettingError(Diagnostic(f"--between: no run has {name}={text_of_value(value)}", hint))
+    reference, *others = values or known[name]
+    if not others:
+        message = f"--between: a single value of {name} cannot be compared (got {text_of_value(reference)})"
+        raise SettingError(Diagnostic(message, f"the runs have {', '.join(map(text_of_value, known[name]))}"))
+    arms: dict[Any, list[StoredRun]] = {value: [] for value in (reference, *others)}
+    for run in runs:
+        if (value := value_of(run, name)) in arms:
+            arms[value].append(run)
+    first = _by_identity(arms[reference], paths, name)
+    comparisons = []
+    for value in others:
+        second = _by_identity(arms[value], paths, name)
+        comparison = _compared(first, second, margin, confidence, metrics)
+        counts = Counter(run.status for run in arms[value])
+        comparisons.append(NamedComparison(name, reference, value, comparison, counts))
+    compared = [named.comparison for named in comparisons if named.comparison is not None]
+    if not compared:
+        message = f"--between: no runs with a verdict are equal but for {name}"
+        raise SettingError(Diagnostic(message, "sweep all values over equal seeds"))
+    _check_metrics(metrics, compared, runs)
+    return comparisons
+
+
+def _compared(
+    one: Mapping[Identity, StoredRun],
+    other: Mapping[Identity, StoredRun],
+    margin: float,
+    confidence: float,
+    metrics: Sequence[str],
+) -> Comparison | None:
+    """Return the comparison of runs by identity; None if no pair has verdicts."""
+    # Sums of metrics do not depend on the order in which runs ended
+    pairs = [(one[key], other[key]) for key in sorted(one, key=repr) if key in other]
     judged = [pair for pair in pairs if all(run.status in (PASSED, FAILED) for run in pair)]
     if not judged:
-        raise SettingError(Diagnostic("the stores have no run with a verdict in common", "sweep both over equal seeds"))
+        return None
     verdicts = PairedVerdicts.of([a.status == PASSED for a, _ in judged], [b.status == PASSED for _, b in judged])
     with_verdict = sum(run.status in (PASSED, FAILED) for runs in (one, other) for run in runs.values())
     return Comparison(
@@ -83,26 +193,34 @@ def compare(
         verdicts.p_value_worse(margin),
         margin,
         confidence,
-        {name: _difference(name, judged, confidence) for name in metrics},
+        {name: change for name in metrics if (change := _difference(name, judged, confidence)) is not None},
     )
 
 
-def _by_identity(paths: Sequence[Path]) -> dict[Identity, StoredRun]:
-    runs = list(stored_runs(paths))
+def _by_identity(runs: Sequence[StoredRun], paths: Sequence[Path], axis: str = "") -> dict[Identity, StoredRun]:
+    """Return the runs by what they have in common with their partners."""
     if warning := indistinct(runs):
-        raise SettingError(Diagnostic(f"{', '.join(map(str, paths))}: {warning}", "sweep again into a new store"))
-    return {identity(run): run for run in runs}
+        hint = "sweep again into a new store, or give a folder of one session only"
+        raise SettingError(Diagnostic(f"{', '.join(map(str, paths))}: {warning}", hint))
+    return {partner_identity(run, axis) if axis else identity(run): run for run in runs}
 
 
-def _difference(name: str, pairs: Sequence[tuple[StoredRun, StoredRun]], confidence: float) -> PairedDifference:
+def _check_metrics(metrics: Sequence[str], comparisons: Sequence[Comparison], runs: Iterable[StoredRun]) -> None:
+    """Raise SettingError for a metric without a finite value in both runs of any pair."""
+    for name in metrics:
+        if not any(name in comparison.metrics for comparison in comparisons):
+            numbers = sorted({key for run in runs for key, value in run.result.items() if _is_finite(value)})
+            message = f"--metric: no pair of runs has finite numbers {name!r}"
+            raise SettingError(Diagnostic(message, f"known: {', '.join(numbers)}"))
+
+
+def _difference(name: str, pairs: Sequence[tuple[StoredRun, StoredRun]], confidence: float) -> PairedDifference | None:
+    """Return the difference of a metric; None without a pair of finite values."""
     values: list[tuple[Any, Any]] = [(a.result.get(name), b.result.get(name)) for a, b in pairs]
-    known = [(float(a), float(b)) for a, b in values if _is_finite(a) and _is_finite(b)]
-    if not known:
-        numbers = sorted({key for run, _ in pairs for key, value in run.result.items() if _is_finite(value)})
-        raise SettingError(
-            Diagnostic(f"--metric: no pair of runs has finite numbers {name!r}", f"known: {', '.join(numbers)}")
-        )
-    return paired_difference([a for a, _ in known], [b for _, b in known], confidence=confidence)
+    finite = [(float(a), float(b)) for a, b in values if _is_finite(a) and _is_finite(b)]
+    if not finite:
+        return None
+    return paired_difference([a for a, _ in finite], [b for _, b in finite], confidence=confidence)
 
 
 def _is_finite(value: object) -> bool:

@@ -15,6 +15,7 @@ import msgspec
 from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
+from eidrive_scenario.experiments.sweeps.result_folders import folder_runs, varying, with_axes
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
@@ -47,9 +48,29 @@ class PointSummary:
 
 
 def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
-    """Yield the runs of several stores; of equal runs, the last one with a verdict. Raise SettingError as a store."""
-    found = {run.key: run for run, _ in runs_with_stores(paths)}
-    return iter(sorted(found.values(), key=lambda run: (run.number, run.key)))
+    """Yield the runs of several stores and folders of results; of equal runs, the last one with a verdict.
+
+    Raise InputError for a damaged store or result.
+    """
+    (runs,) = stored_sides(paths)
+    return iter(runs)
+
+
+def stored_sides(*sides: Sequence[Path]) -> list[list[StoredRun]]:
+    """Return the runs of each side as `stored_runs`; settings that vary within any side are axes of all folders."""
+    stores = [[path for path in paths if not _has_results(path)] for paths in sides]
+    folders = [folder_runs([path for path in paths if _has_results(path)]) for paths in sides]
+    axes = {name for runs in folders for name in varying(runs)}
+    joined: list[list[StoredRun]] = []
+    for paths, runs in zip(stores, folders, strict=True):
+        last = _last_verdicts([*_all_runs(paths), *((run, Path()) for run in with_axes(runs, axes))])
+        joined.append(sorted((run for run, _ in last), key=lambda run: (run.number, run.key)))
+    return joined
+
+
+def _has_results(path: Path) -> bool:
+    """Whether a path is a folder or a file of results, not a store."""
+    return path.is_dir() or path.suffix == ".json"
 
 
 def runs_with_stores(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
@@ -57,18 +78,60 @@ def runs_with_stores(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
 
     Of equal runs, the last one counts that was not aborted or crashed, as another try may have a verdict.
     """
-    found: dict[str, tuple[StoredRun, Path]] = {}
+    yield from _last_verdicts(_all_runs(paths))
+
+
+def _all_runs(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
     for path in paths:
         with ResultStore.read(path) as store:
             for run in store.runs():
-                if run.key not in found or run.status not in REPEATABLE or found[run.key][0].status in REPEATABLE:
-                    found[run.key] = run, path
-    yield from found.values()
+                yield run, path
+
+
+def _last_verdicts(runs: Iterable[tuple[StoredRun, Path]]) -> Iterable[tuple[StoredRun, Path]]:
+    """Return the last run with each key, unless it alone was aborted or crashed."""
+    last: dict[str, tuple[StoredRun, Path]] = {}
+    for run, path in runs:
+        if run.key not in last or run.status not in REPEATABLE or last[run.key][0].status in REPEATABLE:
+            last[run.key] = run, path
+    return last.values()
 
 
 def identity(run: StoredRun) -> Identity:
     """Return what distinguishes a run from the others of its sweep."""
     return run.scenario, run.run, run.seed, tuple(sorted(run.point.items()))
+
+
+def partner_identity(run: StoredRun, axis: str) -> Identity:
+    """Return what a run has in common with those at other values of an axis or of a parameter of a distribution.
+
+    The numbers of the runs of a distribution depend on its parameters: all other parameters replace them.
+    """
+    varied = _varied_parameters(run)
+    others = {name: value for name, value in {**run.point, **varied}.items() if name != axis}
+    return run.scenario, None if axis in varied else run.run, run.seed, tuple(sorted(others.items()))
+
+
+def values_of(runs: Iterable[StoredRun]) -> dict[str, list[Any]]:
+    """Return the values of each axis, and of each parameter that a distribution varies.
+
+    Numbers are in ascending order, then texts in order of appearance.
+    """
+    points = [{**run.point, **_varied_parameters(run)} for run in runs]
+    values: dict[str, dict[Any, None]] = {}
+    for point in points:
+        for name, value in point.items():
+            values.setdefault(name, {})[value] = None
+    return {name: sorted(several, key=_number_first) for name, several in values.items()}
+
+
+def value_of(run: StoredRun, name: str) -> Any:
+    """Return the value of an axis, or of a parameter that a distribution varies; None without it."""
+    return run.point[name] if name in run.point else _varied_parameters(run).get(name)
+
+
+def _number_first(value: Any) -> tuple[bool, float]:
+    return (False, value) if isinstance(value, int | float) else (True, 0.0)
 
 
 def indistinct(runs: Sequence[StoredRun]) -> str:
@@ -212,7 +275,7 @@ def as_table(runs: Iterable[StoredRun]) -> tuple[list[str], list[dict[str, Any]]
 
 
 def read_results(*stores: str | Path) -> Any:
-    """Return the runs of one or several stores as a pandas DataFrame, one row per run.
+    """Return the runs of one or several stores or folders of results as a pandas DataFrame, one row per run.
 
     Raise SettingError if a file is not a store, or without pandas.
     """

@@ -1,0 +1,181 @@
+"""Results of `eidrive run --out` and of pytest as runs of a sweep: the settings that vary among them are its axes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+
+from eidrive_scenario.base.content_digest import sha256_of
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.experiments.sweeps.axes import PARAMETER, SETTINGS, Scalar, is_setting
+from eidrive_scenario.experiments.sweeps.store import ABORTED, FAILED, NOT_JUDGED, PASSED, StoredRun
+from eidrive_scenario.recording.recording import open_recording
+from eidrive_scenario.recording.run_files import RESULT, read_result, result_paths, unfinished_runs
+from eidrive_scenario.run_options import NO_COOPERATION, OPTIONS
+from eidrive_scenario.simulation.result import typed
+from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
+
+SCENARIO = "scenario"
+"""Name of the axis over the scenarios of a folder."""
+
+
+class _Verdict(msgspec.Struct):
+    """Verdict in the format of `--json`, as far as it is a part of a row."""
+
+    name: str
+    passed: bool
+    value: float | None = None
+    limit: float | None = None
+
+
+class _Settings(msgspec.Struct):
+    """Resolved settings of a run that may be values of axes."""
+
+    scenario: str
+    seed: int
+    run: int | None = None
+    parameters: dict[str, str] = {}
+    drawn: tuple[str, ...] = ()
+
+
+class _Result(msgspec.Struct):
+    """Result in the format of `--json`, as far as it is a part of a row."""
+
+    scenario: str
+    seed: int
+    passed: bool
+    end_reason: str
+    trace_hash: str
+    settings: dict[str, Any]
+    run: int | None = None
+    channel: str = ""
+    criteria: tuple[_Verdict, ...] = ()
+    metrics: dict[str, float | None] = {}
+    warnings: tuple[str, ...] = ()
+    simulated_s: float = 0.0
+    wall_s: float = 0.0
+    settings_sha256: str = ""
+    command: str = ""
+
+
+def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
+    """Return the runs whose results are in these files and folders, and the interrupted ones, which are aborted.
+
+    Their points have all settings that a sweep could vary (see `with_axes`). Raise InputError for a damaged result, and
+    for a location without runs.
+    """
+    runs: list[StoredRun] = []
+    for location in locations:
+        if not location.exists():
+            raise SettingError(
+                Diagnostic("no such file or folder", "give a store or a folder of results", str(location))
+            )
+        before = len(runs)
+        runs += [_finished(path, len(runs)) for path in result_paths([location])]
+        runs += _interrupted(location, len(runs))
+        if len(runs) == before:
+            hint = "give a store of a sweep, or a folder that eidrive run --out or pytest --eidrive-out wrote"
+            raise SettingError(Diagnostic(f"no {RESULT} in this folder", hint, str(location)))
+    return runs
+
+
+def varying(runs: Iterable[StoredRun]) -> set[str]:
+    """Return the names of the settings with several values among runs of folders."""
+    values: dict[str, set[Scalar]] = {}
+    for run in runs:
+        for name, value in run.point.items():
+            values.setdefault(name, set()).add(value)
+    return {name for name, several in values.items() if len(several) > 1}
+
+
+def with_axes(runs: Iterable[StoredRun], axes: set[str]) -> Iterator[StoredRun]:
+    """Yield the runs of folders with these axes only."""
+    for run in runs:
+        point = {name: value for name, value in run.point.items() if name in axes}
+        yield msgspec.structs.replace(run, point=point)
+
+
+def _finished(path: Path, number: int) -> StoredRun:
+    try:
+        result = msgspec.convert(read_result(path), _Result)
+        point = _point(result.settings)
+    except msgspec.ValidationError as error:
+        raise InputError(
+            Diagnostic(f"not the result of a run: {error}", f"give another {RESULT}", str(path))
+        ) from error
+    is_judged = result.passed or result.criteria or result.end_reason == TIME_LIMIT
+    verdicts = {
+        f"{verdict.name}.{key}": getattr(verdict, key)
+        for verdict in result.criteria
+        for key in ("passed", "value", "limit")
+    }
+    row = {
+        **{name: getattr(result, name) for name in ("channel", "passed", "end_reason", "simulated_s", "wall_s")},
+        "warnings": len(result.warnings),
+        **{option.name: result.settings.get(option.name) for option in OPTIONS if option.in_row},
+        **{f"parameter.{name}": typed(text) for name, text in result.settings.get("parameters", {}).items()},
+        **verdicts,
+        **result.metrics,
+        "settings_sha256": result.settings_sha256,
+        "trace_hash": result.trace_hash,
+    }
+    return StoredRun(
+        result.settings_sha256 or str(path),
+        number,
+        result.scenario,
+        result.run,
+        result.seed,
+        PASSED if result.passed else FAILED if is_judged else NOT_JUDGED,
+        point,
+        row,
+        "" if is_judged else "no criterion judges the run",
+        result.command,
+        result.wall_s,
+        json.dumps(result.settings),
+    )
+
+
+def _interrupted(location: Path, number: int) -> Iterator[StoredRun]:
+    """Yield the runs with a partial recording only, unless it ends before their settings."""
+    for path in unfinished_runs([location]):
+        try:
+            metadata = open_recording(path).metadata
+            text = metadata["settings"]
+            given = json.loads(text)
+            settings, point = msgspec.convert(given, _Settings), _point(given)
+        except (InputError, LookupError, ValueError):
+            continue
+        yield StoredRun(
+            sha256_of(text.encode()),
+            number,
+            settings.scenario,
+            settings.run,
+            settings.seed,
+            ABORTED,
+            point,
+            {},
+            f"{path}: the run did not end",
+            metadata.get("command", ""),
+            0.0,
+            text,
+        )
+
+
+def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
+    """Return the settings of a run that a sweep could vary, without those that the seed draws."""
+    known = msgspec.convert(settings, _Settings)
+    point: dict[str, Scalar] = {SCENARIO: known.scenario}
+    for name in SETTINGS:
+        value = settings.get(name)
+        if isinstance(value, list):  # the senders of `cooperate`
+            value = "+".join(map(str, value)) or NO_COOPERATION
+        if isinstance(value, str | int | float):
+            point[name] = value
+    for name, text in known.parameters.items():
+        if name not in known.drawn:
+            point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = cast("Scalar", typed(text))
+    return point

@@ -1,0 +1,97 @@
+"""Folders of results of `eidrive run` and pytest in place of stores."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from command_fixtures import Eidrive, eidrive
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.sweeps.comparison import compare, compare_values
+from eidrive_scenario.experiments.sweeps.results import stored_runs, stored_sides, summaries
+
+__all__ = ["eidrive"]
+
+
+@pytest.fixture
+def runs(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> Path:
+    """Return a folder with the runs of the speeds 5 and 30, of which the second fails, and of two seeds."""
+    for speed in ("5", "30.0"):
+        eidrive("run", scenario, "--param", f"Speed={speed}", "--repeat", "2", "--out", tmp_path / "runs" / speed)
+    return tmp_path / "runs"
+
+
+def test_settings_that_vary_are_the_axes(runs: Path) -> None:
+    rows = list(stored_runs([runs]))
+    assert {(one.point["Speed"], one.seed, one.status) for one in rows} == {
+        (5, 1, "passed"), (5, 2, "passed"), (30.0, 1, "failed"), (30.0, 2, "failed"),
+    }  # fmt: skip
+    assert all(set(one.point) == {"Speed"} for one in rows)
+    assert [dict(row.counts) for row in summaries(rows)] == [{"passed": 2}, {"failed": 2}]
+    result = json.loads(next(runs.rglob("result.json")).read_text(encoding="utf-8"))
+    row = next(one for one in rows if one.key == result["settings_sha256"])
+    assert (row.result["max_speed.value"], row.result["trace_hash"]) == (
+        result["criteria"][0]["value"],
+        result["trace_hash"],
+    )
+
+
+def test_folders_are_compared_as_stores(eidrive: Eidrive, runs: Path) -> None:
+    (between,) = compare_values([runs], "Speed")
+    assert between.comparison is not None
+    assert (between.first, between.second, between.comparison.verdicts.only_first) == (5, 30.0, 2)
+    separate = compare([runs / "5"], [runs / "30.0"])
+    assert separate == between.comparison
+    assert eidrive("results", runs, "--by", "Speed").exit_code == 0
+
+
+def test_values_that_vary_on_one_side_distinguish_runs_of_both(runs: Path) -> None:
+    """The second side has one speed, whose runs are the partners of the equal speed of the first side."""
+    sides = stored_sides([runs], [runs / "5"])
+    assert [one.point for one in sides[1]] == [{"Speed": 5}, {"Speed": 5}]
+    comparison = compare([runs], [runs / "5"])
+    assert (comparison.verdicts.both, comparison.unpaired, comparison.identical) == (2, 2, 2)
+
+
+def test_interrupted_run_is_aborted(runs: Path) -> None:
+    """A recording without a result has the settings of its run; one that has only begun is left out."""
+    folders = sorted(path.parent for path in runs.rglob("result.json") if "30.0" in str(path))
+    for folder in folders:
+        (folder / "result.json").unlink()
+        (folder / "recording.mcap").rename(folder / "recording.partial.mcap")
+    (folders[1] / "recording.partial.mcap").write_bytes(b"")
+    rows = list(stored_runs([runs]))
+    assert [(one.point["Speed"], one.status) for one in rows].count((30, "aborted")) == 1
+    assert len(rows) == 3
+    assert compare([runs / "5"], [runs / "5", folders[0]]).lost == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "not JSON"),
+        ('{"trace_hash": ""}', "not the result of a run: Object missing required field `scenario`"),
+        ('{"trace_hash": "", "scenario": "s", "seed": "x", "passed": true, "end_reason": "", "settings": {}}', "seed"),
+    ],
+)
+def test_damaged_result_is_an_error_that_names_the_file(runs: Path, text: str, message: str) -> None:
+    damaged = next(runs.rglob("result.json"))
+    damaged.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        stored_runs([runs])
+    assert message in str(caught.value)
+    assert str(damaged) in str(caught.value)
+
+
+def test_folder_without_results_is_an_error(tmp_path: Path, runs: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"no result\.json in this folder"):
+        stored_runs([runs, tmp_path / "empty"])
+
+
+def test_copies_of_a_run_count_once(runs: Path, tmp_path: Path) -> None:
+    shutil.copytree(runs, tmp_path / "copy")
+    assert len(list(stored_runs([runs, tmp_path / "copy"]))) == 4
