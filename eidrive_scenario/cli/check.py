@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from eidrive_scenario.base.wall_limit import LimitReached, limit_wall_time
-from eidrive_scenario.cli.options import HelpAll, takes_run_options
+from eidrive_scenario.cli.options import HelpAll, check_output_paths, takes_run_options
 from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError
@@ -33,6 +33,9 @@ def check(
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
     ] = None,
+    sarif: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a SARIF log, such as for code scanning.")
+    ] = None,
     help_all: HelpAll = False,
 ) -> None:
     """Print all diagnostics of scenarios, distributions and roads as `file:line: problem; hint`.
@@ -52,6 +55,8 @@ def check(
         check_seconds("--wall-limit", wall_limit)
         supervise(wall_limit, report_hang, what="check")
     missing: list[Diagnostic] = []
+    if sarif is not None:
+        check_output_paths({"--sarif": sarif}, paths)
     aborted: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     printed: dict[str, dict[Diagnostic, None]] = {"error": dict.fromkeys(missing), "warning": {}, "note": {}}
@@ -77,11 +82,22 @@ def check(
         if isinstance(report, DistributionCheckReport) and report.runs:
             echo(f"{path}: {_count(report.runs, 'run')}")
     print_unused_projects(printed["error"])
+    if sarif is not None:
+        _write_sarif(sarif, printed, aborted)
     counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in printed.items())]
     echo(", ".join(counts if printed["note"] else counts[:-1]))
     if aborted:
         raise typer.Exit(ABORTED)
     raise typer.Exit(INVALID_INPUT if printed["error"] or (strict and printed["warning"]) else 0)
+
+
+def _write_sarif(out: Path, printed: Mapping[str, Iterable[Diagnostic]], aborted: Sequence[BaseException]) -> None:
+    """Write the printed diagnostics, and the errors of checks that were aborted, as a SARIF log."""
+    from eidrive_scenario.checks.rule import Level
+    from eidrive_scenario.checks.sarif import write_sarif
+
+    diagnostics = [(Level(level), diagnostic) for level, several in printed.items() for diagnostic in several]
+    write_sarif(diagnostics, out, folder=Path.cwd(), aborted=[str(error) for error in aborted])
 
 
 def _check_file(path: Path, ignored: tuple[str, ...], settings: RunSettings, wall_limit: float | None) -> CheckReport:
