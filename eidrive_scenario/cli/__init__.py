@@ -39,6 +39,7 @@ FUNCTIONS = {
     "sweep": "sweep:sweep",
     "results": "results:results",
     "compare": "results:compare",
+    "schema": "schema:schema",
     "init": "init:init",
 }
 """Module of this package and function of each command, in the order of the help."""

@@ -138,7 +138,7 @@ def compare(
     ] = False,
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page.")] = None,
 ) -> None:
-    """Compare two sweeps of the same runs, or values of an axis of one, in pairs of runs with equal seeds.
+    """Compare two sweeps, or the values of an axis of one, in pairs with equal seeds.
 
     Example: eidrive compare release-1.db release-2.db --margin 0.02
 

@@ -81,6 +81,8 @@ def _sensors(value: Any) -> Any:
     return sensors
 
 
+_Listed = tuple[str, ...] | str
+_MessageKind = Literal["cpm", "cam"]
 _Sensor = Annotated[SerializeAsAny[SensorSettings], BeforeValidator(parse_sensor)]
 
 
@@ -143,18 +145,18 @@ class AgentSettings(Settings):
     field_of_view: Annotated[float, Field(gt=0.0, le=360.0)] | None = None
     visibility: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     mount: MountSetting = None
-    cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names)] = None
+    cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names, _Listed | None)] = None
     message_rate: Annotated[float, Field(ge=1e-3, le=10_000.0)] | None = None
     message_phase: Annotated[float, Field(ge=0.0, le=MAX_TIME)] | None = None
     report_timeout: Annotated[float, Field(gt=0.0, le=MAX_TIME)] | None = None
     antenna_height: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    messages: Annotated[tuple[Literal["cpm", "cam"], ...], BeforeValidator(_names)] = ("cpm",)
+    messages: Annotated[tuple[_MessageKind, ...], BeforeValidator(_names, tuple[_MessageKind, ...] | str)] = ("cpm",)
     generation: Literal["each_tick", "rate", "etsi"] | None = None
     mtu: Annotated[int, Field(ge=200, le=1_000_000)] = 1400
     security_bytes: Annotated[int, Field(ge=0, le=1_000_000)] = 0
     clock_offset: Annotated[float, Field(ge=-MAX_TIME, le=MAX_TIME)] = 0.0
     clock_drift: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
-    asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names)] = ()
+    asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names, _Listed)] = ()
     target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
     follow_speed_limit: bool = False
     planner_settings: SerializeAsAny[PlannerSettings] = PlannerSettings()

@@ -40,7 +40,9 @@ def _mount(value: Any) -> Any:
     return value
 
 
-MountSetting = Annotated[Mount | MountName | None, BeforeValidator(_mount)]
+MountSetting = Annotated[
+    Mount | MountName | None, BeforeValidator(_mount, Mount | MountName | tuple[float, ...] | None)
+]
 
 
 class SensorSettings(Settings):
@@ -110,10 +112,14 @@ class CameraSettings(SensorSettings):
     width: int = Field(default=800, ge=2, le=8192)
     height: int = Field(default=600, ge=2, le=8192)
     fov: float = Field(default=100.0, gt=0.0, lt=180.0)
-    distortion: Annotated[tuple[float, float, float, float, float], BeforeValidator(_distortion)] = (0.0,) * 5
+    distortion: Annotated[tuple[float, float, float, float, float], BeforeValidator(_distortion, tuple[float, ...])] = (
+        0.0,
+    ) * 5
     near: Annotated[float, Field(ge=1e-3, le=MAX_RANGE)] = 0.1
     far: Annotated[float, Field(ge=1e-3, le=MAX_RANGE)] = 500.0
-    noise: Annotated[NoiseSettings | None, BeforeValidator(_noise)] = NoiseSettings()
+    noise: Annotated[
+        NoiseSettings | None, BeforeValidator(_noise, NoiseSettings | Literal["none", "off", False] | None)
+    ] = NoiseSettings()
     f_number: Annotated[float, Field(ge=0.1, le=1000.0)] = 1.6
     exposure_time: Annotated[float, Field(ge=1e-9, le=100.0)] | None = None
     gain: Annotated[float, Field(ge=-20.0, le=80.0)] | None = None

@@ -260,7 +260,7 @@ class Nakagami(Settings):
     m: tuple[Shape, ...]
     distances: tuple[Annotated[float, Field(gt=0.0)], ...] = ()
 
-    @field_validator("m", mode="before")
+    @field_validator("m", mode="before", json_schema_input_type=tuple[Shape, ...] | Shape)
     @classmethod
     def _wrap_single_shape(cls, value: object) -> object:
         return (value,) if isinstance(value, int | float | str) else value

@@ -54,6 +54,9 @@ def _is_point(entry: Any) -> bool:
     )
 
 
+_Rectangle = tuple[float, float, float, float]
+
+
 class ConflictAreaSettings(PlannerSettings):
     """Settings of the planner `conflict_area`.
 
@@ -64,7 +67,9 @@ class ConflictAreaSettings(PlannerSettings):
 
     area_setting: ClassVar[str | None] = "conflict_area"
 
-    conflict_area: Annotated[tuple[Polygon, ...], BeforeValidator(_areas)]
+    conflict_area: Annotated[
+        tuple[Polygon, ...], BeforeValidator(_areas, tuple[Polygon | _Rectangle, ...] | Polygon | _Rectangle)
+    ]
     conflict_deceleration: PositiveFloat = 5.0
     conflict_hold_time: NonNegativeFloat = 1.05
 

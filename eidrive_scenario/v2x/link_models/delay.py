@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import quoted, shortened
 from eidrive_scenario.extensions.settings import Settings
@@ -18,6 +18,12 @@ MAX_BYTES = 32 * MIB
 """Maximum size of a file of measured delays [bytes]."""
 UNITS = {"s": 1.0, "ms": 1e-3}
 """Factor from each unit to seconds."""
+
+
+def _seconds_or_file(schema: dict[str, Any]) -> None:
+    """State in the JSON schema that either of both is required."""
+    schema["required"] = ["kind"]
+    schema["anyOf"] = [{"required": ["seconds"]}, {"required": ["file"]}]
 
 
 class TraceDelay(Settings):
@@ -30,6 +36,8 @@ class TraceDelay(Settings):
     replay   false: drawn from the values, with linear interpolation; true: message n of a link has value n, and the
              trace repeats
     """
+
+    model_config = ConfigDict(json_schema_extra=_seconds_or_file)
 
     kind: Literal["trace"]
     seconds: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1, repr=False)]

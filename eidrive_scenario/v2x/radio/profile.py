@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_validator
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.errors import suggestion
@@ -61,6 +61,11 @@ class PacketErrors(Settings):
         return self
 
 
+def _one_curve(value: Any) -> Any:
+    """Return the name of one curve as that of all states."""
+    return {"los": value, "nlosv": value, "nlos": value} if isinstance(value, str) else value
+
+
 class RadioProfile(ComposedProfile):
     """Settings of a radio channel; `delay` and `loss` apply in addition to the radio model.
 
@@ -94,7 +99,7 @@ class RadioProfile(ComposedProfile):
     shadowing_db: Annotated[float, Field(ge=0.0, le=30.0)] | None = None
     decorrelation: PositiveFloat | None = None
     fading: Fading = NoFading()
-    packet_errors: PacketErrors | None = None
+    packet_errors: Annotated[PacketErrors | None, BeforeValidator(_one_curve, PacketErrors | str | None)] = None
     data_rate_mbps: float = 6.0
     mtu: PositiveInt = 1400
     jitter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.01
@@ -103,14 +108,6 @@ class RadioProfile(ComposedProfile):
     congestion: CongestionControl = NoDcc()
     background: Background | None = None
     jammers: Annotated[tuple[Jammer, ...], Field(max_length=100)] = ()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _expand_curve_name(cls, data: Any) -> Any:
-        if isinstance(data, dict) and isinstance(data.get("packet_errors"), str):
-            name = data["packet_errors"]
-            return {**data, "packet_errors": {"los": name, "nlosv": name, "nlos": name}}
-        return data
 
     @model_validator(mode="after")
     def _check_combination(self) -> RadioProfile:
