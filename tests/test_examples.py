@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -31,6 +33,49 @@ def test_latency_sweep_high_latency_causes_collisions(tmp_path: Path) -> None:
     _, ideal, late = run("latency_sweep.py", "--seeds", "2", "--latency", "0", "0.3", folder=tmp_path)
     assert (ideal.split()[1], late.split()[1]) == ("2/2", "0/2")
     assert float(ideal.split()[-1]) > float(late.split()[-1])
+
+
+RECORDER = """
+import json
+from pathlib import Path
+
+calls = []
+
+def __getattr__(name):
+    def call(*arguments, **named):
+        calls.append([name, *arguments, named])
+        Path("calls.json").write_text(json.dumps(calls), encoding="utf-8")
+    return call
+"""
+
+
+@pytest.mark.process
+def test_mlflow_runs_logs_each_run_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that records calls takes the place of MLflow."""
+    (tmp_path / "mlflow.py").write_text(RECORDER, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    words = ("--channel", "ideal", "latency_300ms", "--seeds", "1")
+    assert run("mlflow_runs.py", *words, folder=tmp_path) == ["ideal 1 passed", "latency_300ms 1 failed"]
+    calls = json.loads((tmp_path / "calls.json").read_text(encoding="utf-8"))
+    names = [name for name, *_ in calls if name != "log_metric"]
+    one = ["start_run", "log_params", "log_metrics", "set_tags", "end_run", "end_run"]
+    assert names == 2 * one
+    ends = [arguments[0] for name, *arguments in calls if name == "end_run"]
+    assert ends == ["FINISHED", "KILLED", "FAILED", "KILLED"]
+    assert [arguments[0]["channel"] for name, *arguments in calls if name == "log_params"] == ["ideal", "latency_300ms"]
+    speeds = [arguments for name, *arguments in calls if name == "log_metric"]
+    assert (speeds[0][0], speeds[1][2]["step"] - speeds[0][2]["step"]) == ("speed", 50)
+
+
+def test_mlflow_runs_writes_a_local_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mlflow = pytest.importorskip("mlflow")
+    store = f"sqlite:///{tmp_path / 'mlflow.db'}"
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", store)
+    run("mlflow_runs.py", "--channel", "ideal", "latency_300ms", "--seeds", "1", folder=tmp_path)
+    mlflow.set_tracking_uri(store)
+    rows = mlflow.search_runs()
+    assert sorted(rows["status"]) == ["FAILED", "FINISHED"]
+    assert set(rows["params.channel"]) == {"ideal", "latency_300ms"}
 
 
 @pytest.mark.statistical
