@@ -91,6 +91,7 @@ class Collision(Criterion):
                     impact = judge_impact(view, self._before, self._of, other, x, y, self._lanes)
                 if not self._only_at_fault or (impact is not None and impact.at_fault):
                     self._hits.append(Hit(view.time, other, x, y, contact.impact_speed, impact))
+                    self.violated_with = self.violated_with or other
         self._before = view
 
     def verdict(self) -> Verdict:

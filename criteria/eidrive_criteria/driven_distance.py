@@ -41,15 +41,17 @@ class DrivenDistance(Criterion):
         self._was_present = False
         self._last: tuple[float, float] | None = None
         """Time and speed in the previous frame [s, m/s]; None while the actor is absent."""
-        self._late = False
+        self._expired: float | None = None
+        """Time of the first frame after the deadline [s]; None before it."""
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
         row, by = view.rows.get(self._settings.of), self._settings.by
-        self._late = by is not None and view.time > by + TIME_TOLERANCE
+        if self._expired is None and by is not None and view.time > by + TIME_TOLERANCE:
+            self._expired = view.time
         if row is None:
             self._last = None
-        if row is None or self._late:
+        if row is None or self._expired is not None:
             return
         self._was_present = True
         time, speed = view.time, abs(float(view.speed[row]))
@@ -60,12 +62,13 @@ class DrivenDistance(Criterion):
 
     def verdict(self) -> Verdict:
         of, limit, was_present = self._settings.of, self._settings.at_least, self._was_present
+        passed = was_present and self._distance >= limit
         return self.conclude(
-            was_present and self._distance >= limit,
+            passed,
             f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),
             value=self._distance if was_present else None,
             limit=limit,
-            is_final=self._late,
+            first_violation=None if passed else self._expired,
         )
 
     def metrics(self) -> Mapping[str, float]:

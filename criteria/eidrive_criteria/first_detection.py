@@ -34,15 +34,18 @@ class FirstDetection(PerceivedCriterion):
         super().__init__(settings)
         self._settings = settings
         self.subjects = (settings.of, settings.to)
-        self._other_was_present = self._late = False
+        self._other_was_present = False
         self._first: float | None = None
+        self._expired: float | None = None
+        """Time of the first frame after the deadline [s]; None before it."""
         self._distance = math.nan
         """Distance between the centers of both actors at the first detection [m]."""
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         self._other_was_present = self._other_was_present or settings.to in view.rows
-        self._late = settings.by is not None and view.time > settings.by + TIME_TOLERANCE
+        if self._expired is None and settings.by is not None and view.time > settings.by + TIME_TOLERANCE:
+            self._expired = view.time
         super().observe(frame)
 
     def evaluate(self, frame: Frame) -> None:
@@ -70,7 +73,7 @@ class FirstDetection(PerceivedCriterion):
             reason,
             value=self._first,
             limit=settings.by,
-            is_final=self._late and not in_time,
+            first_violation=None if in_time else self._expired,
         )
 
     def metrics(self) -> Mapping[str, float]:

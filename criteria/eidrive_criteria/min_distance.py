@@ -48,8 +48,11 @@ class MinDistance(PairCriterion):
         return center if self._measure == "center" else box
 
     def describe_smallest(self) -> str:
-        measure = "center to center" if self._measure == "center" else "box to box"
-        return f"{self.of} and {self.to} came within {self.smallest:.2f} m ({measure}) at {self.when:.2f} s"
+        measure, other = "center to center", f"boxes within {self._box:.2f} m"
+        if self._measure == "box":
+            measure, other = "box to box", f"centers within {self._center:.2f} m"
+        nearest = f"{self.of} and {self.to} came within {self.smallest:.2f} m ({measure}) at {self.when:.2f} s"
+        return f"{nearest}, {other}"
 
     def metrics(self) -> Mapping[str, float]:
         """Return both minimum distances [m] and the time of the evaluated one [s]; empty without a common frame."""

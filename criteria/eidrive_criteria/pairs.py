@@ -138,6 +138,8 @@ class LeaderCriterion(Criterion):
             return
         if self._extreme.add(value, view.time):
             self._other = leader.other
+        if self._extreme.violated is not None:
+            self.violated_with = self.violated_with or leader.other
 
     def verdict(self) -> Verdict:
         if self._missing:

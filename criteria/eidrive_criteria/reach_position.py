@@ -42,13 +42,15 @@ class ReachPosition(Criterion):
         self.subjects = (settings.of,)
         self._nearest = math.inf
         self._reached: float | None = None
-        self._late = False
+        self._expired: float | None = None
+        """Time of the first frame after the deadline [s]; None before it."""
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         row = view.rows.get(settings.of)
-        self._late = settings.by is not None and view.time > settings.by + TIME_TOLERANCE
-        if row is None or self._late:
+        if self._expired is None and settings.by is not None and view.time > settings.by + TIME_TOLERANCE:
+            self._expired = view.time
+        if row is None or self._expired is not None:
             return
         x, y, _ = view.position[row].tolist()
         distance = math.hypot(x - settings.x, y - settings.y)
@@ -71,7 +73,7 @@ class ReachPosition(Criterion):
             reason,
             value=self._nearest if math.isfinite(self._nearest) else None,
             limit=settings.within,
-            is_final=self._late,
+            first_violation=self._expired if self._reached is None else None,
         )
 
     def metrics(self) -> Mapping[str, float]:

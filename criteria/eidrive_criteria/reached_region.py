@@ -55,18 +55,21 @@ class ReachedRegion(Criterion):
         super().__init__(settings)
         self._settings, self._polygon = settings, settings.polygon()
         self.subjects = (settings.of,)
-        self._was_present = self._late = False
+        self._was_present = False
         self._reached: float | None = None
+        self._expired: float | None = None
+        """Time of the first frame after the deadline [s]; None before it."""
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         row = view.rows.get(settings.of)
-        self._late = settings.by is not None and view.time > settings.by + TIME_TOLERANCE
+        if self._expired is None and settings.by is not None and view.time > settings.by + TIME_TOLERANCE:
+            self._expired = view.time
         if row is None:
             return
         self._was_present = True
         x, y, *_ = view.plain_boxes[row]
-        if self._reached is None and not self._late and point_in_polygon(x, y, self._polygon):
+        if self._reached is None and self._expired is None and point_in_polygon(x, y, self._polygon):
             self._reached = view.time
 
     def verdict(self) -> Verdict:
@@ -79,7 +82,11 @@ class ReachedRegion(Criterion):
         else:
             reason = actor_never_present([settings.of])
         return self.conclude(
-            self._reached is not None, reason, value=self._reached, limit=settings.by, is_final=self._late
+            self._reached is not None,
+            reason,
+            value=self._reached,
+            limit=settings.by,
+            first_violation=self._expired if self._reached is None else None,
         )
 
     def metrics(self) -> Mapping[str, float]:

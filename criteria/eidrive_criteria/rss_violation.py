@@ -101,7 +101,8 @@ class RssViolation(Criterion):
             ratio = safety_ratio(self._model, found)
             if ratio < self._ratio:
                 self._ratio, self._when, self._other = ratio, view.time, found.other
-            violated = violated or ratio < 1.0
+            if ratio < 1.0:
+                violated, self.violated_with = True, self.violated_with or found.other
         if violated:
             self._violations += 1
             self._first = view.time if self._first is None else self._first

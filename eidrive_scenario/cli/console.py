@@ -116,6 +116,12 @@ def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
     for verdict in criteria:
         table.add_row(*_row(verdict))
     out.print(table)
+    for verdict in criteria:
+        if verdict.violation_state:
+            title, *lines = verdict.violation_state
+            out.print(Text(f"{verdict.name}: {title}"))
+            for line in lines:
+                out.print(Text(f"  {line}"))
 
 
 def _row(verdict: Verdict) -> tuple[Text, ...]:

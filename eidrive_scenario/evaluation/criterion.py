@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import Annotated, Any, ClassVar
 
@@ -14,7 +16,9 @@ from pydantic import Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, EidriveError, InvalidResult, SettingError, quoted
+from eidrive_scenario.evaluation.violation_state import LOOKBACK, describe_violation
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.recording.frame import Frame
@@ -36,6 +40,9 @@ class Verdict:
     reason: str
     fatal: bool = False
     """True if the failure ends the run. The failure must be final: no later event can fulfill the criterion."""
+    violation_state: tuple[str, ...] = field(default=(), compare=False)
+    """State of the stations at the first violation, as lines of text that begin with its time. A `CriteriaObserver`
+    sets it; empty if the criterion passed."""
 
 
 class CriterionSettings(Settings):
@@ -62,6 +69,8 @@ class Criterion(ABC):
     fatal: bool = False
     subjects: tuple[str, ...] = ()
     """Names of the required actors, checked against the entities of the scenario before the run."""
+    violated_with: str = ""
+    """Other actor of the first violation, if `subjects` does not contain it; empty if there is none."""
     monitors: tuple[str, ...] = ()
     """Names of the evaluated MonitorDeclarations, checked before the run."""
     demands_progress: bool = False
@@ -198,6 +207,85 @@ def _plain_number(number: object) -> float | None:
     return number if isinstance(number, int) and not isinstance(number, bool) else found
 
 
+class CriteriaObserver:
+    """Passes the frames of one run to its criteria, and describes the state at the first violation of each.
+
+    A criterion is asked for its verdict once per PERIOD only, so that a tick without a violation costs nothing. Frames
+    are held until its answer is known: those of PERIOD, and those before them that `describe_violation` needs.
+
+    criteria  of the run; the caller may append to the list between frames
+    """
+
+    PERIOD = 1.0
+    """Simulated time between two searches for violations [s]."""
+
+    def __init__(self, criteria: Sequence[Criterion]) -> None:
+        self._criteria = criteria
+        self._frames: deque[Frame] = deque()
+        self._due = 0.0
+        self._states: dict[int, tuple[float, tuple[str, ...]]] = {}
+        """Time and description of the first violation, as of the last verdict, by the id of the criterion."""
+
+    def observe(self, frame: Frame) -> None:
+        """Process one frame."""
+        for criterion in self._criteria:
+            criterion.observe(frame)
+        self._frames.append(frame)
+        time = frame.view.time
+        if time >= self._due:
+            self._due = time + self.PERIOD
+            self._search()
+            while self._frames[0].view.time < time - self.PERIOD - LOOKBACK:
+                self._frames.popleft()
+
+    def _search(self) -> None:
+        """Describe the violations since the last search."""
+        for criterion in self._criteria:
+            with suppress(Exception):  # The verdict counts at the end of the run, which reports its errors
+                violation = criterion.verdict().first_violation
+                if violation is not None:
+                    self._describe(criterion, float(violation))
+
+    def _describe(self, criterion: Criterion, violation: float) -> tuple[str, ...] | None:
+        """Return the state at a violation at a time [s]; None if its frame is not held any more."""
+        key = id(criterion)
+        if key in self._states and self._states[key][0] == violation:
+            return self._states[key][1]
+        frames = list(self._frames)
+        count = sum(frame.view.time < violation - TIME_TOLERANCE for frame in frames) + 1
+        is_held = count > 1 or abs(frames[0].view.time - violation) <= TIME_TOLERANCE
+        if not is_held or count > len(frames):
+            return None
+        state = f"first violation at {violation:.2f} s", *describe_violation(frames[:count], _actors(criterion))
+        self._states[key] = violation, state
+        return state
+
+    def verdicts(self, exit_verdict: Verdict | None = None) -> tuple[Verdict, ...]:
+        """Return the verdicts of all criteria over all frames, and of a command that has ended the run.
+
+        A failure without a first violation is judged at the last frame, which its state describes.
+        """
+        verdicts = [self._with_state(criterion, checked_verdict(criterion)) for criterion in self._criteria]
+        return tuple(verdicts if exit_verdict is None else [*verdicts, self._with_state(None, exit_verdict)])
+
+    def _with_state(self, criterion: Criterion | None, verdict: Verdict) -> Verdict:
+        if verdict.passed or not self._frames:
+            return verdict
+        violation = verdict.first_violation
+        if criterion is not None and violation is not None and (state := self._describe(criterion, violation)):
+            return replace(verdict, violation_state=state)
+        frames = list(self._frames)
+        end = f"state at the last tick, {frames[-1].view.time:.2f} s"
+        title = end if violation is None else f"first violation at {violation:.2f} s; {end}"
+        actors = () if criterion is None else _actors(criterion)
+        return replace(verdict, violation_state=(title, *describe_violation(frames, actors)))
+
+
+def _actors(criterion: Criterion) -> tuple[str, ...]:
+    """Return the actors that the first violation of a criterion concerns."""
+    return tuple(dict.fromkeys(name for name in (*criterion.subjects, criterion.violated_with) if name))
+
+
 def evaluate_criteria(
     frames: Iterable[Frame],
     criteria: Sequence[Criterion],
@@ -213,14 +301,14 @@ def evaluate_criteria(
     """
     for criterion in criteria:
         bind_roads(criterion, roads)
+    observer = CriteriaObserver(criteria)
     for frame in frames:
-        for criterion in criteria:
-            criterion.observe(frame)
+        observer.observe(frame)
     for criterion in criteria:
         criterion.observe_final_links(final_links)
     for criterion in criteria if links is not None else ():
         criterion.observe_links(links or {})
-    return tuple(checked_verdict(criterion) for criterion in criteria)
+    return observer.verdicts()
 
 
 def describe_criteria() -> Iterator[tuple[str, str, str, str]]:

@@ -16,7 +16,7 @@ from eidrive_scenario.evaluation.criteria_parser import (
     exit_verdict,
     parse_criteria,
 )
-from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads, checked_verdict
+from eidrive_scenario.evaluation.criterion import CriteriaObserver, Criterion, Verdict, bind_roads
 from eidrive_scenario.recording.frame import ExecutedCommand, Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
@@ -120,6 +120,7 @@ class _Judge:
         self._roads = roads
         self._outcome = outcome
         self._criteria: list[Criterion] = []
+        self._observer = CriteriaObserver(self._criteria)
         self._own = True
         self._exit: Verdict | None = None
         self._last: Frame | None = None
@@ -136,8 +137,7 @@ class _Judge:
         """Process a frame, and the commands before it."""
         for command in frame.commands if self._own else ():
             self._execute(command)
-        for criterion in self._criteria:
-            criterion.observe(frame)
+        self._observer.observe(frame)
         self._last = frame
 
     def _execute(self, command: ExecutedCommand) -> None:
@@ -168,8 +168,7 @@ class _Judge:
         for criterion in self._criteria:
             criterion.observe_final_links(() if outcome is None else outcome.final_links)
             criterion.observe_links(links)
-        verdicts = [plain_verdict(checked_verdict(criterion)) for criterion in self._criteria]
-        verdicts += [] if self._exit is None else [self._exit]
+        verdicts = list(map(plain_verdict, self._observer.verdicts(self._exit)))
         end = INCOMPLETE if outcome is None else outcome.end_reason
         code = exit_code_of(verdicts, end)
         warnings = [] if verdicts else [f"{UNJUDGED}; give one by --criterion, such as '{{collision: {{of: Ego}}}}'"]

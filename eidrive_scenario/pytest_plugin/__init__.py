@@ -7,7 +7,11 @@ parameter value distribution becomes as many tests for each of its runs, up to `
 
 from __future__ import annotations
 
-from eidrive_scenario.pytest_plugin.failures import pytest_runtest_makereport, pytest_runtest_setup
+from eidrive_scenario.pytest_plugin.failures import (
+    pytest_report_teststatus,
+    pytest_runtest_makereport,
+    pytest_runtest_setup,
+)
 from eidrive_scenario.pytest_plugin.fixture import pytest_generate_tests, run_scenario
 from eidrive_scenario.pytest_plugin.items import pytest_collect_file, pytest_sessionfinish, pytest_testnodedown
 from eidrive_scenario.pytest_plugin.options import pytest_report_header
@@ -30,6 +34,7 @@ __all__ = [
     "pytest_handlecrashitem",
     "pytest_load_initial_conftests",
     "pytest_report_header",
+    "pytest_report_teststatus",
     "pytest_runtest_makereport",
     "pytest_runtest_setup",
     "pytest_sessionfinish",

@@ -34,7 +34,8 @@ class RunRecord:
     """Facts about the runs of a test, most of them about those that did not pass.
 
     properties   entries of `user_properties` that the plugin has added
-    reasons      one line for each reason
+    essence      criterion, value and instant of the first failed run, in a few words
+    reasons      one line for each reason, and those of the state at the first violation
     commands     command lines that reproduce the runs
     attachments  recordings and results
     folders      folders of the files of all runs
@@ -42,6 +43,7 @@ class RunRecord:
     """
 
     properties: list[tuple[str, object]] = field(default_factory=list)
+    essence: str = ""
     reasons: list[str] = field(default_factory=list)
     commands: list[str] = field(default_factory=list)
     attachments: list[str] = field(default_factory=list)
@@ -73,9 +75,15 @@ def add_properties(item: pytest.Item, entries: Iterable[tuple[str, object]]) -> 
     item.user_properties.extend(added)
 
 
-def add_failed_run(item: pytest.Item, result: RunResult, file: Path) -> None:
-    """Record a run whose verdict is failed, or that is out of time."""
+def add_failures(item: pytest.Item, result: RunResult | RateVerdict, file: Path) -> None:
+    """Record a run that did not pass, or the first failed runs of a test of the success rate; nothing if it passed."""
     record = record_of(item)
+    for failure in failures_of(result):
+        record.essence = record.essence or essence(result)
+        _add_failed_run(record, failure, file)
+
+
+def _add_failed_run(record: RunRecord, result: RunResult, file: Path) -> None:
     record.reasons += reasons(result)
     record.commands += [result.command] if result.command else []
     if result.recording is not None:
@@ -134,6 +142,24 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     return report
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_report_teststatus(report: Any, config: pytest.Config) -> Generator[None, Any, Any]:
+    """Add the essence of a failed run to the word for its outcome, if the short summary would cut the reason.
+
+    pytest cuts what follows the name of the test at the width of the terminal, and a name may have that width.
+    """
+    status = yield
+    text = printable(getattr(report, "eidrive", {}).get("essence", ""))
+    if not text or status is None or status[0] not in ("failed", "error"):
+        return status
+    category, letter, word = status
+    name, *style = word if isinstance(word, tuple) else (word,)
+    fits = len(f"{name} {report.nodeid} - {text}") + len("...") <= config.get_terminal_writer().fullwidth
+    if not (fits and str(report.longrepr).startswith(text)):
+        name = f"{name} ({text})"
+    return category, letter, (name, *style) if style else name
+
+
 _SHOWN_FAILURES = 5
 """Number of failed runs that a failed test of the success rate explains."""
 
@@ -161,21 +187,56 @@ def explain_outcome(result: RunResult | RateVerdict) -> str:
 
 
 def explain(result: RunResult) -> str:
-    """Return the reasons of a failed run, its last state, the command that repeats it, and its recording."""
+    """Return the reasons of a failed run, the last state of its storyboard, the command that repeats it, and its
+    recording.
+
+    The first line is the first reason, because the short summary of pytest shows its beginning.
+    """
     from eidrive_scenario.experiments.commands import reproduction_lines
+    from eidrive_scenario.recording.text.run_log import LAST_DECISION
 
     run = "" if result.run is None else f"run {result.run} of "
     outcome = "is not judged" if result.exit_code == NOT_JUDGED else "failed"
     head = f"{run}{result.scenario} {outcome} with channel {result.channel}, seed {result.seed}"
-    return "\n".join([head, *reasons(result), *result.final_state, *reproduction_lines(result)])
+    state: Iterable[str] = result.final_state
+    if not has_no_verdict(result):  # Decisions are those at the first violation
+        state = (line for line in state if not line.startswith(LAST_DECISION))
+    return "\n".join([*reasons(result), head, *state, *reproduction_lines(result)])
 
 
 def reasons(result: RunResult) -> list[str]:
-    """Return a line for each failed criterion, and for a run without a verdict its reason."""
-    lines = [_reason(verdict) for verdict in result.criteria if not verdict.passed]
+    """Return lines for each failed criterion, the state at its first violation included, and the reason of a run
+    without a verdict."""
+    lines: list[str] = []
+    for verdict in result.criteria:
+        if not verdict.passed:
+            lines.append(f"{essential_facts(verdict)}: {verdict.reason}")
+            lines += [f"  {line}" for line in verdict.violation_state]
     if not lines or has_no_verdict(result):
         lines.append(_reason_without_verdict(result))
     return lines
+
+
+def essence(result: RunResult | RateVerdict) -> str:
+    """Return criterion, value, limit and instant of the first failed criterion of a run, or why it has none; the number
+    of passed runs of a test of the success rate."""
+    from eidrive_scenario.simulation import RunResult
+
+    if not isinstance(result, RunResult):
+        return f"{result.rate.successes} of {result.rate.trials} runs passed"
+    failed = next((verdict for verdict in result.criteria if not verdict.passed), None)
+    if failed is not None:
+        return essential_facts(failed)
+    return "not judged" if result.exit_code == NOT_JUDGED else f"{result.end_reason} at {result.simulated_s:.2f} s"
+
+
+def essential_facts(verdict: Verdict) -> str:
+    """Return `min_distance 0 m, limit 3 m, first violated at 1.75 s` of a failed verdict."""
+    value = "" if verdict.value is None else f" {verdict.value:.4g} {verdict.unit}".rstrip()
+    limit = "" if verdict.limit is None else f", limit {verdict.limit:.4g} {verdict.unit}".rstrip()
+    violation = verdict.first_violation
+    instant = "at the end" if violation is None else f"first violated at {violation:.2f} s"
+    return f"{verdict.name}{value}{limit}, {instant}"
 
 
 def has_no_verdict(result: RunResult | RateVerdict) -> bool:
@@ -201,14 +262,6 @@ def _reason_without_verdict(result: RunResult) -> str:
             "ini option eidrive_without_criteria to warn or pass"
         )
     return f"ended by its {result.end_reason} after {result.simulated_s:.2f} s"
-
-
-def _reason(verdict: Verdict) -> str:
-    quantities = (("value", verdict.value, verdict.unit), ("limit", verdict.limit, verdict.unit))
-    facts = [f"{name} {value:g} {unit}".rstrip() for name, value, unit in quantities if value is not None]
-    if verdict.first_violation is not None:
-        facts.append(f"first violated at {verdict.first_violation:.2f} s")
-    return f"{verdict.name}: {verdict.reason}" + (f" ({', '.join(facts)})" if facts else "")
 
 
 def failure_text(error: BaseException) -> str | None:

@@ -16,11 +16,10 @@ from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.pytest_plugin.failures import (
     add_error,
-    add_failed_run,
+    add_failures,
     add_properties,
     add_section,
     explain_outcome,
-    failures_of,
 )
 from eidrive_scenario.pytest_plugin.markers import run_markers, test_name
 from eidrive_scenario.pytest_plugin.option_values import path_beside
@@ -241,8 +240,7 @@ def _report_failures(item: pytest.Item, source: Source, result: RunResult | Rate
     if result.passed:
         return
     add_section(item, explain_outcome(result))
-    for failure in failures_of(result):
-        add_failed_run(item, failure, source if isinstance(source, Path) else item.path)
+    add_failures(item, result, source if isinstance(source, Path) else item.path)
 
 
 def _from_file(trace: TracebackType | None, file: str) -> TracebackType | None:

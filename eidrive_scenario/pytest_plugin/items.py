@@ -16,10 +16,9 @@ from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.pytest_plugin.failures import (
     ScenarioFailed,
     add_error,
-    add_failed_run,
+    add_failures,
     explain_outcome,
     failure_text,
-    failures_of,
     has_no_verdict,
 )
 from eidrive_scenario.pytest_plugin.markers import keywords, run_markers, test_name
@@ -72,8 +71,7 @@ class ScenarioItem(pytest.Item):
                 raise
             raise pytest.fail.Exception(text, pytrace=False) from None
         file = self.path if self.run is None else self.run.scenario
-        for failure in failures_of(self._result):
-            add_failed_run(self, failure, file)
+        add_failures(self, self._result, file)
         if has_no_verdict(self._result):
             raise pytest.fail.Exception(explain_outcome(self._result), pytrace=False)
 

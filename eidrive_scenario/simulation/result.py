@@ -112,7 +112,8 @@ class RunResult:
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """Return the object of a verdict that `--json` prints."""
-    return {key: getattr(verdict, key) for key in ("name", "passed", "value", "limit", "unit", "reason")}
+    keys = ("name", "passed", "value", "limit", "unit", "reason", "first_violation")
+    return {**{key: getattr(verdict, key) for key in keys}, "violation_state": list(verdict.violation_state)}
 
 
 def result_row(result: RunResult) -> dict[str, Scalar]:
@@ -168,7 +169,7 @@ def result_html(result: RunResult) -> str:
     rows = "".join(
         f"<tr><td>{escape(verdict.name)}</td><td>{'passed' if verdict.passed else 'failed'}</td>"
         f"<td>{_quantity(verdict.value, verdict.unit)}</td><td>{_quantity(verdict.limit, verdict.unit)}</td>"
-        f'<td style="text-align:left">{escape(verdict.reason)}</td></tr>'
+        f'<td style="text-align:left">{"<br>".join(map(escape, (verdict.reason, *verdict.violation_state)))}</td></tr>'
         for verdict in result.criteria
     )
     heads = "".join(f"<th>{head}</th>" for head in ("criterion", "", "value", "limit", "reason"))
@@ -184,9 +185,11 @@ def result_html(result: RunResult) -> str:
 
 
 def outcome_word(result: RunResult) -> str:
-    """Return `passed`, `not passed`, or `not judged` for a run without criteria."""
+    """Return `passed`, `failed` by a criterion, `not passed` by a time limit, or `not judged` without criteria."""
     if result.exit_code == NOT_JUDGED:
         return "not judged"
+    if not all(verdict.passed for verdict in result.criteria):
+        return "failed"
     return "passed" if result.passed else "not passed"
 
 

@@ -10,7 +10,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED, Diagnostic
-from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
+from eidrive_scenario.evaluation.criterion import CriteriaObserver, Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.frame import Frame
@@ -84,6 +84,7 @@ def build_result(
     *,
     settings: ResolvedSettings,
     measures: RunMeasures,
+    observer: CriteriaObserver,
     late_warnings: Iterator[str],
     no_criteria: bool = False,
 ) -> RunResult:
@@ -92,7 +93,7 @@ def build_result(
     links = dict(stack.link_statistics(frame.view.time))
     for criterion in state.criteria:
         criterion.observe_links(links)
-    verdicts = final_verdicts(state.criteria, state.exit)
+    verdicts = observer.verdicts(state.exit)
     exit_code = exit_code_of(verdicts, end.reason, no_criteria=no_criteria)
     unjudged = [] if verdicts else [UNJUDGED if no_criteria else f"{UNJUDGED}; {HOW_TO_JUDGE}"]
     metrics = criteria_metrics(state.criteria)
@@ -119,12 +120,6 @@ def build_result(
         settings=settings,
         final_state=measures.final_state.lines(),
     )
-
-
-def final_verdicts(criteria: Sequence[Criterion], exit_verdict: Verdict | None) -> tuple[Verdict, ...]:
-    """Return the verdicts of all criteria, and of the command that has ended the run."""
-    verdicts = [checked_verdict(criterion) for criterion in criteria]
-    return tuple(verdicts if exit_verdict is None else [*verdicts, exit_verdict])
 
 
 def criteria_metrics(criteria: Sequence[Criterion]) -> dict[str, float]:

@@ -15,6 +15,7 @@ from eidrive_scenario.driving.stack import StackFactory
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import StationAction
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
+from eidrive_scenario.evaluation.criterion import CriteriaObserver
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import Pose
@@ -78,6 +79,7 @@ class Simulation:
         """Whether the run may get a verdict: by a criterion, or by a command that ends it."""
         self._state = setup.state()
         self.criteria = self._state.criteria
+        self._criteria_observer = CriteriaObserver(self.criteria)
         self._measures = RunMeasures(self.stack)
         self._outside = OutsideInputs(dict(self.settings.user_values))
         self._begun: Tick | None = None
@@ -242,8 +244,7 @@ class Simulation:
         )
         self._measures.observe(frame, commands.driven)
         self._observers.observe(frame)
-        for criterion in self.criteria:
-            criterion.observe(frame)
+        self._criteria_observer.observe(frame)
         end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)
         if end is None:
             self._links = self.stack.send(steps, view.time)
@@ -264,6 +265,7 @@ class Simulation:
             self._ended,
             settings=self.resolved,
             measures=self._measures,
+            observer=self._criteria_observer,
             late_warnings=late_warnings(self.scenario, self.storyboard, self._measures.motionless, values, self._ended),
             no_criteria=self.settings.no_criteria,
         )

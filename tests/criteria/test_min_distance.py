@@ -24,7 +24,13 @@ def test_min_distance_measures_center_and_box(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria(passing(frame, car), [distance])
     # Perpendicular at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
     assert verdict == Verdict(
-        "min_distance", True, 5.0, None, "m", None, "Ego and Incoming came within 5.00 m (center to center) at 2.00 s"
+        "min_distance",
+        True,
+        5.0,
+        None,
+        "m",
+        None,
+        "Ego and Incoming came within 5.00 m (center to center) at 2.00 s, boxes within 2.00 m",
     )
     assert distance.metrics() == {
         "min_distance.Ego.Incoming.center": 5.0,
@@ -50,7 +56,7 @@ def test_min_distance_by_default_measures_between_bodies(frame: Any, car: Any) -
     (verdict,) = evaluate_criteria(passing(frame, car), [criterion(at_least=2.5)])
     assert (verdict.passed, verdict.first_violation) == (False, 2.0)
     assert verdict.value == pytest.approx(2.0)
-    assert verdict.reason == "Ego and Incoming came within 2.00 m (box to box) at 2.00 s"
+    assert verdict.reason == "Ego and Incoming came within 2.00 m (box to box) at 2.00 s, centers within 5.00 m"
 
 
 def test_min_distance_of_a_crash_fails_every_limit_by_default(frame: Any, car: Any) -> None:

@@ -159,6 +159,8 @@ def describe_change(change: StateChange) -> str:
 
 
 _STORYBOARD = "storyboard"
+LAST_DECISION = "last decision of "
+"""Start of the lines about decisions in a final state."""
 _SHOWN = 5
 """Maximum number of running events that are listed."""
 
@@ -213,7 +215,7 @@ class FinalState:
             yield f"last change: {last.time:.2f} s {element} {describe_change(last)}"
         for name, step in frame.steps.items():
             if step.plan is not None:
-                yield f"decision of {name}: {_decision(step.plan)}: {step.plan.reason}"
+                yield f"{LAST_DECISION}{name}: {describe_decision(step.plan)}: {step.plan.reason}"
 
     def _storyboard(self, now: float) -> str:
         if self._end is None:
@@ -222,7 +224,8 @@ class FinalState:
         return f"{how} at {self._end.time:.2f} s" + (f": {self._end.why}" if self._end.why else "")
 
 
-def _decision(plan: Plan) -> str:
+def describe_decision(plan: Plan) -> str:
+    """Return what a plan does at its start, without its reason."""
     if plan.braking is not None:
         return f"brake with {plan.braking:.1f} m/s²"
     if len(plan.speeds) == 0:

@@ -20,14 +20,12 @@ from eidrive_scenario.reporting.run_report.rates import (
     success_rate,
 )
 from eidrive_scenario.reporting.run_report.report_origin import report_origin
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
+from eidrive_scenario.reporting.run_report.reported_runs import OUTCOMES, ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup, group_runs
 from eidrive_scenario.reporting.run_report.run_table import (
-    OUTCOMES,
     failure_reason,
     headline,
     metric_titles,
-    outcome,
     run_table,
 )
 
@@ -72,7 +70,7 @@ def write_report(
     runs = [run for group in groups for run in group.distinct]
     metrics = _common_metrics(runs)
     titles = metric_titles(runs)
-    counts = Counter(map(outcome, runs))
+    counts = Counter(run.outcome for run in runs)
     overview = sorted(enumerate(groups), key=_rate_order) if len(groups) > MOST_GROUPS else list(enumerate(groups))
     title = headline(runs)
     failures = [run for run in runs if not run.passed]
@@ -89,7 +87,6 @@ def write_report(
         table=run_table(groups),
         failures=failures[:MOST_WITHOUT_SCRIPT],
         unlisted=len(failures[MOST_WITHOUT_SCRIPT:]),
-        outcome=outcome,
         failure_reason=failure_reason,
         metrics=[titles[name] for name in metrics],
         groups=[

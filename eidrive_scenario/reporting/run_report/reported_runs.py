@@ -26,6 +26,10 @@ _OF_REPORT = ("folder", "replay", "axes", "sweep")
 """Fields that are no part of a result."""
 
 
+OUTCOMES = ("failed", "did not finish", "not judged", "passed")
+"""Outcomes of a run in the order of pages: what needs attention comes first."""
+
+
 class ReportedCriterion(BaseModel):
     """Verdict in the format of `--json`."""
 
@@ -37,6 +41,9 @@ class ReportedCriterion(BaseModel):
     limit: float | None = None
     unit: str = ""
     reason: str = ""
+    first_violation: float | None = None
+    violation_state: tuple[str, ...] = ()
+    """Lines about the stations at the first violation, of which the first has its time; empty for older results."""
 
 
 class ReportedRun(BaseModel):
@@ -84,6 +91,16 @@ class ReportedRun(BaseModel):
     def is_judged(self) -> bool:
         """False for a run that ended without a criterion, unless it was accepted as it is."""
         return self.passed or bool(self.criteria) or not self.finished
+
+    @property
+    def outcome(self) -> str:
+        """Return one of OUTCOMES: a run that reached its time limit did not finish, unless a criterion failed."""
+        if self.passed:
+            return "passed"
+        if not self.is_judged:
+            return "not judged"
+        has_failed = any(not criterion.passed for criterion in self.criteria)
+        return "failed" if self.finished or has_failed else "did not finish"
 
     @property
     def finished(self) -> bool:

@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedCriterion, ReportedRun
+from eidrive_scenario.reporting.run_report.reported_runs import OUTCOMES, ReportedCriterion, ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 from eidrive_scenario.reporting.run_report.settings_text import flatten
 
-OUTCOMES = ("failed", "did not finish", "not judged", "passed")
-"""Outcomes of a run in the order of the page: what needs attention comes first."""
 _SHOWN_SETTINGS = 4
 """Maximum number of settings that differ, and of varied values, that have a column from the start."""
 _SHOWN_LETTERS = 24
@@ -20,15 +18,6 @@ _EXACT = 2**53
 """Integers below are exact in JavaScript; others, such as large seeds, are texts."""
 _UNITS = {"count": "", "at_fault": "", "impact_speed": "m/s", "time": "s", "margin": "", "changed": "s"}
 """Units that differ from the unit of the criterion, by the last part of the name of the metric."""
-
-
-def outcome(run: ReportedRun) -> str:
-    """Return the outcome of a run, one of OUTCOMES."""
-    if run.passed:
-        return "passed"
-    if not run.finished:
-        return "did not finish"
-    return "failed" if run.is_judged else "not judged"
 
 
 def failure_reason(criterion: ReportedCriterion) -> str:
@@ -63,7 +52,7 @@ def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
     those that differ from the first run with the same set follow.
     """
     entries = [(run, number) for number, group in enumerate(groups) for run in group.distinct]
-    entries.sort(key=lambda entry: OUTCOMES.index(outcome(entry[0])))
+    entries.sort(key=lambda entry: OUTCOMES.index(entry[0].outcome))
     runs = [run for run, _ in entries]
     numbers = [number for _, number in entries]
     texts = _Numbered()
@@ -87,7 +76,7 @@ def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
             _column("simulated [s]", [run.simulated_s for run in runs], texts),
             _column("settings", [run.settings_sha256[:10] for run in runs], texts, is_shown=False),
         ],
-        "outcomes": [OUTCOMES.index(outcome(run)) for run in runs],
+        "outcomes": [OUTCOMES.index(run.outcome) for run in runs],
         "groups": numbers,
         "groupNames": [" · ".join([group.scenario, group.channel, *_settings_of(group)]) for group in groups],
         "criteria": [[_verdict(criterion, kinds, texts) for criterion in run.criteria] for run in runs],
@@ -121,10 +110,12 @@ class _Numbered:
 
 
 def _verdict(criterion: ReportedCriterion, kinds: _Numbered, texts: _Numbered) -> list[Any]:
-    """Return kind (name, limit, unit), whether the criterion passed, its value, and its reason."""
+    """Return kind (name, limit, unit), whether the criterion passed, value, reason, and the lines of the state at its
+    first violation."""
     reason = criterion.reason if criterion.passed else failure_reason(criterion)
     kind = kinds[criterion.name, criterion.limit, criterion.unit]
-    return [kind, int(criterion.passed), _rounded(criterion.value), texts[reason]]
+    state = (texts[line] for line in criterion.violation_state)
+    return [kind, int(criterion.passed), _rounded(criterion.value), texts[reason], *state]
 
 
 def _columns(groups: Sequence[RunGroup], runs: Sequence[ReportedRun], texts: _Numbered) -> list[dict[str, Any]]:
@@ -185,7 +176,7 @@ def common_failures(runs: Sequence[ReportedRun]) -> Mapping[str, int]:
     """Return the number of failed runs of each criterion that failed, the most frequent ones first."""
     counts: dict[str, int] = {}
     for run in runs:
-        if outcome(run) == "failed":
+        if run.outcome == "failed":
             for name in dict.fromkeys(criterion.name for criterion in run.criteria if not criterion.passed):
                 counts[name] = counts.get(name, 0) + 1
     return dict(sorted(counts.items(), key=lambda entry: -entry[1]))
@@ -197,7 +188,7 @@ _NAMED = 4
 
 def headline(runs: Sequence[ReportedRun]) -> str:
     """Return what failed in one line, such as `3 of 40 runs failed: collision (2), min_distance (1)`."""
-    counts = {name: sum(outcome(run) == name for run in runs) for name in OUTCOMES}
+    counts = {name: sum(run.outcome == name for run in runs) for name in OUTCOMES}
     several = len(runs) > 1
     if counts["passed"] == len(runs):
         return f"All {len(runs)} runs passed" if several else "The run passed"

@@ -59,7 +59,8 @@ def test_json_option_prints_one_object_per_run(eidrive: Eidrive, passing_by: Pat
         "wall_s",
     }
     assert expected <= set(first)
-    assert set(first["criteria"][0]) == {"name", "passed", "value", "limit", "unit", "reason"}
+    verdict = {"name", "passed", "value", "limit", "unit", "reason", "first_violation", "violation_state"}
+    assert set(first["criteria"][0]) == verdict
     assert first["passed"] is True
     assert first["end_reason"] == "stop trigger"
     assert first["metrics"]["min_distance.Ego.Parked.center"] == pytest.approx(5.0)

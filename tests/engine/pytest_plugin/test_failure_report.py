@@ -1,4 +1,4 @@
-"""Text of a failed run: criterion, value, limit, time, last state, decision, command and recording."""
+"""Text of a failed run: criterion, value, limit, time, state at the violation, last state, command and recording."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def test_failed_run_is_explained_with_state_and_decision(tmp_path: Path) -> None
     """A driven vehicle exceeds its speed limit; the stop trigger fires in the first tick after one second."""
     scenario = write_scenario(tmp_path / "a b.xosc", criterion="max_speed: {of: Ego, at_most: 1}", end=1.0)
     text = explain(run_and_save(scenario, seed=2, below=tmp_path / "kept")).splitlines()
-    assert text[0] == "a b failed with channel none, seed 2"
-    speed = re.match(r"max_speed: .*\(value (\S+) m/s, limit 1 m/s, first violated at 0\.00 s\)$", text[1])
+    speed = re.match(r"max_speed (\S+) m/s, limit 1 m/s, first violated at 0\.00 s: Ego drove up to ", text[0])
     assert speed is not None
     assert float(speed[1]) == pytest.approx(5.0, abs=0.5)
-    assert text[2] == "storyboard: stopped at 1.05 s: simulation time 1.05 s > 1 s"
-    assert text[3].startswith("running events: ")
-    decisions = [line for line in text if line.startswith("decision of ")]
-    assert any(
-        re.match(r"decision of Ego: drive at \d+\.\d m/s, acceleration -?\d+\.\d m/s²: \w+", one) for one in decisions
-    )
+    assert text[1] == "  first violation at 0.00 s"
+    assert re.match(r"  decision of Ego: drive at \d+\.\d m/s, acceleration -?\d+\.\d m/s²: \w+", text[2])
+    assert text[3] == "  Ego received no message so far"
+    assert text[4] == "a b failed with channel none, seed 2"
+    assert text[5] == "storyboard: stopped at 1.05 s: simulation time 1.05 s > 1 s"
+    assert text[6].startswith("running events: ")
+    assert not any(line.startswith("last decision of ") for line in text)
     assert f"reproduce: eidrive run '{scenario}' --seed 2" in text
     assert Path(text[-1].removeprefix("recording: ")).is_file()
 

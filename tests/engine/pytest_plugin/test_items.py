@@ -24,8 +24,8 @@ def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> N
     result.stdout.fnmatch_lines_random(
         [
             "*failed with channel *, seed 1",
-            "collision: Ego and Parked hit each other at 1.6* s at *",
-            "min_distance: Ego and Parked came within * m (*) at * s (value * m, limit 3 m, first violated at * s)",
+            "collision 1, limit 0, first violated at 1.6* s: Ego and Parked hit each other at 1.6* s at *",
+            "min_distance * m, limit 3 m, first violated at * s: Ego and Parked came within * m (*) at * s, *",
             "*wrong.xosc:61: *did you mean 'step'?",
         ]
     )

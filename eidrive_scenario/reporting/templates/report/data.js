@@ -36,9 +36,9 @@ function short(value) {
 
 /* Return the criteria of a run. */
 function criteriaOf(run) {
-  return data.criteria[run].map(([kind, passed, value, reason]) => {
+  return data.criteria[run].map(([kind, passed, value, reason, ...state]) => {
     const [name, limit, unit] = data.kinds[kind];
-    return { name, limit, unit, passed: Boolean(passed), value, reason: text(reason) };
+    return { name, limit, unit, passed: Boolean(passed), value, reason: text(reason), state: state.map(text) };
   });
 }
 

@@ -27,6 +27,7 @@ function criterionItem(criterion, metrics) {
     make("strong", null, criterion.name), " ", make("span", { class: verdict }, verdict), " ",
     make("span", { class: "values" }, values.filter(Boolean).join(", ")),
     ...(criterion.reason ? [make("div", null, criterion.reason)] : []),
+    ...criterion.state.map((line) => make("div", { class: "setting" }, line)),
     ...(own.length ? [make("div", { class: "setting" }, own.map(([title, value]) => measured(title.slice(criterion.name.length + 1), value)).join(" · "))] : []));
 }
 
