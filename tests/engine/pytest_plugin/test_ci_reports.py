@@ -87,7 +87,9 @@ def test_github_session_writes_annotations_and_summary_once(
     commands = [line for line in result.outlines if line.startswith("::")]
     declared = PASSING_BY.read_text(encoding="utf-8").splitlines()
     near, wrong = sorted(commands)
-    found = re.match(r"::error file=xosc/near\.xosc,line=(\d+),title=[^:]*::collision: ", near)
+    found = re.match(
+        r"::error file=xosc/near\.xosc,line=(\d+),title=[^:]*::collision 1, limit 0, first violated at ", near
+    )
     assert found is not None
     assert "collision" in declared[int(found[1]) - 1]
     assert wrong.startswith("::error file=xosc/wrong.xosc,line=61,title=xosc/wrong.xosc%3A%3Axosc/wrong[seed=1]::")

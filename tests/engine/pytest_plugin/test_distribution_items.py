@@ -97,8 +97,8 @@ def test_distribution_items_have_outcomes_and_properties(
     result.assert_outcomes(passed=1, failed=1, skipped=1)
     result.stdout.fnmatch_lines(
         [
+            "collision 1, limit 0, first violated at 1.6* s: Ego and Parked hit each other at 1.6* s at *",
             "run 1 of passing_by failed with channel *, seed 1",
-            "collision: Ego and Parked hit each other at 1.6* s at *",
             f"SKIPPED * excluded by constraints: {path}:6: parameter 'OtherY' is '9', outside its constraints;*",
         ]
     )

@@ -55,6 +55,25 @@ def test_running_event_is_part_of_state(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
+@pytest.mark.parametrize("workers", [(), ("-n", "1")])
+def test_short_summary_contains_reason_at_any_width(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, workers: tuple[str, ...]
+) -> None:
+    """pytest shows the message behind the name only as far as the terminal is wide; here the name has 90 columns."""
+    monkeypatch.delenv("CI", raising=False)
+    name = "a" * 38
+    text = PASSING_BY.read_text(encoding="utf-8")
+    (pytester.path / f"{name}.xosc").write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
+    reason = r"collision 1, limit 0, first violated at 1\.6\d s"
+    test = rf"{name}\.xosc::{name}\[seed=1\]"
+    for columns, line in ((80, rf"FAILED \({reason}\) {test}"), (200, rf"FAILED {test} - {reason}: Ego and Parked.*")):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        result = pytester.runpytest_subprocess(f"{name}.xosc", "-p", "no:cacheprovider", *workers)
+        (summary,) = [one for one in result.outlines if one.startswith("FAILED")]
+        assert re.fullmatch(line, summary)
+
+
+@pytest.mark.process
 def test_command_of_options_reproduces_run(pytester: pytest.Pytester) -> None:
     """The pasted command gives the same verdict in another folder, with every option that needs quotes."""
     folder = pytester.mkdir("it's a folder")
