@@ -39,7 +39,9 @@ def test_options_drive_and_judge_scenario_files(project: pytest.Pytester) -> Non
     result = run(project, "drives", *options, "--eidrive-criterion", "{collision: {of: Ego}}", "--junitxml", "j.xml")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["eidrive: drive Ego=slow.yaml, criterion limit.yaml,{collision: {of: Ego}}"])
-    result.stdout.fnmatch_lines(["max_speed: *", f"reproduce: eidrive run *--drive Ego={project.path}/slow.yaml *"])
+    result.stdout.fnmatch_lines(
+        ["max_speed * m/s, limit 9 *", f"reproduce: eidrive run *--drive Ego={project.path}/slow.yaml *"]
+    )
     found = properties(project)
     assert found["settings.drive"] == '["Ego"]'
     assert float(found["max_speed.value"] or 0.0) > 9.0

@@ -33,7 +33,7 @@ def test_run_without_criteria_is_an_error(bare: pytest.Pytester) -> None:
     result = run(bare, "--junitxml", "junit.xml")
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines(
-        ["far is not judged with channel *, seed 1", f"{WORDS}; add one to the scenario or by --eidrive-criterion *"]
+        [f"{WORDS}; add one to the scenario or by --eidrive-criterion *", "far is not judged with channel *, seed 1"]
     )
     (case,) = ElementTree.parse(bare.path / "junit.xml").iter("testcase")
     error = case.find("error")
