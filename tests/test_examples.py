@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import json
 import os
@@ -132,3 +133,24 @@ def test_stable_baselines_trains_a_policy(tmp_path: Path) -> None:
     assert head.split() == ["latency", "[s]", "passed"]
     assert [row.split()[0] for row in rows] == ["0", "0.15", "0.3", "0.45", "0.6"]
     assert (tmp_path / "ppo.zip").is_file()
+
+
+def test_notebook_cells_show_the_stated_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Texts of the outputs of all cells, executed in their order and in one namespace."""
+    pytest.importorskip("pandas")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    cells = json.loads((EXAMPLES / "quickstart.ipynb").read_text(encoding="utf-8"))["cells"]
+    shown = 0
+    for cell in cells:
+        if cell["cell_type"] != "code":
+            continue
+        *statements, last = ast.parse("".join(cell["source"])).body
+        exec(compile(ast.Module(statements, []), "cell", "exec"), names)
+        assert isinstance(last, ast.Expr)
+        value = eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+        (output,) = cell["outputs"]
+        assert repr(value) == "".join(output["data"]["text/plain"])
+        shown += 1
+    assert shown == 5
+    assert (tmp_path / "report" / "report.html").is_file()

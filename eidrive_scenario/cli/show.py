@@ -212,7 +212,7 @@ def view(
         str | None, typer.Option(help="Station of pictures and films.", show_default="the first that drives")
     ] = None,
 ) -> None:
-    """Write a recorded run, or two with a common time axis, as an HTML replay, or its top view as pictures.
+    """Write one or two recorded runs as an HTML replay, or the top view of one as pictures.
 
     Example: eidrive view reports/scenario_1 --browser
     """

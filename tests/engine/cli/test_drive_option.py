@@ -44,7 +44,10 @@ def test_command_of_a_driven_run_repeats_it(tmp_path: Path, eidrive: Eidrive, pa
         (("--drive", "Ego="), "--drive: no entity or stack is given (got 'Ego='); expected NAME, NAME=FILE.yaml or"),
         (("--drive", "={planner: route}"), "--drive: no entity or stack is given"),
         (("--drive", "Ego", "--drive", "Ego={range: 5}"), "--drive: entity 'Ego' is given twice"),
-        (("--drive", "Ego=none.yaml"), "--drive Ego: no file 'none.yaml'; give the path of a YAML file, or a mapping"),
+        (
+            ("--drive", "Ego=no_such_stack.yaml"),
+            "--drive Ego: no file 'no_such_stack.yaml'; give the path of a YAML file, or a mapping",
+        ),
         (("--drive", "Ego={planner: }}"), "--drive Ego:1: not valid YAML"),
         (("--drive", "Ego={planner: rout}"), "--drive Ego: unknown planner 'rout'; did you mean 'route'?"),
         (("--criterion", "c.yaml"), "--criterion: no file 'c.yaml'"),

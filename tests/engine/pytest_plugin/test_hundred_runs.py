@@ -73,7 +73,7 @@ def test_broken_runs_are_reported_as_what_they_are(junit: Path) -> None:
     assert (endless[0], fails[0], invalid[0], killed[0]) == ("error", "failure", "error", "error")
     assert "detector 'hangs' (faulty:Hangs) of station 'Ego'" in endless[1]
     assert f"after {LIMIT} s of wall time (the wall limit)" in endless[1]
-    assert "max_speed: " in fails[1]
+    assert "max_speed 5 m/s, limit 1 m/s" in fails[1]
     assert "limit 1 m/s" in fails[1]
     assert "invalid.xosc:" in invalid[1]
     assert "the process of the run was ended by SIGKILL" in killed[1]

@@ -28,7 +28,7 @@ def listed_runs(page: Path) -> list[dict[str, Any]]:
             run[column["title"]] = value if column["number"] else text[value]
         run["criteria"] = {
             data["kinds"][kind][0]: (bool(passed), value, *data["kinds"][kind][1:], text[reason])
-            for kind, passed, value, reason in data["criteria"][index]
+            for kind, passed, value, reason, *_ in data["criteria"][index]
         }
         metrics, *values = data["metrics"][index]
         run["metrics"] = dict(zip(data["metricSets"][metrics], values, strict=True))

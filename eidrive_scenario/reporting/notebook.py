@@ -1,0 +1,123 @@
+"""Runs and scenarios in a notebook: verdicts with a replay, and pictures; pages of runs."""
+
+from __future__ import annotations
+
+import html
+import io
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from matplotlib.figure import Figure
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition, resolve_scenario
+from eidrive_scenario.recording.recording import open_recording
+from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in, result_of
+from eidrive_scenario.reporting.drawing.scenario_figure import roads_figure, scenario_figure
+from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, paper_style, write_figure
+from eidrive_scenario.reporting.replay.page import make_replay
+from eidrive_scenario.reporting.report_files import report_files
+from eidrive_scenario.simulation import RunResult
+
+HEIGHT = 900
+"""Default height of a replay in a notebook [px]."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Content that a notebook displays as HTML, and a console as text."""
+
+    html: str
+    text: str
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Figure that a notebook displays as SVG; `write` writes an .svg, .pdf or .png file."""
+
+    figure: Figure
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Write the figure in the format of the suffix of a path."""
+        write_figure(self.figure, Path(path))
+
+    def _repr_svg_(self) -> str:
+        text = io.StringIO()
+        with paper_style():
+            self.figure.savefig(text, format="svg", metadata={"Date": None})
+        return text.getvalue()
+
+
+def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> Shown:
+    """Return the verdicts of a run and, if it was recorded, its replay for the output of a notebook.
+
+    run     result of a run, or the folder or recording of one
+    height  of the replay [px]
+
+    Raise InputError if there is no recording at a path, or none of its frames can be read.
+    """
+    if isinstance(run, RunResult):
+        recording, verdicts = run.recording, run._repr_html_()
+        text = str(run)
+    else:
+        recording, verdicts = recording_in(Path(run)), ""
+        text = str(recording)
+    return Shown(verdicts + ("" if recording is None else _replay_frame(recording, height)), text)
+
+
+def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | None = None) -> Picture:
+    """Return the picture of a scenario before its run, or of a road file.
+
+    source   file .xosc or .xodr, or name of a scenario of the library
+    size     width and height [mm]
+    station  whose view is shaded; by default the first that drives
+
+    Raise InputError for an invalid file, SettingError for a station of a road file.
+    """
+    path = Path(source)
+    if path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads":
+        if station is not None:
+            raise SettingError(Diagnostic("a road file has no stations", "give a scenario"))
+        return Picture(roads_figure(path, size))
+    return Picture(scenario_figure(resolve_scenario(source), size, station))
+
+
+def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:
+    """Write the report of runs, as `eidrive report` does, with a replay of each recorded run; return its path.
+
+    runs  folders of runs, their parents, and stores of sweeps
+    out   file of the page if it ends in `.html`, else the folder of `report.html`
+
+    Raise InputError without any result.
+    """
+    return report_files([Path(run) for run in runs], Path(out))
+
+
+def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Path:
+    """Write the replay of a run, as `eidrive view` does, and return its path.
+
+    recording  a recording, or the folder of a run
+
+    Raise InputError if no frame can be read.
+    """
+    path = recording_in(Path(recording))
+    result = result_of(path)
+    replay = make_replay(
+        open_recording(path), Path(out), result, result_file=path.with_name(RESULT), complete=not is_partial(path)
+    )
+    return replay.page
+
+
+def _replay_frame(recording: Path, height: int) -> str:
+    """Return the replay as an element of HTML that contains its page."""
+    with TemporaryDirectory() as folder:
+        page = write_replay(recording, Path(folder, "replay.html")).read_text(encoding="utf-8")
+    return f'<iframe style="width:100%;height:{height}px;border:0" srcdoc="{html.escape(page)}"></iframe>'
