@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from eidrive_scenario.extensions.library import library_path, resolve_scenario
-from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
+from eidrive_scenario.simulation import Simulation, load_for_seed
 
 SCENARIO = "coop/scenario_1"
 DEFAULT: Mapping[str, str] = {}
@@ -31,9 +31,9 @@ class RunTime(NamedTuple):
 
 
 def run(detector: str, properties: Mapping[str, str], seed: int) -> RunTime:
-    """Run the scenario once; `properties` are those of the controllers of the stations."""
-    with _scenario(properties) as path:
-        simulation = Simulation(load_for_seed(path, seed, {}), seed=seed, settings=RunSettings(detector=detector))
+    """Run the scenario once; `properties` are added to those of the controllers of the stations."""
+    with _scenario({"detector": detector, **properties}) as path:
+        simulation = Simulation(load_for_seed(path, seed, {}), seed=seed)
         start = time.process_time()
         result = simulation.run()
         times = time.process_time() - start
@@ -42,15 +42,12 @@ def run(detector: str, properties: Mapping[str, str], seed: int) -> RunTime:
 
 @contextmanager
 def _scenario(properties: Mapping[str, str]) -> Iterator[Path]:
-    """Yield the path of the scenario, or of a copy with these properties."""
+    """Yield the path of a copy of the scenario with these properties."""
     path = resolve_scenario(SCENARIO)
-    if not properties:
-        yield path
-        return
     text = path.read_text(encoding="utf-8").replace('"../', f'"{library_path()}/')
     oracle = '<Property name="detector" value="oracle"/>'
     added = "".join(f'<Property name="{name}" value="{value}"/>' for name, value in properties.items())
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
-        copy.write_text(text.replace(oracle, oracle + added), encoding="utf-8")
+        copy.write_text(text.replace(oracle, added), encoding="utf-8")
         yield copy

@@ -3,7 +3,7 @@
     pip install stable-baselines3
     python examples/train_sb3.py --steps 100000 --out crossing_ppo.zip
 
-Each environment has a process of its own and one of the latencies of the task (`crossing_task.py`). The same seed gives
+Each environment has a separate process and one of the latencies of the task (`crossing_task.py`). The same seed gives
 the same episodes.
 """
 

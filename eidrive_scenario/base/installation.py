@@ -1,4 +1,4 @@
-"""How this distribution was installed (PEP 610), and the commands that install it again or add optional dependencies.
+"""Origin of the installed distribution (PEP 610), and the commands that install it again or add optional dependencies.
 
 The distribution is on no package index, so a command names the repository, the wheel or the folder that it came from.
 """

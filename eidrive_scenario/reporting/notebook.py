@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import os
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -26,7 +27,7 @@ HEIGHT = 900
 
 
 @dataclass(frozen=True)
-class Shown:
+class RunDisplay:
     """Content that a notebook displays as HTML, and a console as text."""
 
     html: str
@@ -56,7 +57,7 @@ class Picture:
         return text.getvalue()
 
 
-def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> Shown:
+def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> RunDisplay:
     """Return the verdicts of a run and, if it was recorded, its replay for the output of a notebook.
 
     run     result of a run, or the folder or recording of one
@@ -70,7 +71,7 @@ def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> Shown:
     else:
         recording, verdicts = recording_in(Path(run)), ""
         text = str(recording)
-    return Shown(verdicts + ("" if recording is None else _replay_frame(recording, height)), text)
+    return RunDisplay(verdicts + ("" if recording is None else _replay_frame(recording, height)), text)
 
 
 def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | None = None) -> Picture:
@@ -87,7 +88,7 @@ def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | 
         if station is not None:
             raise SettingError(Diagnostic("a road file has no stations", "give a scenario"))
         return Picture(roads_figure(path, size))
-    return Picture(scenario_figure(resolve_scenario(source), size, station))
+    return Picture(scenario_figure(resolve_scenario(os.fspath(source)), size, station))
 
 
 def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:
