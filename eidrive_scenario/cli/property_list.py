@@ -83,13 +83,13 @@ def _of_model(owner: str, model: type[BaseModel], above: str = "") -> Iterator[P
 
 def descriptions(model: type[BaseModel]) -> dict[str, str]:
     """Return what the documentation of a model and of its fields says about each setting, by name."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for cls in reversed(model.__mro__):
         if issubclass(cls, BaseModel) and cls is not BaseModel:
             inline = _INLINE.findall(cls.__doc__ or "")
-            found |= {name: f"[{unit}]" for names, unit in inline for name in names.split(", ")}
-            found |= _documented(cls.__doc__ or "") | _field_texts(cls)
-    return found
+            texts |= {name: f"[{unit}]" for names, unit in inline for name in names.split(", ")}
+            texts |= _documented(cls.__doc__ or "") | _field_texts(cls)
+    return texts
 
 
 def _documented(text: str) -> dict[str, str]:
@@ -97,21 +97,21 @@ def _documented(text: str) -> dict[str, str]:
 
     Several names in one line have one unit, or one each in this order.
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     names: Sequence[str] = ()
     for line in inspect.cleandoc(text).splitlines():
         entry = _ENTRY.match(line)
         if entry:
             names = [name.strip() for name in entry[1].split(",")]
             units = _UNIT.findall(entry[2])
-            found |= dict.fromkeys(names, entry[2])
+            texts |= dict.fromkeys(names, entry[2])
             if len(units) == len(names):
-                found |= {name: f"{_UNIT.sub('', entry[2])} [{unit}]" for name, unit in zip(names, units, strict=True)}
+                texts |= {name: f"{_UNIT.sub('', entry[2])} [{unit}]" for name, unit in zip(names, units, strict=True)}
         elif names and line.startswith("    "):
-            found |= {name: f"{found[name]} {line.strip()}" for name in names}
+            texts |= {name: f"{texts[name]} {line.strip()}" for name in names}
         else:
             names = ()
-    return found
+    return texts
 
 
 def _field_texts(model: type[BaseModel]) -> dict[str, str]:

@@ -109,11 +109,11 @@ def compare(
     Raise SettingError if a file is not a store, if no runs are equal, or for an unknown metric.
     """
     sides = stored_sides(first, second)
-    one, other = (_by_identity(runs, paths) for runs, paths in zip(sides, (first, second), strict=True))
-    comparison = _compared(one, other, margin, confidence, metrics)
+    base, changed = (_by_identity(runs, paths) for runs, paths in zip(sides, (first, second), strict=True))
+    comparison = _compared(base, changed, margin, confidence, metrics)
     if comparison is None:
         raise SettingError(Diagnostic("the stores have no run with a verdict in common", "sweep both over equal seeds"))
-    _check_metrics(metrics, [comparison], [*one.values(), *other.values()])
+    _check_metrics(metrics, [comparison], [*base.values(), *changed.values()])
     return comparison
 
 
@@ -136,19 +136,19 @@ def compare_values(
     equal, or for an unknown metric.
     """
     runs = list(stored_runs(paths))
-    known = values_of(runs)
-    name = next((name for name in known if axis_identity(name) == axis_identity(axis)), None)
+    axes = values_of(runs)
+    name = next((name for name in axes if axis_identity(name) == axis_identity(axis)), None)
     if name is None:
-        hint = suggestion(axis, known) if known else "the runs vary by their seeds only"
+        hint = suggestion(axis, axes) if axes else "the runs vary by their seeds only"
         raise SettingError(Diagnostic(f"--between: no axis {quoted(axis)}", hint))
     for value in values:
-        if value not in known[name]:
-            hint = f"the runs have {', '.join(map(text_of_value, known[name]))}"
+        if value not in axes[name]:
+            hint = f"the runs have {', '.join(map(text_of_value, axes[name]))}"
             raise SettingError(Diagnostic(f"--between: no run has {name}={text_of_value(value)}", hint))
-    reference, *others = values or known[name]
+    reference, *others = values or axes[name]
     if not others:
         message = f"--between: a single value of {name} cannot be compared (got {text_of_value(reference)})"
-        raise SettingError(Diagnostic(message, f"the runs have {', '.join(map(text_of_value, known[name]))}"))
+        raise SettingError(Diagnostic(message, f"the runs have {', '.join(map(text_of_value, axes[name]))}"))
     arms: dict[Any, list[StoredRun]] = {value: [] for value in (reference, *others)}
     for run in runs:
         if (value := value_of(run, name)) in arms:
@@ -169,20 +169,20 @@ def compare_values(
 
 
 def _compared(
-    one: Mapping[Identity, StoredRun],
-    other: Mapping[Identity, StoredRun],
+    base: Mapping[Identity, StoredRun],
+    changed: Mapping[Identity, StoredRun],
     margin: float,
     confidence: float,
     metrics: Sequence[str],
 ) -> Comparison | None:
     """Return the comparison of runs by identity; None if no pair has verdicts."""
     # Sums of metrics do not depend on the order in which runs ended
-    pairs = [(one[key], other[key]) for key in sorted(one, key=repr) if key in other]
+    pairs = [(base[key], changed[key]) for key in sorted(base, key=repr) if key in changed]
     judged = [pair for pair in pairs if all(run.status in (PASSED, FAILED) for run in pair)]
     if not judged:
         return None
     verdicts = PairedVerdicts.of([a.status == PASSED for a, _ in judged], [b.status == PASSED for _, b in judged])
-    with_verdict = sum(run.status in (PASSED, FAILED) for runs in (one, other) for run in runs.values())
+    with_verdict = sum(run.status in (PASSED, FAILED) for runs in (base, changed) for run in runs.values())
     return Comparison(
         verdicts,
         with_verdict - 2 * len(judged),

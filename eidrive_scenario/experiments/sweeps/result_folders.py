@@ -167,15 +167,15 @@ def _interrupted(location: Path, number: int) -> Iterator[StoredRun]:
 
 def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
     """Return the settings of a run that a sweep could vary, without those that the seed draws."""
-    known = msgspec.convert(settings, _Settings)
-    point: dict[str, Scalar] = {SCENARIO: known.scenario}
+    resolved = msgspec.convert(settings, _Settings)
+    point: dict[str, Scalar] = {SCENARIO: resolved.scenario}
     for name in SETTINGS:
         value = settings.get(name)
         if isinstance(value, list):  # the senders of `cooperate`
             value = "+".join(map(str, value)) or NO_COOPERATION
         if isinstance(value, str | int | float):
             point[name] = value
-    for name, text in known.parameters.items():
-        if name not in known.drawn:
+    for name, text in resolved.parameters.items():
+        if name not in resolved.drawn:
             point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = cast("Scalar", typed(text))
     return point

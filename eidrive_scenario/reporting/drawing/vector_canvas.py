@@ -192,8 +192,8 @@ class VectorCanvas(LegendEntries):
         line = height - _PAD - label_height / 2.0
         ends = [self._point(_PAD, line), self._point(_PAD + bar, line)]
         ticks = [(self._point(x, line - 2.5), self._point(x, line + 2.5)) for x in (_PAD, _PAD + bar)]
-        for one, other in (ends, *ticks):
-            self._axes.plot(*zip(one, other, strict=True), color=STATION, lw=1.2, zorder=1e6)
+        for begin, end in (ends, *ticks):
+            self._axes.plot(*zip(begin, end, strict=True), color=STATION, lw=1.2, zorder=1e6)
         x, y = self._point(2.0 * _PAD + bar, height - _PAD)
         self._axes.text(x, y, text, fontsize=self._points(1.0), color=STATION, zorder=1e6)
 
