@@ -12,10 +12,12 @@ from eidrive_scenario.reporting.drawing.canvas import Canvas, ellipse_of_95_perc
 from eidrive_scenario.reporting.drawing.image_canvas import Image, ImageCanvas
 from eidrive_scenario.reporting.drawing.labels import Rectangle, wrapped, write_labels
 from eidrive_scenario.reporting.drawing.top_view import (
+    BRAKING,
     FUSED,
     LINK,
     LOST,
     OWN,
+    PLAN,
     RECEIVED,
     STATION,
     WHITE,
@@ -74,7 +76,7 @@ def draw_snapshot(canvas: Canvas, snapshot: StationSnapshot, roads: RoadDrawing)
 def _draw_plan(canvas: Canvas, snapshot: StationSnapshot) -> None:
     plan = snapshot.step.plan if snapshot.step else None
     if plan is not None and len(plan.points) > 1 and np.isfinite(plan.points).all():
-        color, legend = (LINK, "planned path") if plan.braking is None else (LOST, "planned path, braking")
+        color, legend = (PLAN, "planned path") if plan.braking is None else (BRAKING, "planned path, braking")
         canvas.line(plan.points, color, 0.4, legend=legend)
 
 
@@ -129,5 +131,5 @@ def _write_labels(canvas: Canvas, snapshot: StationSnapshot) -> None:
     texts = []
     for row in order:
         speed = float(view.speed[row])
-        texts.append(f"{view.names[row]}  {3.6 * speed:.0f} km/h" if abs(speed) > 0.05 else view.names[row])
+        texts.append(f"{view.names[row]}  {speed:.1f} m/s" if abs(speed) > 0.05 else view.names[row])
     write_labels(canvas, texts, [footprint(view.boxes[row]) for row in order], titles)

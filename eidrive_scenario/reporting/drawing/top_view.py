@@ -19,6 +19,7 @@ from eidrive_scenario.reporting.snapshot import StationSnapshot
 
 OWN, RECEIVED, LINK, LOST, AREA = "#2563eb", "#ea580c", "#0f9d58", "#dc2626", "#eab308"
 FUSED, TRUTH, STATION = "#7c3aed", "#334155", "#0f172a"
+PLAN, BRAKING = "#075985", "#831843"
 LANES = {
     "sidewalk": "#e7e1d5",
     "median": "#dbe5d0",

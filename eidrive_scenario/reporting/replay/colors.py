@@ -11,6 +11,7 @@ from typing import Any
 
 from eidrive_scenario.reporting.drawing.canvas import HOUSE
 from eidrive_scenario.reporting.drawing.top_view import (
+    BRAKING,
     FUSED,
     GROUND,
     LANE,
@@ -19,6 +20,7 @@ from eidrive_scenario.reporting.drawing.top_view import (
     LOST,
     OWN,
     PAINT,
+    PLAN,
     RECEIVED,
     STATION,
     TRUTH,
@@ -29,8 +31,8 @@ COLORS: dict[str, dict[str, Any]] = {
     "light": {
         "own": OWN,
         "fused": FUSED,
-        "plan": "#075985",
-        "braking": "#831843",
+        "plan": PLAN,
+        "braking": BRAKING,
         "link": LINK,
         "lost": LOST,
         "senders": [RECEIVED, "#c026d3", "#a16207", "#4d7c0f", "#be123c", "#92400e"],
