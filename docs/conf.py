@@ -42,6 +42,7 @@ _MODULES = (
     "run",
     "live",
     "experiments",
+    "report",
     "pages",
 )
 _API = "eidrive_scenario.api"

@@ -20,7 +20,7 @@ from eidrive_scenario.reporting.drawing.vector_canvas import write_figure as wri
 from eidrive_scenario.reporting.page import png_address as png_address
 from eidrive_scenario.reporting.page import write_page as write_page
 from eidrive_scenario.reporting.replay.page import write_replays as write_replays
-from eidrive_scenario.reporting.run_report.report import write_report as write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report as write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun as ReportedRun
 from eidrive_scenario.reporting.run_report.reported_runs import run_of_result as run_of_result
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder as SnapshotBuilder

@@ -12,7 +12,7 @@ from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinishe
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, write_figure
 from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.rates import rate_figures
-from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, read_runs
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
@@ -60,7 +60,7 @@ def report_files(
             warn(line)
     if figures is not None and not write_rate_figures(results, figures, size or DEFAULT_SIZE):
         warn("--figures: the report has no curve and no heat map: no number varies between its runs")
-    return write_report(results, out, omitted=omitted, unjudged=unjudged)
+    return write_run_report(results, out, omitted=omitted, unjudged=unjudged)
 
 
 def write_rate_figures(runs: Sequence[ReportedRun], folder: Path, size: Size) -> int:

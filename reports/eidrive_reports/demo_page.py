@@ -37,7 +37,7 @@ from eidrive_scenario.api.pages import (
     png_address,
     roads_symbol,
     top_view,
-    write_report,
+    write_run_report,
 )
 
 HEADINGS = (
@@ -142,7 +142,7 @@ def write_demo(
         }
         for table in (links, own)
     }
-    return write_report(
+    return write_run_report(
         runs,
         out,
         template="demo.html.jinja",

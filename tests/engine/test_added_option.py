@@ -39,7 +39,7 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.experiments.sweeps.axes import parse_axis, settings_at
-from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
 from eidrive_scenario.simulation import RunSettings, run_file
@@ -80,7 +80,7 @@ assert [settings_at({axis.name: value}, settings, None).fog for value in axis.va
 
 # Report
 assert run_facts(parse_run(result).settings)["fog"] == "thick"
-write_report([parse_run(result)], Path("report"))
+write_run_report([parse_run(result)], Path("report"))
 assert "thick" in next(Path("report").rglob("*.html")).read_text(encoding="utf-8")
 
 # pytest: option, ini option, header, settings of a run

@@ -19,7 +19,7 @@ from eidrive_scenario.export.tables import write_csv
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.text.run_log import RunLog
 from eidrive_scenario.reporting.replay.page import make_replay
-from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 from eidrive_scenario.simulation.run_outcome import expired_messages
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
@@ -72,13 +72,13 @@ def test_expired_messages_are_in_recording_replay_tables_and_log(late: RunResult
 
 
 def test_expired_messages_are_in_report(late: RunResult, tmp_path: Path) -> None:
-    page = html.fromstring(write_report([late.as_json()], tmp_path).read_text(encoding="utf-8"))
+    page = html.fromstring(write_run_report([late.as_json()], tmp_path).read_text(encoding="utf-8"))
     (table,) = page.iterfind(".//table[@class='overview']")
     titles = [str(cell.xpath("string()")) for cell in table.iterfind("thead/tr/th")]
     cells = [str(cell.xpath("string()")) for cell in table.iterfind("tbody/tr/td")]
     assert cells[titles.index("messages expiredmean (range)")] == f"{RECEIVED:.2f}"
     timely = {**late.as_json(), "metrics": {**late.metrics, "messages.expired": 0.0}}
-    page = html.fromstring(write_report([timely], tmp_path).read_text(encoding="utf-8"))
+    page = html.fromstring(write_run_report([timely], tmp_path).read_text(encoding="utf-8"))
     assert "messages expired" not in str(page.xpath("string(//table[@class='overview'])"))
 
 

@@ -43,7 +43,7 @@ EXPIRED = "messages.expired"
 """Metric of the messages that were too old on arrival."""
 
 
-def write_report(
+def write_run_report(
     results: Iterable[Mapping[str, Any] | ReportedRun],
     out: Path,
     *,

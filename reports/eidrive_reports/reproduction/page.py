@@ -17,7 +17,14 @@ from eidrive_reports.reproduction.parts import PARTS
 from eidrive_reports.reproduction.provenance import read_provenance
 from eidrive_scenario.api.common import Diagnostic, SettingError, load_json
 from eidrive_scenario.api.experiments import resolve_scenario, run_jobs
-from eidrive_scenario.api.pages import ReportedRun, png_address, run_of_result, write_page, write_replays, write_report
+from eidrive_scenario.api.pages import (
+    ReportedRun,
+    png_address,
+    run_of_result,
+    write_page,
+    write_replays,
+    write_run_report,
+)
 from eidrive_scenario.api.run import run_and_save
 
 
@@ -38,7 +45,7 @@ def write_part_replays(
         task = partial(_recorded_run, below=Path(recordings))
         runs = run_jobs(part.jobs(1, detectors), task, workers=workers, console=console, title=f"{part.name}, replays")
         linked, omitted = write_replays(runs, page.parent)
-    return write_report(linked, page, omitted=omitted)
+    return write_run_report(linked, page, omitted=omitted)
 
 
 def _recorded_run(job: EpisodeJob, below: Path) -> ReportedRun:

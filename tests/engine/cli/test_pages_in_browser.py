@@ -26,7 +26,7 @@ from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.live.live_view import LiveView
-from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report
 
 BROWSER = os.environ.get("EIDRIVE_BROWSER")
 SCREENSHOTS = os.environ.get("EIDRIVE_SCREENSHOTS")
@@ -482,7 +482,7 @@ def runs_page(browser: Any, tmp_path: Path) -> Iterator[ReportPage]:
         )
         for seed in range(1, 61)
     ]
-    page = ReportPage(browser, write_report(runs, tmp_path), 1440)
+    page = ReportPage(browser, write_run_report(runs, tmp_path), 1440)
     yield page
     page.close("report-used", full=False)
 
@@ -584,7 +584,7 @@ def test_report_of_ten_thousand_runs_has_few_rows_and_reaches_all(browser: Any, 
         reported_run(seed, passed=seed % 10 > 0, reason=(seed % 9 + 1) * "word " if seed % 10 == 0 else "")
         for seed in range(1, 10_001)
     ]
-    page = ReportPage(browser, write_report(runs, tmp_path), WIDTHS[size])
+    page = ReportPage(browser, write_run_report(runs, tmp_path), WIDTHS[size])
     assert page.count() == 10_000
     assert not page.wide()
     assert page.page.locator("#table tbody").count() < 100
@@ -612,7 +612,7 @@ def test_unusual_names_in_report_are_texts(browser: Any, tmp_path: Path, size: s
     runs[0]["criteria"][0] |= {"name": LONG, "reason": LONG}
     runs[1] |= {"metrics": {"constructor": 1.0, ATTACK: 2.0, LONG: 3.0}, "settings": {LONG: LONG, ATTACK: ATTACK}}
     runs[2] |= {"criteria": [], "passed": False, "metrics": {}, "settings": {}, "command": ""}
-    page = ReportPage(browser, write_report(runs, tmp_path), WIDTHS[size])
+    page = ReportPage(browser, write_run_report(runs, tmp_path), WIDTHS[size])
     assert page.count() == 3
     for button in page.page.locator("#table .open").all():
         button.click()
@@ -628,7 +628,7 @@ def test_unusual_names_in_report_are_texts(browser: Any, tmp_path: Path, size: s
 
 
 def test_report_without_script_lists_failures(browser: Any, tmp_path: Path) -> None:
-    file = write_report([reported_run(seed, passed=seed > 1, reason="too near") for seed in (1, 2)], tmp_path)
+    file = write_run_report([reported_run(seed, passed=seed > 1, reason="too near") for seed in (1, 2)], tmp_path)
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
     page.goto(file.as_uri())

@@ -14,7 +14,7 @@ from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.rates import parameter_matrix, scenario_matrix
-from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run, read_runs
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
@@ -91,7 +91,7 @@ def test_report_links_replay_of_each_recorded_run(street: Play, tmp_path: Path) 
     assert not errors
     linked, omitted = write_replays(runs, tmp_path / "out")
     assert not omitted
-    runs_of_page = listed_runs(write_report(linked, tmp_path / "out"))
+    runs_of_page = listed_runs(write_run_report(linked, tmp_path / "out"))
     assert [run["replay"] for run in runs_of_page] == ["replays/a%20run.html", ""]
     assert (tmp_path / "out" / "replays" / "a run.html").is_file()
 

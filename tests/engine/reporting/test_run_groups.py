@@ -13,7 +13,7 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.run_files import read_result
-from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 from eidrive_scenario.simulation import RunSettings
@@ -152,7 +152,7 @@ def test_runs_of_a_distribution_are_one_group_with_its_varied_parameters() -> No
 
 def test_report_counts_copied_result_once(tmp_path: Path) -> None:
     one = run()
-    page = write_report([one, dict(one), run(seed=2)], tmp_path)
+    page = write_run_report([one, dict(one), run(seed=2)], tmp_path)
     tree = html.fromstring(page.read_text(encoding="utf-8"))
     assert tree.xpath("string(//table[@class='overview']/tbody/tr/td[3])") == "0/2"
     assert [listed["seed"] for listed in listed_runs(page)] == [1, 2]
@@ -162,12 +162,12 @@ def test_report_counts_copied_result_once(tmp_path: Path) -> None:
 
 def test_copy_with_a_replay_is_the_one_that_is_listed(tmp_path: Path) -> None:
     (one,) = reports(run())
-    page = write_report([one, one.model_copy(update={"replay": "replays/one.html"})], tmp_path)
+    page = write_run_report([one, one.model_copy(update={"replay": "replays/one.html"})], tmp_path)
     assert [listed["replay"] for listed in listed_runs(page)] == ["replays/one.html"]
 
 
 def test_report_contains_channel_settings_and_command_of_each_run(tmp_path: Path) -> None:
-    page = write_report([run(channel=late(0.1)), run(channel=late(0.25))], tmp_path)
+    page = write_run_report([run(channel=late(0.1)), run(channel=late(0.25))], tmp_path)
     text = str(html.fromstring(page.read_text(encoding="utf-8")).xpath("string()"))
     assert "channel.delay.seconds: 0.1" in text
     assert "delay: {kind: constant, seconds: 0.25}" in text
@@ -184,7 +184,7 @@ def test_report_escapes_names(tmp_path: Path) -> None:
     one["settings"]["channel_profile"] = {attack: attack}
     one["metrics"] = {attack: 1.0, "inf": float("inf")}
     one["criteria"][0]["reason"] = attack
-    page = write_report([one, run()], tmp_path).read_text(encoding="utf-8")
+    page = write_run_report([one, run()], tmp_path).read_text(encoding="utf-8")
     assert "<img" not in page
 
 
@@ -195,7 +195,7 @@ def test_report_of_unusual_values_is_written(tmp_path: Path) -> None:
         {"run": 3, "parameters": {"A": "1"}},
         {"scenario": "\ud800", "seed": 10**50},
     ):
-        assert write_report([run() | changes, run()], tmp_path).exists()
+        assert write_run_report([run() | changes, run()], tmp_path).exists()
 
 
 @pytest.mark.parametrize(
