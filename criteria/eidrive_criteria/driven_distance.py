@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_criteria.folds import Deadline
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -41,17 +41,15 @@ class DrivenDistance(Criterion):
         self._was_present = False
         self._last: tuple[float, float] | None = None
         """Time and speed in the previous frame [s, m/s]; None while the actor is absent."""
-        self._expired: float | None = None
-        """Time of the first frame after the deadline [s]; None before it."""
+        self._deadline = Deadline(settings.by)
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
-        row, by = view.rows.get(self._settings.of), self._settings.by
-        if self._expired is None and by is not None and view.time > by + TIME_TOLERANCE:
-            self._expired = view.time
+        row = view.rows.get(self._settings.of)
+        self._deadline.observe(view.time)
         if row is None:
             self._last = None
-        if row is None or self._expired is not None:
+        if row is None or self._deadline.expired is not None:
             return
         self._was_present = True
         time, speed = view.time, abs(float(view.speed[row]))
@@ -68,7 +66,7 @@ class DrivenDistance(Criterion):
             f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),
             value=self._distance if was_present else None,
             limit=limit,
-            first_violation=None if passed else self._expired,
+            first_violation=None if passed else self._deadline.expired,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import require_two_actors
+from eidrive_criteria.folds import Deadline, require_two_actors
 from eidrive_criteria.perceived import PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Frame, Verdict, actor_never_present
@@ -36,16 +36,14 @@ class FirstDetection(PerceivedCriterion):
         self.subjects = (settings.of, settings.to)
         self._other_was_present = False
         self._first: float | None = None
-        self._expired: float | None = None
-        """Time of the first frame after the deadline [s]; None before it."""
+        self._deadline = Deadline(settings.by)
         self._distance = math.nan
         """Distance between the centers of both actors at the first detection [m]."""
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         self._other_was_present = self._other_was_present or settings.to in view.rows
-        if self._expired is None and settings.by is not None and view.time > settings.by + TIME_TOLERANCE:
-            self._expired = view.time
+        self._deadline.observe(view.time)
         super().observe(frame)
 
     def evaluate(self, frame: Frame) -> None:
@@ -73,7 +71,7 @@ class FirstDetection(PerceivedCriterion):
             reason,
             value=self._first,
             limit=settings.by,
-            first_violation=None if in_time else self._expired,
+            first_violation=None if in_time else self._deadline.expired,
         )
 
     def metrics(self) -> Mapping[str, float]:

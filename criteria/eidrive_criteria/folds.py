@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, Self, TypeVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api.common import RoadNetwork, WorldView
+from eidrive_scenario.api.common import TIME_TOLERANCE, RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import (
     Continuity,
     Criterion,
@@ -24,6 +24,22 @@ from eidrive_scenario.api.criteria import (
 )
 
 TwoActors = TypeVar("TwoActors", bound=CriterionSettings)
+
+
+class Deadline:
+    """Time of the first frame after a deadline.
+
+    expired  this time [s]; None before it, and without a deadline
+    """
+
+    def __init__(self, by: float | None) -> None:
+        self._by = by
+        self.expired: float | None = None
+
+    def observe(self, time: float) -> None:
+        """Process the time of one frame [s]."""
+        if self.expired is None and self._by is not None and time > self._by + TIME_TOLERANCE:
+            self.expired = time
 
 
 class BoundedSettings(CriterionSettings):

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_criteria.folds import Deadline
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -42,15 +42,13 @@ class ReachPosition(Criterion):
         self.subjects = (settings.of,)
         self._nearest = math.inf
         self._reached: float | None = None
-        self._expired: float | None = None
-        """Time of the first frame after the deadline [s]; None before it."""
+        self._deadline = Deadline(settings.by)
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         row = view.rows.get(settings.of)
-        if self._expired is None and settings.by is not None and view.time > settings.by + TIME_TOLERANCE:
-            self._expired = view.time
-        if row is None or self._expired is not None:
+        self._deadline.observe(view.time)
+        if row is None or self._deadline.expired is not None:
             return
         x, y, _ = view.position[row].tolist()
         distance = math.hypot(x - settings.x, y - settings.y)
@@ -73,7 +71,7 @@ class ReachPosition(Criterion):
             reason,
             value=self._nearest if math.isfinite(self._nearest) else None,
             limit=settings.within,
-            first_violation=self._expired if self._reached is None else None,
+            first_violation=self._deadline.expired if self._reached is None else None,
         )
 
     def metrics(self) -> Mapping[str, float]:

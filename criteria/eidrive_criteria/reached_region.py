@@ -7,7 +7,8 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api.common import TIME_TOLERANCE, point_in_polygon
+from eidrive_criteria.folds import Deadline
+from eidrive_scenario.api.common import point_in_polygon
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 Point = tuple[float, float]
@@ -57,19 +58,17 @@ class ReachedRegion(Criterion):
         self.subjects = (settings.of,)
         self._was_present = False
         self._reached: float | None = None
-        self._expired: float | None = None
-        """Time of the first frame after the deadline [s]; None before it."""
+        self._deadline = Deadline(settings.by)
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         row = view.rows.get(settings.of)
-        if self._expired is None and settings.by is not None and view.time > settings.by + TIME_TOLERANCE:
-            self._expired = view.time
+        self._deadline.observe(view.time)
         if row is None:
             return
         self._was_present = True
         x, y, *_ = view.plain_boxes[row]
-        if self._reached is None and self._expired is None and point_in_polygon(x, y, self._polygon):
+        if self._reached is None and self._deadline.expired is None and point_in_polygon(x, y, self._polygon):
             self._reached = view.time
 
     def verdict(self) -> Verdict:
@@ -86,7 +85,7 @@ class ReachedRegion(Criterion):
             reason,
             value=self._reached,
             limit=settings.by,
-            first_violation=self._expired if self._reached is None else None,
+            first_violation=self._deadline.expired if self._reached is None else None,
         )
 
     def metrics(self) -> Mapping[str, float]:
