@@ -12,7 +12,7 @@ from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from eidrive_scenario.base.content_digest import ENGINE
+from eidrive_scenario.base.installation import ENGINE
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 
 
@@ -32,9 +32,9 @@ def report_origin(runs: Sequence[ReportedRun]) -> dict[str, str]:
 
 
 def _commit() -> str:
-    """Return the commit of the working folder, with `-dirty` if files differ from it; empty without one."""
-    # A monitor of files is a program that the settings of a repository name: it is not needed here.
-    command = ["git", "-c", "core.fsmonitor=false", "describe", "--always", "--dirty", "--abbrev=10", "--exclude=*"]
+    """Return the commit of the working folder; empty without one."""
+    # Whether files differ from it is not asked: Git would execute filters that the settings of the folder name.
+    command = ["git", "rev-parse", "--short=10", "HEAD"]
     try:
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
     except (OSError, subprocess.SubprocessError):

@@ -125,7 +125,9 @@ def test_report_states_version_date_machine_and_command(tmp_path: Path, monkeypa
     assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d[+-]\d\d:\d\d", entries["date"])
 
 
-def test_report_in_a_repository_states_its_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_report_in_a_repository_states_its_commit_and_executes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def git(*arguments: str) -> str:
         user = ("-c", "user.name=a", "-c", "user.email=a@example.org")
         return subprocess.run(
@@ -134,15 +136,19 @@ def test_report_in_a_repository_states_its_commit(tmp_path: Path, monkeypatch: p
 
     git("init", "--quiet")
     (tmp_path / "file").write_text("1")
-    git("add", "file")
+    (tmp_path / ".gitattributes").write_text("* filter=hostile\n")
+    git("add", ".")
     git("commit", "--quiet", "--message", "first")
     commit = git("rev-parse", "HEAD")[:10]
     monkeypatch.chdir(tmp_path)
     page = write_run_report([result(1, "none", True)], tmp_path / "out")
     assert f"<dd>{commit}</dd>" in page.read_text(encoding="utf-8")
-    (tmp_path / "file").write_text("2")
-    page = write_run_report([result(1, "none", True)], tmp_path / "out")
-    assert f"<dd>{commit}-dirty</dd>" in page.read_text(encoding="utf-8")
+    git("config", "filter.hostile.clean", f"touch '{tmp_path}/executed'; cat")
+    (tmp_path / "file").write_text("22")
+    write_run_report([result(1, "none", True)], tmp_path / "out")
+    assert not (tmp_path / "executed").exists()
+    git("status")
+    assert (tmp_path / "executed").exists(), "commands that compare files execute the filter"
 
 
 def test_page_without_script_lists_runs_that_did_not_pass(tmp_path: Path) -> None:
