@@ -15,7 +15,8 @@ from typing import Any, Protocol
 import numpy as np
 import pydantic
 
-ENGINE = "eidrive-scenario"
+from eidrive_scenario.base.installation import ENGINE
+
 _PACKAGES = (ENGINE, "numpy", "pybullet")
 _NUMBER = struct.Struct("<d")
 

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-NAME = "eidrive-scenario"
+ENGINE = "eidrive-scenario"
+"""Name of the distribution."""
 
 
 def install_command(extra: str) -> str:
@@ -23,7 +24,7 @@ def install_command(extra: str) -> str:
     if "dir_info" in origin and Path(folder).is_dir():
         editable = "-e " if origin["dir_info"].get("editable") else ""
         return f"pip install {editable}{shlex.quote(f'{folder}[{extra}]')}"
-    return f"pip install {shlex.quote(f'{NAME}[{extra}]{requirement_source()}')}"
+    return f"pip install {shlex.quote(f'{ENGINE}[{extra}]{requirement_source()}')}"
 
 
 def requirement_source() -> str:
@@ -44,7 +45,7 @@ def requirement_source() -> str:
 def _origin() -> dict[str, Any]:
     """Return the content of direct_url.json; nothing if there is none."""
     try:
-        text = distribution(NAME).read_text("direct_url.json")
+        text = distribution(ENGINE).read_text("direct_url.json")
     except PackageNotFoundError:
         return {}
     origin: dict[str, Any] = json.loads(text) if text else {}

@@ -14,7 +14,7 @@ from eidrive_scenario.cli.output import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 if TYPE_CHECKING:
-    from eidrive_scenario.recording.recording import Recording
+    pass
 
 
 PictureSize = Annotated[
@@ -172,21 +172,15 @@ def draw(
 
     The picture has ids of roads and lanes, marks of s, starts, paths, trigger zones and the ranges of sensors.
     """
-    from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition, resolve_scenario
-    from eidrive_scenario.reporting.drawing.scenario_figure import roads_figure, scenario_figure
+    from eidrive_scenario.extensions.library import resolve_scenario
+    from eidrive_scenario.reporting.drawing.scenario_figure import is_road_file, source_figure
     from eidrive_scenario.reporting.drawing.vector_canvas import check_format, parse_size, write_figure
 
-    path = Path(file)
-    is_roads = path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads"
-    if not is_roads:
-        path = resolve_scenario(file)
-    elif station is not None:
-        raise SettingError(Diagnostic("--station: a road file has no stations", "give a scenario"))
+    path = Path(file) if is_road_file(file) else resolve_scenario(file)
     picture = out or Path(f"{path.stem}.svg")
     check_format("--out", picture)
     check_output_paths({"--out": picture}, [path])
-    millimeters = parse_size(size)
-    write_figure(roads_figure(path, millimeters) if is_roads else scenario_figure(path, millimeters, station), picture)
+    write_figure(source_figure(path, parse_size(size), station), picture)
     echo(str(picture))
 
 
@@ -220,7 +214,6 @@ def view(
     from eidrive_scenario.recording.run_files import is_partial, recording_in
 
     path = recording_in(recording)
-    complete = not is_partial(path)
     stills = {"--png": png, "--svg": svg, "--pdf": pdf}
     has_stills = any(path is not None for path in stills.values())
     has_pictures = has_stills or gif is not None or mp4 is not None
@@ -258,7 +251,9 @@ def view(
         if mp4 is not None:
             film.write_mp4(recorded, mp4)
     if page is not None:
-        damage = _write_replay(opened, page, complete, None if second is None else open_recording(second))
+        from eidrive_scenario.reporting.replay.page import make_replay
+
+        damage = make_replay(opened, page, other=None if second is None else open_recording(second)).damage
     for line in damage:
         echo(f"warning: {path} is damaged: {line}", color="yellow", err=True)
     for partial in filter(is_partial, [path, *([second] if second else [])]):
@@ -272,16 +267,6 @@ def view(
 
 TWO_RUNS = "two-runs.html"
 """File of the page of two recordings beside the first."""
-
-
-def _write_replay(recording: Recording, page: Path, complete: bool, other: Recording | None) -> tuple[str, ...]:
-    """Write the page of a recording with an optional other one, and return the damage of the recordings."""
-    from eidrive_scenario.recording.run_files import RESULT, result_of
-    from eidrive_scenario.reporting.replay.page import make_replay
-
-    beside = recording.path.with_name(RESULT)
-    result = result_of(recording.path)
-    return make_replay(recording, page, result, result_file=beside, complete=complete, other=other).damage
 
 
 def report(

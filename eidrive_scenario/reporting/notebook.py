@@ -12,11 +12,10 @@ from tempfile import TemporaryDirectory
 
 from matplotlib.figure import Figure
 
-from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition, resolve_scenario
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.recording import open_recording
-from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in, result_of
-from eidrive_scenario.reporting.drawing.scenario_figure import roads_figure, scenario_figure
+from eidrive_scenario.recording.run_files import recording_in
+from eidrive_scenario.reporting.drawing.scenario_figure import is_road_file, source_figure
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, paper_style, write_figure
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.report_files import report_files
@@ -83,12 +82,8 @@ def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | 
 
     Raise InputError for an invalid file, SettingError for a station of a road file.
     """
-    path = Path(source)
-    if path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads":
-        if station is not None:
-            raise SettingError(Diagnostic("a road file has no stations", "give a scenario"))
-        return Picture(roads_figure(path, size))
-    return Picture(scenario_figure(resolve_scenario(os.fspath(source)), size, station))
+    path = Path(source) if is_road_file(os.fspath(source)) else resolve_scenario(os.fspath(source))
+    return Picture(source_figure(path, size, station))
 
 
 def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:
@@ -109,12 +104,7 @@ def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Pa
 
     Raise InputError if no frame can be read.
     """
-    path = recording_in(Path(recording))
-    result = result_of(path)
-    replay = make_replay(
-        open_recording(path), Path(out), result, result_file=path.with_name(RESULT), complete=not is_partial(path)
-    )
-    return replay.page
+    return make_replay(open_recording(recording_in(Path(recording))), Path(out)).page
 
 
 def _replay_frame(recording: Path, height: int) -> str:

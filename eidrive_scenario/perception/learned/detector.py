@@ -21,11 +21,8 @@ from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
 from eidrive_scenario.perception.learned.image_network import ImageNetwork, object_category
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
-from eidrive_scenario.perception.learned.network_loading import build_network, check_network, weights_path
-from eidrive_scenario.perception.learned.runtimes import (
-    runtime_versions,
-    select_runtime,
-)
+from eidrive_scenario.perception.learned.network_loading import build_network, check_network, runtime_of, weights_path
+from eidrive_scenario.perception.learned.runtimes import runtime_versions
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import (
     check_weights_exist,
@@ -57,9 +54,7 @@ class LearnedDetector(Detector):
         self._signals: tuple[SignalReading, ...] = ()
         path = weights_path(self.network, self.settings)
         check_weights_exist(path)
-        self.library_versions = runtime_versions(
-            select_runtime(path, self.settings.runtime, self.settings.device, self.settings.precision)
-        )
+        self.library_versions = runtime_versions(runtime_of(path, self.settings))
         self._network: ImageNetwork | None = None
         self.processes_batches = self.settings.device == "cuda"
         self._prepared: Mapping[str, ImageDetections] = {}

@@ -8,7 +8,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.own_network import OwnNetwork
-from eidrive_scenario.perception.learned.runtimes import is_installed, missing_runtime, select_runtime
+from eidrive_scenario.perception.learned.runtimes import Runtime, is_installed, missing_runtime, select_runtime
 from eidrive_scenario.perception.learned.settings import EXTERNAL_SUFFIXES, LearnedSettings
 from eidrive_scenario.perception.learned.weights import (
     DEFAULT_CONFIDENCE,
@@ -28,6 +28,11 @@ def weights_path(name: str, settings: LearnedSettings) -> Path:
     return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
 
 
+def runtime_of(path: Path, settings: LearnedSettings) -> Runtime:
+    """Return the runtime for weights. Raise SettingError if none can execute them as the settings demand."""
+    return select_runtime(path, settings.runtime, settings.device, settings.precision)
+
+
 def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool) -> None:
     """Raise SettingError if the weights that the settings select are missing, or are TorchScript without permission of
     the user, and if the runtime is not installed. Nothing is read or imported.
@@ -36,7 +41,7 @@ def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     check_weights_exist(path)
     if path.suffix == TORCHSCRIPT_SUFFIX and not torchscript_is_allowed(allow_torchscript):
         raise refused_torchscript(path)
-    runtime = select_runtime(path, settings.runtime, settings.device, settings.precision)
+    runtime = runtime_of(path, settings)
     if not is_installed(runtime):
         raise missing_runtime(runtime)
 
@@ -48,7 +53,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     """
     check_network(name, settings, allow_torchscript=allow_torchscript)
     path = weights_path(name, settings)
-    runtime = select_runtime(path, settings.runtime, settings.device, settings.precision)
+    runtime = runtime_of(path, settings)
     if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         return ExternalNetwork(
             path,

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition
 from eidrive_scenario.reporting.drawing.canvas import Canvas
 from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
 from eidrive_scenario.reporting.drawing.road_labels import RoadLabels
@@ -14,6 +16,26 @@ from eidrive_scenario.reporting.drawing.top_view import Window
 from eidrive_scenario.reporting.drawing.vector_canvas import Size, scene_figure
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import Simulation
+
+
+def is_road_file(source: str | Path) -> bool:
+    """Return whether a source is a road file, not a scenario."""
+    path = Path(source)
+    return path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads"
+
+
+def source_figure(path: Path, size: Size, station: str | None = None) -> Figure:
+    """Return the picture of a road file, or of a scenario before its run; see the functions below.
+
+    Raise SettingError for a station of a road file.
+    """
+    if not is_road_file(path):
+        return scenario_figure(path, size, station)
+    if station is not None:
+        raise SettingError(
+            Diagnostic(f"a road file has no station (got {quoted(station)})", "give a scenario", str(path))
+        )
+    return roads_figure(path, size)
 
 
 def scenario_figure(path: Path, size: Size, station: str | None = None) -> Figure:

@@ -184,17 +184,12 @@ class RunOfPage:
 def make_replay(
     recording: Recording,
     out: Path,
-    result: Mapping[str, Any] | None = None,
     *,
-    result_file: str | Path = "",
-    complete: bool = True,
     other: Recording | None = None,
 ) -> Replay:
-    """Write the replay of a recording to the file `out`, with the verdicts of an optional `result`.
+    """Write the replay of a recording to the file `out`, with the verdicts of the result in its folder.
 
-    result_file  file of the result for error messages
-    complete     whether the run has ended; the page states that an unfinished run is incomplete
-    other        recording that the page shows over this one, with the verdicts of the result in its folder
+    other  recording that the page shows over this one, with the verdicts of the result in its folder
 
     The readable part of a damaged recording is shown, and the page lists the damage. Raise InputError if no frame can
     be read, the result is invalid, or the roads of the recordings differ.
@@ -207,9 +202,8 @@ def make_replay(
             reason = f"the roads differ from those of {recording.path}"
             hint = "give two recordings on the same roads, or write a page of each"
             raise InputError(Diagnostic(reason, hint, str(other.path)))
-        path = other.path
-        second = _read_run(other, others_report, result_of(path), path.with_name(RESULT), not is_partial(path))
-    run = _read_run(recording, report, result, result_file, complete)
+        second = _read_run(other, others_report)
+    run = _read_run(recording, report)
     labels = ("", "") if other is None or second is None else _labels(recording, run.facts, other, second.facts)
     damage = (*report.lines(), *(f"{other.path}: {line}" for line in others_report.lines() if other is not None))
     values = page_values(
@@ -220,7 +214,7 @@ def make_replay(
         command=recording.metadata.get("command", ""),
         result=run.result,
         notices=damage,
-        complete=complete and (second is None or second.complete),
+        complete=run.complete and (second is None or second.complete),
         roads=roads,
         street=_readable_street(recording),
         data=run.data,
@@ -243,14 +237,9 @@ def _labels(
     return first, second
 
 
-def _read_run(
-    recording: Recording,
-    report: DamageReport,
-    result: Mapping[str, Any] | None,
-    result_file: str | Path,
-    complete: bool,
-) -> RunOfPage:
-    """Read a recorded run. Raise InputError if no frame can be read, or the result is invalid."""
+def _read_run(recording: Recording, report: DamageReport) -> RunOfPage:
+    """Read a recorded run. Raise InputError if no frame can be read, or the result in its folder is invalid."""
+    result = result_of(recording.path)
     for line in recording.damage:
         report.add(line)
     trace = TraceHash()
@@ -266,10 +255,10 @@ def _read_run(
         raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
     if result is not None and result.get("trace_hash") != trace.hexdigest():
         report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
-    verdicts = None if result is None else parse_run(result, result_file)
+    verdicts = None if result is None else parse_run(result, recording.path.with_name(RESULT))
     data["decisive"] = decisive_instant(data, verdicts, data["actors"])
     title = _title(recording.scenario or recording.path.stem, recording.seed)
-    return RunOfPage(title, _facts(recording, settings), settings, data, verdicts, complete)
+    return RunOfPage(title, _facts(recording, settings), settings, data, verdicts, not is_partial(recording.path))
 
 
 def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:
@@ -373,7 +362,7 @@ def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[Repor
         taken.add(name)
         page = beside / FOLDER / f"{name}.html"
         try:
-            make_replay(open_recording(recording), page, result_of(recording), result_file=recording.with_name(RESULT))
+            make_replay(open_recording(recording), page)
         except InputError as error:
             omitted.append(f"{recording}: {error.diagnostics[0].message}; the run has no replay")
             continue

@@ -114,7 +114,7 @@ def test_draw_of_roads_has_no_stations(eidrive: Eidrive, tmp_path: Path) -> None
     road = library_path() / "roads" / "coop_1.xodr"
     assert eidrive("draw", road, "-o", tmp_path / "roads.svg").exit_code == 0
     result = eidrive("draw", road, "--station", "Ego")
-    assert (result.exit_code, "a road file has no stations" in result.stderr) == (2, True)
+    assert (result.exit_code, "a road file has no station" in result.stderr) == (2, True)
 
 
 def test_draw_does_not_overwrite_its_input(eidrive: Eidrive, tmp_path: Path) -> None:

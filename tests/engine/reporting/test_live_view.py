@@ -20,7 +20,6 @@ from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.run_files import result_of
 from eidrive_scenario.reporting.live import live_view
 from eidrive_scenario.reporting.live.live_view import Pace
 from eidrive_scenario.reporting.replay.frame_data import replay_data
@@ -155,7 +154,7 @@ def test_live_page_at_the_end_equals_the_replay(tmp_path: Path) -> None:
         shown: Any = html.fromstring(live.page())
         (*_, (_, end)) = live.events()
     recording = read_recording(tmp_path)
-    file = make_replay(recording, tmp_path / "page.html", result_of(recording.path)).page
+    file = make_replay(recording, tmp_path / "page.html").page
     written: Any = html.fromstring(file.read_text(encoding="utf-8"))
     for path in ("//title", "//h1/span[@id='badge']", "//div[@id='verdict']", "//div[@class='panel']"):
         texts = [[found.text_content() for found in page.xpath(path)] for page in (shown, written)]

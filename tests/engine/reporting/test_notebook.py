@@ -53,5 +53,5 @@ def test_pictures_are_vectors_in_notebooks_and_files(source: str | Path, tmp_pat
 
 
 def test_road_file_has_no_station() -> None:
-    with pytest.raises(SettingError, match="a road file has no stations"):
+    with pytest.raises(SettingError, match="a road file has no station"):
         report.draw(library_path() / "roads" / "coop_1.xodr", station="Ego")
