@@ -6,7 +6,7 @@ import ast
 import inspect
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import NoneType, UnionType
@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.errors import EidriveError
+from eidrive_scenario.errors import RegistryError
 from eidrive_scenario.extensions.registry import registry, singular
 
 GROUPS = ("planners", "detectors", "fusion", "trackers", "vehicle_controllers", "sensors", "channels", "criteria")
@@ -49,15 +49,19 @@ class Property(NamedTuple):
     text: str
 
 
-def properties() -> Iterator[Property]:
-    """Yield all keys: those of stations, then those of each extension. An extension that does not load has none."""
+def properties(warn: Callable[[str], None]) -> Iterator[Property]:
+    """Yield all keys: those of stations, then those of each extension.
+
+    warn  function that gets a line for each extension that does not load; its keys are missing
+    """
     yield from _of_model("station", AgentSettings)
     for group in GROUPS:
         names = registry(group)
         for name in names:
             try:
                 extension = names.load(name)
-            except EidriveError:
+            except RegistryError as error:
+                warn(f"no keys of {singular(group)} {name}: {error}")
                 continue
             model = getattr(extension, "settings_type", None)
             if isinstance(model, type) and issubclass(model, BaseModel):

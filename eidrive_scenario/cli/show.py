@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo
+from eidrive_scenario.cli.output import echo, print_warnings
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 if TYPE_CHECKING:
@@ -73,7 +73,9 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     elif what is Names.properties:
         from eidrive_scenario.cli.property_list import Property, properties
 
-        lines = _columns([[name.upper() for name in Property._fields], *properties()])
+        warnings: list[str] = []
+        lines = _columns([[name.upper() for name in Property._fields], *properties(warnings.append)])
+        print_warnings(warnings)
     elif what is Names.criteria:
         from eidrive_scenario.evaluation.criterion import describe_criteria
 

@@ -14,7 +14,7 @@ from eidrive_scenario.cli.show import Names
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.experiments.sweeps.store import ResultStore
 from eidrive_scenario.extensions.library import library_path
-from eidrive_scenario.extensions.registry import GROUPS
+from eidrive_scenario.extensions.registry import GROUPS, register, registry
 
 
 def test_help_lists_commands_without_importing_engine() -> None:
@@ -100,6 +100,17 @@ def test_list_of_properties_shows_type_default_and_unit(eidrive: Eidrive) -> Non
     assert rows["criterion min_distance", "at_least"][2] == "m"
     assert rows["criterion comfort", "jerk"] == ["number", "8.37", "m/s³"]
     assert {key for owner, key in rows if owner == "station"} >= set(AgentSettings.model_fields)
+
+
+def test_list_of_properties_names_extensions_that_do_not_load(eidrive: Eidrive) -> None:
+    register("fusion", "broken", "nowhere:Nothing")
+    try:
+        result = eidrive("list", "properties")
+    finally:
+        registry("fusion")._points.pop("broken")
+    assert result.exit_code == 0
+    assert "warning: no keys of fusion method broken: fusion method 'broken' (nowhere:Nothing)" in result.stderr
+    assert "fusion method average" not in result.stderr
 
 
 @pytest.mark.parametrize("suffix", ["svg", "pdf", "png"])
