@@ -12,6 +12,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.roads import RoadNetwork
@@ -87,6 +88,8 @@ class Detector(ABC):
     """Versions of the libraries that compute the detections, by name; part of the resolved settings."""
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
     """Detections in the last image of each camera, for detectors that process images; recorded with the boxes."""
+    feature_map: FeatureMap | None = None
+    """Features of the points in the last readings, for detectors with bird's-eye-view features."""
 
     def check_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - an optional hook
         """Raise SettingError if `load_weights` would refuse its data without reading it, as `eidrive check` reports."""

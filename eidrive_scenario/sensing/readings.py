@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.world.camera import CameraImage
 
 NOTHING_ATTACHED: Array = np.empty((0, 7))
@@ -201,3 +202,5 @@ class Readings(msgspec.Struct, frozen=True, gc=False):
     """Readings of all other sensors, by kind and name."""
     attached: Array = msgspec.field(default_factory=lambda: NOTHING_ATTACHED)
     """Boxes (K, 7) of the own trailers, whose angles the vehicle measures, in the world frame [m, rad]."""
+    features: FeatureMap | None = None
+    """Fused features of this tick: a detector of features detects objects in them instead of in the points."""

@@ -1,0 +1,36 @@
+"""Features of one station on its bird's-eye-view grid: produced by detectors, transmitted and fused."""
+
+from __future__ import annotations
+
+import msgspec
+
+from eidrive_scenario.base.arrays import Floats
+
+
+class FeatureMap(msgspec.Struct, frozen=True, gc=False):
+    """Features of one station at one instant on its bird's-eye-view grid.
+
+    The grid is centered on the first lidar of the station; its x axis has the heading of this lidar, y is to the left.
+    Arrays have the index [channel, i, j], where i is along x and j along y. The center of cell (i, j) of n x n cells
+    is at ((i + 0.5 - n / 2) cell, (j + 0.5 - n / 2) cell).
+
+    time        of the scan [s]
+    x, y, yaw   pose of the grid in the world, as the station assumes it [m, rad]
+    height      of the lidar in the world [m]
+    foot        height of the ground below it in the world [m]
+    cell        edge of a cell [m]
+    features    (96, 128, 128), at least 0
+    latent      (8, 128, 128): the compressed features before rounding, in latent units
+    confidence  (128, 128): maximum probability of a class
+    """
+
+    time: float
+    x: float
+    y: float
+    yaw: float
+    height: float
+    foot: float
+    cell: float
+    features: Floats
+    latent: Floats
+    confidence: Floats

@@ -1,0 +1,60 @@
+"""Compression of bird's-eye-view features to a few bytes per cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.base.arrays import Floats
+
+FEATURES = 96
+"""Channels of the features."""
+LATENT = 8
+"""Channels of the compressed features."""
+LARGEST_CODE = 127
+CODES = 256
+"""Entries of the code book."""
+
+
+@dataclass(frozen=True)
+class FeatureCodec:
+    """Codec of the compressed features z (8, N) of N cells, which the network computes from the features.
+
+    scale          latent units of one step of an 8-bit integer
+    codebook       (256, 8), in latent units
+    expand_weight  (96, 8), expand_bias (96,): linear layer from z to the features, followed by a ReLU
+    """
+
+    scale: np.float32
+    codebook: Floats
+    expand_weight: Floats
+    expand_bias: Floats
+
+    def expand(self, latent: Floats) -> Floats:
+        """Return the features (96, N) of cells with these compressed features (8, N)."""
+        features: Floats = self.expand_weight @ latent
+        features += self.expand_bias[:, None]
+        np.maximum(features, np.float32(0.0), out=features)
+        return features
+
+    def to_int8(self, latent: Floats) -> NDArray[np.int8]:
+        """Return the compressed features (8, N) as 8-bit integers."""
+        steps = np.rint(latent / self.scale)
+        return np.asarray(steps.clip(-LARGEST_CODE, LARGEST_CODE), np.int8)
+
+    def from_int8(self, steps: NDArray[np.int8]) -> Floats:
+        """Return the compressed features (8, N) that these integers stand for."""
+        return steps * self.scale
+
+    def to_codes(self, latent: Floats) -> NDArray[np.uint8]:
+        """Return the number (N,) of the nearest entry of the code book to each column (8, N); of several, the first."""
+        # |z - c|² = |z|² - 2 (z · c - |c|² / 2)
+        nearness = latent.T @ self.codebook.T
+        nearness -= np.square(self.codebook).sum(axis=1) / np.float32(2.0)
+        return np.asarray(nearness.argmax(axis=1), np.uint8)
+
+    def from_codes(self, codes: NDArray[np.uint8]) -> Floats:
+        """Return the entries of the code book as compressed features (8, N)."""
+        return self.codebook[codes].T
