@@ -22,6 +22,7 @@ class FeatureMap(msgspec.Struct, frozen=True, gc=False):
     features    (96, 128, 128), at least 0
     latent      (8, 128, 128): the compressed features before rounding, in latent units
     confidence  (128, 128): maximum probability of a class
+    interval    time between the two scans in the features [s]; None: they are of one scan and show no motion
     """
 
     time: float
@@ -34,3 +35,4 @@ class FeatureMap(msgspec.Struct, frozen=True, gc=False):
     features: Floats
     latent: Floats
     confidence: Floats
+    interval: float | None = None

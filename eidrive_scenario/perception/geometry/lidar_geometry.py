@@ -37,11 +37,11 @@ class LevelFrame:
         return cls(x, y, z, math.atan2(pose[1, 0], pose[0, 0]))
 
     def points(self, reading: LidarReading) -> Array:
-        """Return the points (N, 3) of a reading of this sensor in this frame."""
+        """Return the points (N, 3) of a reading in this frame."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        level = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ reading.pose[:3, :3]
-        points: Array = reading.points @ level.T
-        points[:, 2] += self.height
+        level = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        points: Array = reading.points @ (level @ reading.pose[:3, :3]).T
+        points += level @ (reading.pose[:3, 3] - (self.x, self.y, 0.0))
         return points
 
     def to_world(self, plan: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Graphs of the networks `ssd` and `yolov5` as ONNX models."""
+"""Graphs of networks as ONNX models, and those of `ssd` and `yolov5`."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _NORM = ("weight", "bias", "running_mean", "running_var")
 
 
 class Graph:
-    """Graph of layers from images (1, 3, H, W) in [0, 1] to several outputs.
+    """Graph of layers from an image (1, C, H, W) to several outputs.
 
     Each method adds a layer and returns the name of its output. A layer has the weights whose names begin with its
     name, as in the classes of `networks`. Raise ValueError if a weight is missing or has another shape.
     """
 
-    def __init__(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(self, arrays: Mapping[str, NDArray[Any]], channels: int = 3) -> None:
         self._arrays = arrays
         self._nodes: list[Node] = []
         self._tensors: dict[str, Floats] = {}
-        self._channels: dict[str, int] = {IMAGE: 3}
+        self._channels: dict[str, int] = {IMAGE: channels}
 
     def channels(self, layer: str) -> int:
         """Return the number of channels of a layer's output."""
@@ -69,6 +69,22 @@ class Graph:
             source, name, weight * gain[:, None, None, None], offset - mean * gain, stride, pad, groups
         )
         return self._add("Mul", (folded, self._add("Sigmoid", (folded,), outputs)), outputs)
+
+    def relu_unit(self, source: str, name: str, outputs: int, kernel: int = 1, stride: int = 1) -> str:
+        """Add a convolution and ReLU."""
+        weight = self.array(f"{name}.weight", (outputs, self._channels[source], kernel, kernel))
+        bias = self.array(f"{name}.bias", (outputs,))
+        return self._relu(self._convolution(source, name, weight, bias, stride, kernel // 2, 1))
+
+    def enlarging_unit(self, source: str, name: str, outputs: int, factor: int) -> str:
+        """Add a transposed convolution, by which each cell becomes `factor` x `factor` cells, and ReLU."""
+        self._tensors[f"{name}.weight"] = self.array(
+            f"{name}.weight", (self._channels[source], outputs, factor, factor)
+        )
+        self._tensors[f"{name}.bias"] = self.array(f"{name}.bias", (outputs,))
+        inputs = (source, f"{name}.weight", f"{name}.bias")
+        sides = (factor, factor)
+        return self._relu(self._add("ConvTranspose", inputs, outputs, kernel_shape=sides, strides=sides))
 
     def head(self, source: str, name: str, outputs: int) -> str:
         """Add a 1x1 convolution without activation."""
@@ -112,7 +128,10 @@ class Graph:
         tensors: Mapping[str, NDArray[Any]] = self._tensors
         if ranges is not None:
             nodes, tensors = quantized(nodes, tensors, IMAGE, list(outputs), ranges)
-        return onnx_model(nodes, tensors, {IMAGE: (1, 3, height, width)}, shapes)
+        return onnx_model(nodes, tensors, {IMAGE: (1, self._channels[IMAGE], height, width)}, shapes)
+
+    def _relu(self, source: str) -> str:
+        return self._add("Relu", (source,), self._channels[source])
 
     def _convolution(
         self, source: str, name: str, weight: Any, bias: Any, stride: int, padding: int, groups: int

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.own_network import OwnNetwork
@@ -14,6 +13,7 @@ from eidrive_scenario.perception.learned.weights import (
     DEFAULT_CONFIDENCE,
     OWN_SUFFIX,
     TORCHSCRIPT_SUFFIX,
+    another_network,
     check_weights_exist,
     refused_torchscript,
     torchscript_is_allowed,
@@ -69,6 +69,5 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
         )
     network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device, settings.precision)
     if network.name != name:
-        message = f"weights {quoted(str(path))} are of another network (got {network.name!r}; expected {name!r})"
-        raise SettingError(Diagnostic(message, f"use the detector {network.name!r}"))
+        raise another_network(path, network.name, name)
     return network

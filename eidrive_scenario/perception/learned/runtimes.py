@@ -9,7 +9,7 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
@@ -26,6 +26,8 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.weights import ONNX_SUFFIX, TORCHSCRIPT_SUFFIX, Precision, read_weights
 
 Runtime = Literal["onnxruntime", "openvino", "torch", "opencv"]
+GraphRuntime = Literal["onnxruntime", "openvino", "opencv"]
+"""Runtimes of ONNX models."""
 Device = Literal["cpu", "cuda"]
 AUTO = "auto"
 
@@ -47,13 +49,21 @@ def runtimes_of(path: Path, device: Device = "cpu", precision: Precision = "floa
     return ("onnxruntime", "opencv") if path.suffix == ONNX_SUFFIX else FASTEST_FIRST
 
 
-def select_runtime(path: Path, wanted: str = AUTO, device: Device = "cpu", precision: Precision = "float32") -> Runtime:
+def select_runtime(
+    path: Path,
+    wanted: str = AUTO,
+    device: Device = "cpu",
+    precision: Precision = "float32",
+    supported: Sequence[Runtime] = FASTEST_FIRST,
+) -> Runtime:
     """Return the runtime for weights: the wanted one, or the fastest that is installed; `torch` if none is.
+
+    supported  runtimes that the detector supports
 
     Raise SettingError if the wanted runtime cannot execute weights of this file type on the device, or is not
     installed.
     """
-    suitable = runtimes_of(path, device, precision)
+    suitable = [name for name in runtimes_of(path, device, precision) if name in supported]
     if not suitable:
         message = f"device {device!r} executes no {path.suffix} weights"
         raise SettingError(Diagnostic(message, "set `device: cpu`, or use weights .npz or .pt"))

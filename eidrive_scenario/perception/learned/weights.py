@@ -112,8 +112,8 @@ DESCRIPTION = "description"
 class Description:
     """Description of a weight file.
 
-    network     `yolov5` or `ssd`;  classes  in the order of its outputs
-    input_size  width and height of its input [px];  anchors  of yolov5 [px]
+    network     `yolov5`, `ssd` or `pillars`;  classes  in the order of its outputs
+    input_size  width and height of its input [px or cells];  anchors  of yolov5 [px]
     confidence  default of the minimum score of a box
     outward     rows of a box height and of the distances by which the left, top, right and bottom edges of boxes of
                 vehicles are outside those of the vehicles on average, by ascending height [px]
@@ -137,16 +137,29 @@ class Weights:
     arrays: Mapping[str, NDArray[Any]]
 
     def onnx(self, precision: Precision = "float32") -> bytes:
-        """Return the ONNX model of the network.
+        """Return the ONNX model of a network for images.
 
         Raise ValueError if an array is missing or has another shape, and if ranges for 8-bit integers are missing.
         """
         description = self.description
-        if precision == "int8" and not description.ranges:
+        if description.network not in _IMAGE_GRAPHS:
+            raise ValueError(f"its network {description.network!r} processes no images")
+        graph = _IMAGE_GRAPHS[description.network]
+        return graph(self.arrays, len(description.classes), description.input_size, self.ranges(precision))
+
+    def ranges(self, precision: Precision) -> Ranges | None:
+        """Return the ranges of the layers for 8-bit integers; None in single precision.
+
+        Raise ValueError if they are missing.
+        """
+        if precision == "float32":
+            return None
+        if not self.description.ranges:
             raise ValueError("its layers have no ranges for int8 (`python -m training.quantize FILE` adds them)")
-        graph = yolov5_onnx if description.network == "yolov5" else ssd_onnx
-        ranges = description.ranges if precision == "int8" else None
-        return graph(self.arrays, len(description.classes), description.input_size, ranges)
+        return self.description.ranges
+
+
+_IMAGE_GRAPHS = {"yolov5": yolov5_onnx, "ssd": ssd_onnx}
 
 
 def read(path: Path) -> Weights:
@@ -155,6 +168,12 @@ def read(path: Path) -> Weights:
     with suitable(path):
         arrays = read_arrays(content)
         return Weights(_parse_description(json.loads(str(arrays[DESCRIPTION]))), arrays)
+
+
+def another_network(path: Path, network: str, expected: str) -> SettingError:
+    """Return the error for weights of another network."""
+    message = f"weights {quoted(str(path))} are of another network (got {network!r}; expected {expected!r})"
+    return SettingError(Diagnostic(message, f"use the detector {network!r}"))
 
 
 @contextmanager
@@ -185,7 +204,7 @@ _DAMAGED = (
 
 
 def _parse_description(data: dict[str, Any]) -> Description:
-    anchors = data["anchors"]
+    anchors = data.get("anchors")
     if anchors is not None:
         anchors = tuple(tuple((float(w), float(h)) for w, h in scale) for scale in anchors)
     width, height = (int(side) for side in data["input_size"])
@@ -195,7 +214,7 @@ def _parse_description(data: dict[str, Any]) -> Description:
     network, coarsest = str(data["network"]), STRIDES[-1]
     if network == "yolov5" and (width % coarsest or height % coarsest):
         raise ValueError(f"its input size is invalid (got {width} x {height}; expected multiples of {coarsest})")
-    if network not in ("yolov5", "ssd") or (network == "yolov5" and anchors is None):
+    if network not in ("yolov5", "ssd", "pillars") or (network == "yolov5" and anchors is None):
         raise ValueError("its description specifies no known network, or lacks anchors")
     if anchors is not None and [len(scale) for scale in anchors] != [ANCHORS_PER_SCALE] * len(STRIDES):
         raise ValueError(f"anchors: invalid number (expected {ANCHORS_PER_SCALE} on each of {len(STRIDES)} scales)")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Floats
+from eidrive_scenario.perception.learned.graphs import Graph
 
 FEATURES = 96
 """Channels of the features."""
@@ -31,6 +34,20 @@ class FeatureCodec:
     codebook: Floats
     expand_weight: Floats
     expand_bias: Floats
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, NDArray[Any]]) -> FeatureCodec:
+        """Return the codec of these weights. Raise ValueError if arrays are missing or do not fit."""
+        graph = Graph(arrays)
+        scale = graph.array("latent_scale", ())
+        if not 0.0 < scale < np.inf:
+            raise ValueError(f"latent_scale is invalid (got {scale:g}; expected a positive number)")
+        return cls(
+            np.float32(scale),
+            graph.array("codebook", (CODES, LATENT)),
+            graph.array("expand.weight", (FEATURES, LATENT, 1, 1)).reshape(FEATURES, LATENT),
+            graph.array("expand.bias", (FEATURES,)),
+        )
 
     def expand(self, latent: Floats) -> Floats:
         """Return the features (96, N) of cells with these compressed features (8, N)."""

@@ -1,0 +1,122 @@
+"""Network `pillars`: features of a bird's-eye view, and the output maps of features."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.base.arrays import Floats
+from eidrive_scenario.base.detections import CLASSES
+from eidrive_scenario.perception.learned.graphs import IMAGE, Graph
+from eidrive_scenario.perception.learned.pillars.codec import FEATURES, LATENT, FeatureCodec
+from eidrive_scenario.perception.learned.pillars.decode import ATTRIBUTES
+from eidrive_scenario.perception.learned.pillars.grid import CELLS, CHANNELS
+from eidrive_scenario.perception.learned.quantization import Ranges
+from eidrive_scenario.perception.learned.runtimes import Runtime, load_onnx
+from eidrive_scenario.perception.learned.weights import Precision, another_network, read, read_weights, suitable
+
+NETWORK = "pillars"
+"""Name of the network in weight files."""
+STRIDE = 2
+"""Cells of the grid along an edge of a cell of the features."""
+BLOCKS = ((32, 1), (48, 2), (128, 4))
+"""Channels of each block, whose first convolution halves the resolution, and number of its further convolutions."""
+UP = 32
+"""Channels of each block after enlargement to the resolution of the features."""
+
+
+def features_onnx(arrays: Mapping[str, NDArray[Any]], ranges: Ranges | None = None) -> bytes:
+    """Return the ONNX model from a grid (1, 12, 256, 256) to its features (1, 96, 128, 128), with 8-bit integers if the
+    ranges of its layers are given.
+
+    Raise ValueError if the weights do not fit.
+    """
+    graph = Graph(arrays, CHANNELS)
+    x, levels = IMAGE, []
+    for block, (channels, depth) in enumerate(BLOCKS):
+        x = graph.relu_unit(x, f"block{block}.0", channels, 3, 2)
+        for layer in range(1, depth + 1):
+            x = graph.relu_unit(x, f"block{block}.{layer}", channels, 3)
+        factor = 2**block
+        enlarge = graph.relu_unit if factor == 1 else graph.enlarging_unit
+        levels.append(enlarge(x, f"up{block}", UP, factor))
+    return graph.onnx((CELLS, CELLS), {graph.concatenation(*levels): STRIDE}, ranges)
+
+
+def maps_onnx(arrays: Mapping[str, NDArray[Any]], classes: int) -> bytes:
+    """Return the ONNX model from features (1, 96, 128, 128) to the maps of objects (1, C + 13, 128, 128) and the
+    compressed features (1, 8, 128, 128).
+
+    Raise ValueError if the weights do not fit.
+    """
+    graph = Graph(arrays, FEATURES)
+    outputs = {graph.head(IMAGE, "head", classes + ATTRIBUTES): 1, graph.head(IMAGE, "compress", LATENT): 1}
+    return graph.onnx((CELLS // STRIDE, CELLS // STRIDE), outputs, None)
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Outputs of the network for features.
+
+    objects  (C + 13, 128, 128): class logits, then the attributes of `decode`;  latent  (8, 128, 128) of `FeatureCodec`
+    """
+
+    objects: Floats
+    latent: Floats
+
+
+class PillarNetwork:
+    """Network `pillars` with the weights of a file, executed by a runtime.
+
+    Features and maps are computed by two models, so that the maps of features have equal bits, whether the features
+    are those of the station or fused.
+
+    Raise SettingError if the weights are not suitable.
+    """
+
+    def __init__(self, path: Path, runtime: Runtime, precision: Precision = "float32") -> None:
+        weights = read(path)
+        description = weights.description
+        if description.network != NETWORK:
+            raise another_network(path, description.network, NETWORK)
+        self.classes = description.classes
+        self.confidence = description.confidence
+        """Default of the minimum score."""
+        with suitable(path):
+            if description.input_size != (CELLS, CELLS):
+                raise ValueError(f"its input size is invalid (expected {CELLS} x {CELLS})")
+            unknown = sorted(set(self.classes) - set(CLASSES))
+            if unknown:
+                raise ValueError(f"its class {unknown[0]!r} is unknown (expected some of {', '.join(CLASSES)})")
+            self.codec = FeatureCodec.of(weights.arrays)
+            models = (
+                features_onnx(weights.arrays, weights.ranges(precision)),
+                maps_onnx(weights.arrays, len(self.classes)),
+            )
+        self._features, self._maps = (load_onnx(runtime, path, 1, model) for model in models)
+
+    def features(self, grid: Floats) -> Floats:
+        """Return the features (96, 128, 128) of a grid (12, 256, 256)."""
+        return np.asarray(self._features(grid[None])[0][0])
+
+    def maps(self, features: Floats) -> Maps:
+        """Return the maps of features (96, 128, 128)."""
+        objects, latent = self._maps(np.ascontiguousarray(features[None]))
+        return Maps(objects[0], latent[0])
+
+
+def load_network(path: Path, runtime: Runtime, precision: Precision) -> PillarNetwork:
+    """Return the network, which stations and runs share. Raise SettingError if the weights are not suitable."""
+    return _load(path, hashlib.sha256(read_weights(path)).hexdigest(), runtime, precision)
+
+
+@lru_cache(maxsize=4)
+def _load(path: Path, digest: str, runtime: Runtime, precision: Precision) -> PillarNetwork:
+    return PillarNetwork(path, runtime, precision)
