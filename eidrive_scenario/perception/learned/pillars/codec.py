@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.perception.learned.graphs import Graph
+from eidrive_scenario.perception.learned.pillars.cell_layer import CellLayer
 
 FEATURES = 96
 """Channels of the features."""
@@ -40,19 +41,19 @@ class FeatureCodec:
         """Return the codec of these weights. Raise ValueError if arrays are missing or do not fit."""
         graph = Graph(arrays)
         scale = graph.array("latent_scale", ())
+        expand = CellLayer.of(arrays, "expand", LATENT, FEATURES)
         if not 0.0 < scale < np.inf:
             raise ValueError(f"latent_scale is invalid (got {scale:g}; expected a positive number)")
         return cls(
             np.float32(scale),
             graph.array("codebook", (CODES, LATENT)),
-            graph.array("expand.weight", (FEATURES, LATENT, 1, 1)).reshape(FEATURES, LATENT),
-            graph.array("expand.bias", (FEATURES,)),
+            expand.weight,
+            expand.bias,
         )
 
     def expand(self, latent: Floats) -> Floats:
         """Return the features (96, N) of cells with these compressed features (8, N)."""
-        features: Floats = self.expand_weight @ latent
-        features += self.expand_bias[:, None]
+        features = CellLayer(self.expand_weight, self.expand_bias)(latent)
         np.maximum(features, np.float32(0.0), out=features)
         return features
 

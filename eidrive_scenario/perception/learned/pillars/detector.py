@@ -104,15 +104,15 @@ class PillarDetector(Detector):
         """Return the road users in the fused features if there are any, else in the points of all lidars."""
         network = self._loaded()
         if readings.features is not None:
-            maps = network.maps(readings.features.features)
-            return self._objects(network, maps.objects, readings.features, readings.time)
+            maps = network.objects(readings.features.features)
+            return self._objects(network, maps, readings.features, readings.time)
         if not readings.lidars:
             return Detections(readings.time)
         clouds = list(self._lidars.revolutions(readings).values())
         frame, foot = LevelFrame.of(clouds[0].pose), float(readings.ego.position[2])
         view = self._history.add(readings.time, clouds, frame, foot)
         features = network.features(view.grid)
-        maps = network.maps(features)
+        maps = network.objects(features)
         self.feature_map = FeatureMap(
             readings.time,
             frame.x,
@@ -122,11 +122,11 @@ class PillarDetector(Detector):
             foot,
             STRIDE * CELL,
             features,
-            maps.latent,
-            class_probability(maps.objects),
+            network.compress(features),
+            class_probability(maps),
             view.age,
         )
-        return self._objects(network, maps.objects, self.feature_map, readings.time)
+        return self._objects(network, maps, self.feature_map, readings.time)
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show; 0 outside of the grid."""

@@ -1,10 +1,9 @@
-"""Network `pillars`: features of a bird's-eye view, and the output maps of features."""
+"""Network `pillars`: features of a bird's-eye view, and the objects and compressed features in them."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.base.detections import CLASSES
 from eidrive_scenario.perception.learned.graphs import IMAGE, Graph
+from eidrive_scenario.perception.learned.pillars.cell_layer import CellLayer
 from eidrive_scenario.perception.learned.pillars.codec import FEATURES, LATENT, FeatureCodec
 from eidrive_scenario.perception.learned.pillars.decode import ATTRIBUTES
 from eidrive_scenario.perception.learned.pillars.grid import CELLS, CHANNELS
@@ -50,33 +50,12 @@ def features_onnx(arrays: Mapping[str, NDArray[Any]], ranges: Ranges | None = No
     return graph.onnx((CELLS, CELLS), {graph.concatenation(*levels): STRIDE}, ranges)
 
 
-def maps_onnx(arrays: Mapping[str, NDArray[Any]], classes: int) -> bytes:
-    """Return the ONNX model from features (1, 96, 128, 128) to the maps of objects (1, C + 13, 128, 128) and the
-    compressed features (1, 8, 128, 128).
-
-    Raise ValueError if the weights do not fit.
-    """
-    graph = Graph(arrays, FEATURES)
-    outputs = {graph.head(IMAGE, "head", classes + ATTRIBUTES): 1, graph.head(IMAGE, "compress", LATENT): 1}
-    return graph.onnx((CELLS // STRIDE, CELLS // STRIDE), outputs, None)
-
-
-@dataclass(frozen=True)
-class Maps:
-    """Outputs of the network for features.
-
-    objects  (C + 13, 128, 128): class logits, then the attributes of `decode`;  latent  (8, 128, 128) of `FeatureCodec`
-    """
-
-    objects: Floats
-    latent: Floats
-
-
 class PillarNetwork:
     """Network `pillars` with the weights of a file, executed by a runtime.
 
-    Features and maps are computed by two models, so that the maps of features have equal bits, whether the features
-    are those of the station or fused.
+    classes     names in the order of the class logits;  confidence  default of the minimum score
+    objects     layer from features to the maps of objects (C + 13, 128, 128), which `decode` reads
+    compress    layer from features to compressed ones (8, 128, 128), of which `codec` makes a few bytes per cell
 
     Raise SettingError if the weights are not suitable.
     """
@@ -88,7 +67,6 @@ class PillarNetwork:
             raise another_network(path, description.network, NETWORK)
         self.classes = description.classes
         self.confidence = description.confidence
-        """Default of the minimum score."""
         with suitable(path):
             if description.input_size != (CELLS, CELLS):
                 raise ValueError(f"its input size is invalid (expected {CELLS} x {CELLS})")
@@ -96,20 +74,14 @@ class PillarNetwork:
             if unknown:
                 raise ValueError(f"its class {unknown[0]!r} is unknown (expected some of {', '.join(CLASSES)})")
             self.codec = FeatureCodec.of(weights.arrays)
-            models = (
-                features_onnx(weights.arrays, weights.ranges(precision)),
-                maps_onnx(weights.arrays, len(self.classes)),
-            )
-        self._features, self._maps = (load_onnx(runtime, path, 1, model) for model in models)
+            self.objects = CellLayer.of(weights.arrays, "head", FEATURES, len(self.classes) + ATTRIBUTES)
+            self.compress = CellLayer.of(weights.arrays, "compress", FEATURES, LATENT)
+            model = features_onnx(weights.arrays, weights.ranges(precision))
+        self._features = load_onnx(runtime, path, 1, model)
 
     def features(self, grid: Floats) -> Floats:
         """Return the features (96, 128, 128) of a grid (12, 256, 256)."""
         return np.asarray(self._features(grid[None])[0][0])
-
-    def maps(self, features: Floats) -> Maps:
-        """Return the maps of features (96, 128, 128)."""
-        objects, latent = self._maps(np.ascontiguousarray(features[None]))
-        return Maps(objects[0], latent[0])
 
 
 def load_network(path: Path, runtime: Runtime, precision: Precision) -> PillarNetwork:
