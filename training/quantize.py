@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,19 +28,15 @@ from training.calibrate import write_description
 from training.image_evaluation import rendered
 
 
-def layer_ranges(path: Path, images: Sequence[NDArray[np.uint8]]) -> dict[str, tuple[float, float]]:
-    """Return the range of each layer that is converted to integers: the means over the images."""
-    weights = read(path)
-    model = onnx.load_from_string(weights.onnx())
+def layer_ranges(content: bytes, inputs: Iterable[Floats]) -> dict[str, tuple[float, float]]:
+    """Return the range of each layer of an ONNX model that is converted to integers: the means over the inputs."""
+    model = onnx.load_from_string(content)
     outputs = [entry.name for entry in model.graph.output]
     layers = [node.output[0] for node in model.graph.node if has_range(node.op_type, node.output[0], outputs)]
     model.graph.output.extend(onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, None) for name in layers)
     session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
     limits = np.array(
-        [
-            [(values.min(), values.max()) for values in session.run(layers, {IMAGE: pixels})]
-            for pixels in _inputs(images, weights.description.input_size)
-        ]
+        [[(values.min(), values.max()) for values in session.run(layers, {IMAGE: image})] for image in inputs]
     )
     return {name: (float(least), float(most)) for name, (least, most) in zip(layers, limits.mean(axis=0), strict=True)}
 
@@ -60,7 +56,8 @@ def main() -> None:
     rows = np.linspace(0, len(dataset) - 1, min(options.pictures, len(dataset))).astype(int).tolist()
     images = list(dataset.images(rows))
     for path in options.weights:
-        ranges = layer_ranges(path, images)
+        weights = read(path)
+        ranges = layer_ranges(weights.onnx(), _inputs(images, weights.description.input_size))
         write_description(path, ranges={name: np.round(limits, 5).tolist() for name, limits in ranges.items()})
         card = path.with_suffix(".json")
         record = json.loads(card.read_text(encoding="utf-8"))

@@ -2,7 +2,7 @@
 
 Runtimes compute a convolution with integers if its inputs come from such pairs. Activations have one scale per layer,
 weights one per output channel. The activation function after a convolution, and the last convolutions of the network,
-compute in single precision.
+compute in single precision. So do transposed convolutions.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ def quantized(
     """Return the operations and constants of a graph whose convolutions compute with 8-bit integers.
 
     nodes    operations in the order of execution; tensors  their constants in single precision
-    image    input of the graph, whose values are multiples of 1/255 between 0 and 1
+    image    input of the graph; without a range, its values are multiples of 1/255 between 0 and 1
     outputs  layers whose outputs the graph returns
     ranges   of all layers that `has_range` selects
 
     Raise ValueError if the range of a layer is missing.
     """
     graph = _QuantizedGraph(tensors)
-    graph.quantize(image, 0.0, 1.0)
+    graph.quantize(image, *ranges.get(image, (0.0, 1.0)))
     for node in nodes:
         inputs = [graph.integer_source.get(name, name) for name in node.inputs]
         if node.operator == "Conv" and node.output not in outputs:
@@ -56,9 +56,9 @@ def quantized(
 
 
 def has_range(operator: str, output: str, outputs: Sequence[str]) -> bool:
-    """Return whether the output of an operation is converted to integers: all but those inside of SiLU, and the
-    outputs of the network."""
-    return operator not in ("Conv", "Sigmoid") and output not in outputs
+    """Return whether the output of an operation is converted to integers: all but those before or inside of an
+    activation, and the outputs of the network."""
+    return operator not in ("Conv", "ConvTranspose", "Sigmoid") and output not in outputs
 
 
 class _QuantizedGraph:

@@ -31,4 +31,4 @@ class CellLayer(NamedTuple):
         """Return the outputs (O, ...) for the channels (I, ...) of cells."""
         outputs: Floats = self.weight @ values.reshape(len(values), -1)
         outputs += self.bias[:, None]
-        return outputs.reshape(-1, *values.shape[1:])
+        return outputs.reshape(len(outputs), *values.shape[1:])

@@ -31,6 +31,9 @@ BLOCKS = ((32, 1), (48, 2), (128, 4))
 UP = 32
 """Channels of each block after enlargement to the resolution of the features."""
 
+INPUT_RANGE = (-0.5, 2.0)
+"""Range of a grid for 8-bit integers: offsets are at least -0.5, and 400 points in a cell are 2."""
+
 
 def features_onnx(arrays: Mapping[str, NDArray[Any]], ranges: Ranges | None = None) -> bytes:
     """Return the ONNX model from a grid (1, 12, 256, 256) to its features (1, 96, 128, 128), with 8-bit integers if the
@@ -47,6 +50,7 @@ def features_onnx(arrays: Mapping[str, NDArray[Any]], ranges: Ranges | None = No
         factor = 2**block
         enlarge = graph.relu_unit if factor == 1 else graph.enlarging_unit
         levels.append(enlarge(x, f"up{block}", UP, factor))
+    ranges = None if ranges is None else {IMAGE: INPUT_RANGE, **ranges}
     return graph.onnx((CELLS, CELLS), {graph.concatenation(*levels): STRIDE}, ranges)
 
 
