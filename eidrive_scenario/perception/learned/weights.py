@@ -155,17 +155,21 @@ class Weights:
         if precision == "float32":
             return None
         if not self.description.ranges:
-            raise ValueError("its layers have no ranges for int8 (`python -m training.quantize FILE` adds them)")
+            raise ValueError("its layers have no ranges for int8 (training/quantize.py computes them)")
         return self.description.ranges
 
 
 _IMAGE_GRAPHS = {"yolov5": yolov5_onnx, "ssd": ssd_onnx}
 
 
-def read(path: Path) -> Weights:
-    """Return the content of a weight file. Raise SettingError if the file does not contain weights."""
+FOR_IMAGES = "use a file that training/train.py has written, or an ONNX model (.onnx)"
+"""Hint for unsuitable weights of a detector of images."""
+
+
+def read(path: Path, hint: str = FOR_IMAGES) -> Weights:
+    """Return the content of a weight file. Raise SettingError with this hint if the file does not contain weights."""
     content = read_weights(path)
-    with suitable(path):
+    with suitable(path, hint):
         arrays = read_arrays(content)
         return Weights(_parse_description(json.loads(str(arrays[DESCRIPTION]))), arrays)
 
@@ -177,13 +181,12 @@ def another_network(path: Path, network: str, expected: str) -> SettingError:
 
 
 @contextmanager
-def suitable(path: Path) -> Iterator[None]:
-    """Raise SettingError with this path if the block finds that weights are damaged or do not fit."""
+def suitable(path: Path, hint: str = FOR_IMAGES) -> Iterator[None]:
+    """Raise SettingError with this path and hint if the block finds that weights are damaged or do not fit."""
     try:
         yield
     except _DAMAGED as error:
         reason = shortened(str(error), 200) if type(error) is ValueError else type(error).__name__
-        hint = "use a file that training/train.py has written, or an ONNX model (.onnx)"
         raise SettingError(Diagnostic(f"weights {quoted(str(path))} do not fit: {reason}", hint)) from error
 
 

@@ -71,7 +71,7 @@ def test_missing_range_of_a_layer_raises_error() -> None:
 @pytest.mark.parametrize(
     ("ranges", "diagnostic"),
     [
-        ({}, r"its layers have no ranges for int8 \(`python -m training.quantize FILE` adds them\)"),
+        ({}, r"its layers have no ranges for int8 \(training/quantize.py computes them\)"),
         ({"mul_2": [2.0, -1.0]}, "ranges: invalid range"),
         ({"mul_2": [0.0, float("inf")]}, "ranges: invalid range"),
         ({"mul_2": [0.0, 1.0]}, "the range of layer mul_5 is missing"),

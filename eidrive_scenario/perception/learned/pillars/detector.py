@@ -38,7 +38,7 @@ from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 class PillarSettings(Settings):
     """Settings of the property `detector_settings`.
 
-    weights     path of a .npz relative to the working directory; None: the shipped weights
+    weights     path relative to the working directory; None: the shipped weights
     confidence  minimum score of a box; None: that of the weights
     runtime     library that executes the network; `auto`: the fastest one that is installed
     precision   `int8` executes the network by OpenVINO with 8-bit integers
@@ -58,7 +58,7 @@ class PillarDetector(Detector):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
-    default_sensors: ClassVar[Mapping[str, SensorSettings]] = {"lidar": LidarSettings(rate=10.0)}
+    default_sensors: ClassVar[Mapping[str, SensorSettings]] = {"lidar": LidarSettings(rate=10.0, rotation=10.0)}
     settings_type: ClassVar[type[Settings] | None] = PillarSettings
 
     def __init__(self, settings: PillarSettings | None = None) -> None:

@@ -24,6 +24,8 @@ from eidrive_scenario.perception.learned.weights import Precision, another_netwo
 
 NETWORK = "pillars"
 """Name of the network in weight files."""
+HINT = "use the shipped weights, or a .npz with the arrays of `pillars` (docs/perception.md)"
+"""Hint for unsuitable weights."""
 STRIDE = 2
 """Cells of the grid along an edge of a cell of the features."""
 BLOCKS = ((32, 1), (48, 2), (128, 4))
@@ -65,13 +67,13 @@ class PillarNetwork:
     """
 
     def __init__(self, path: Path, runtime: Runtime, precision: Precision = "float32") -> None:
-        weights = read(path)
+        weights = read(path, HINT)
         description = weights.description
         if description.network != NETWORK:
             raise another_network(path, description.network, NETWORK)
         self.classes = description.classes
         self.confidence = description.confidence
-        with suitable(path):
+        with suitable(path, HINT):
             if description.input_size != (CELLS, CELLS):
                 raise ValueError(f"its input size is invalid (expected {CELLS} x {CELLS})")
             unknown = sorted(set(self.classes) - set(CLASSES))

@@ -162,7 +162,9 @@ def test_unsuitable_latent_scale_raises_error(scale: float, tmp_path: Path) -> N
 def test_truncated_file_raises_error(share: float, tmp_path: Path) -> None:
     content = save(tmp_path / "weights.npz", plain_arrays()).read_bytes()
     (tmp_path / "cut.npz").write_bytes(content[: int(share * len(content))])
-    with pytest.raises(SettingError, match=r"cut.npz' do not fit: .*use a file that training/"):
+    with pytest.raises(
+        SettingError, match=r"cut.npz' do not fit: .*; use the shipped weights, or a .npz with the arrays"
+    ):
         PillarNetwork(tmp_path / "cut.npz", "opencv")
 
 
