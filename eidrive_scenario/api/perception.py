@@ -5,6 +5,7 @@ Stable: all names except `lift` and `MapContext`, which may change with a minor 
 
 from eidrive_scenario.base.detections import CLASSES as CLASSES
 from eidrive_scenario.base.detections import Detections as Detections
+from eidrive_scenario.base.feature_map import FeatureMap as FeatureMap
 from eidrive_scenario.perception.detector import Detector as Detector
 from eidrive_scenario.perception.detector import DetectorContext as DetectorContext
 from eidrive_scenario.perception.geometry.map_context import MapContext as MapContext

@@ -1,4 +1,4 @@
-"""Features of one station on its bird's-eye-view grid: produced by detectors, transmitted and fused."""
+"""Features of one station on a grid in plan view: produced by detectors, transmitted and fused."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from eidrive_scenario.base.arrays import Floats
 
 
 class FeatureMap(msgspec.Struct, frozen=True, gc=False):
-    """Features of one station at one instant on its bird's-eye-view grid.
+    """Features of one station at one instant on a grid in plan view.
 
     The grid is centered on the first lidar of the station; its x axis has the heading of this lidar, y is to the left.
     Arrays have the index [channel, i, j], where i is along x and j along y. The center of cell (i, j) of n x n cells

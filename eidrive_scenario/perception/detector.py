@@ -89,7 +89,7 @@ class Detector(ABC):
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
     """Detections in the last image of each camera, for detectors that process images; recorded with the boxes."""
     feature_map: FeatureMap | None = None
-    """Features of the points in the last readings, for detectors with bird's-eye-view features."""
+    """Features of the points in the last readings, for detectors that compute a grid of features."""
 
     def check_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - an optional hook
         """Raise SettingError if `load_weights` would refuse its data without reading it, as `eidrive check` reports."""

@@ -1,1 +1,1 @@
-"""Detector `pillars`: a network on the bird's-eye view of lidar points, whose features stations can exchange."""
+"""Detector `pillars`: a network on lidar points in plan view, whose features stations can exchange."""

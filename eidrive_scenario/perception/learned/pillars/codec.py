@@ -1,4 +1,4 @@
-"""Compression of bird's-eye-view features to a few bytes per cell."""
+"""Compression of features to a few bytes per cell."""
 
 from __future__ import annotations
 

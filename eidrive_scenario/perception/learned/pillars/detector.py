@@ -1,4 +1,4 @@
-"""Detector `pillars`: a network on the bird's-eye view of lidar points."""
+"""Detector `pillars`: a network on lidar points in plan view."""
 
 from __future__ import annotations
 
@@ -110,8 +110,8 @@ class PillarDetector(Detector):
             return Detections(readings.time)
         clouds = list(self._lidars.revolutions(readings).values())
         frame, foot = LevelFrame.of(clouds[0].pose), float(readings.ego.position[2])
-        view = self._history.add(readings.time, clouds, frame, foot)
-        features = network.features(view.grid)
+        grid = self._history.add(readings.time, clouds, frame, foot)
+        features = network.features(grid.channels)
         maps = network.objects(features)
         self.feature_map = FeatureMap(
             readings.time,
@@ -124,7 +124,7 @@ class PillarDetector(Detector):
             features,
             network.compress(features),
             class_probability(maps),
-            view.age,
+            grid.age,
         )
         return self._objects(network, maps, self.feature_map, readings.time)
 

@@ -1,4 +1,4 @@
-"""Bird's-eye view of lidar points: statistics of the points above each cell of a grid (pillars)."""
+"""Grid of lidar points in plan view: statistics of the points of each cell (pillars)."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ TOLERANCE = 0.05
 
 
 @dataclass(frozen=True)
-class BirdsEyeView:
-    """Grid of a scan, and the age of the earlier scan in it [s], None without one.
+class PillarGrid:
+    """Statistics of a scan, and the age of the earlier scan in them [s], None without one.
 
-    The grid (12, 256, 256) has the index [channel, i, j], with i along x and j along y of a level frame, centered on
+    `channels` (12, 256, 256) has the index [channel, i, j], with i along x and j along y of a level frame, centered on
     its origin. Points of objects are those between CLEARANCE and TALLEST above the ground, points of the ground those
     below. Channels of a cell:
 
@@ -46,7 +46,7 @@ class BirdsEyeView:
     All but 7 are 0 without points of objects.
     """
 
-    grid: Floats
+    channels: Floats
     age: float | None
 
 
@@ -65,8 +65,8 @@ class ScanHistory:
     def __init__(self) -> None:
         self._scans: deque[_Standing] = deque()
 
-    def add(self, time: float, clouds: list[LidarReading], frame: LevelFrame, foot: float) -> BirdsEyeView:
-        """Return the bird's-eye view of these point clouds in a level frame.
+    def add(self, time: float, clouds: list[LidarReading], frame: LevelFrame, foot: float) -> PillarGrid:
+        """Return the grid of these point clouds in a level frame.
 
         The earlier scan is the one whose age is nearest to STEP, within TOLERANCE. Its points are moved by the poses
         that the station assumed.
@@ -85,7 +85,7 @@ class ScanHistory:
         fill(points, height, intensity, frame.to_local(earlier.plan), earlier.height, CLEARANCE, grid)
         standing = (height > CLEARANCE) & (height < TALLEST)
         self._scans.append(_Standing(time, frame.to_world(points[standing, :2]), height[standing]))
-        return BirdsEyeView(grid, None if earlier is _NOTHING else time - earlier.time)
+        return PillarGrid(grid, None if earlier is _NOTHING else time - earlier.time)
 
 
 _NOTHING = _Standing(-math.inf, np.empty((0, 2)), np.empty(0))
@@ -101,7 +101,7 @@ def fill(
     clearance: float,
     grid: Floats,
 ) -> None:
-    """Write the channels of BirdsEyeView into a grid (12, n, n): sums and extremes of each cell first, then means.
+    """Write the channels of a PillarGrid (12, n, n): sums and extremes of each cell first, then means.
 
     points     (N, 3) in the level frame [m]; their height (N,) above the ground [m] and intensity (N,)
     earlier    (M, 2) points of objects of the earlier scan in the same frame [m], their height (M,) above the ground

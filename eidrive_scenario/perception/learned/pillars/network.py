@@ -1,4 +1,4 @@
-"""Network `pillars`: features of a bird's-eye view, and the objects and compressed features in them."""
+"""Network `pillars`: features of a grid of lidar points, and the objects and compressed features in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bird's-eye view of lidar points: channels of the grid, and the earlier scan."""
+"""Lidar points in plan view: channels of the grid, and the earlier scan."""
 
 from __future__ import annotations
 
@@ -112,9 +112,9 @@ def test_history_standing_wall_is_in_same_cells_of_both_scans() -> None:
         history.add(time, [reading(points, frame)], frame, 0.0) for time, frame in zip((0.3, 0.5), poses, strict=True)
     )
     assert first.age is None
-    assert not first.grid[8:].any()
+    assert not first.channels[8:].any()
     assert second.age == pytest.approx(0.2)
-    present, earlier = second.grid[[0, 1, 5, 6]], second.grid[8:]
+    present, earlier = second.channels[[0, 1, 5, 6]], second.channels[8:]
     np.testing.assert_allclose(earlier, present, atol=1e-4)
     assert np.count_nonzero(present[0]) > 20
 
@@ -145,7 +145,7 @@ def test_history_lidars_of_station_form_one_cloud() -> None:
     another = LevelFrame(-1.5, 0.7, 1.2, math.pi)
     parts = [reading(points[::2], FOOT_POSE), reading(points[1::2], another, math.radians(20.0))]
     divided = ScanHistory().add(0.0, parts, FOOT_POSE, 0.0)
-    np.testing.assert_allclose(divided.grid, together.grid, atol=1e-5)
+    np.testing.assert_allclose(divided.channels, together.channels, atol=1e-5)
 
 
 @pytest.mark.parametrize("slope", [-0.08, 0.0, 0.06])
@@ -153,10 +153,10 @@ def test_history_tilted_lidar_on_slope_measures_heights_above_ground(slope: floa
     """A unit 6 m above a sloping road, pitched down by 30 degrees: the wall is 1.0 m to 1.5 m above the road."""
     frame = LevelFrame(0.0, 0.0, 6.0, 0.0)
     view = ScanHistory().add(0.0, [reading(street(slope), frame, math.radians(30.0))], frame, 0.0)
-    occupied = np.argwhere(view.grid[0] > 0.0)
+    occupied = np.argwhere(view.channels[0] > 0.0)
     assert set(occupied[:, 0].tolist()) == {math.floor(10.2 / 0.4) + 128}
     np.testing.assert_allclose(
-        4.0 * view.grid[1:3, occupied[:, 0], occupied[:, 1]], [[1.5], [1.0]] * np.ones(len(occupied)), atol=0.1
+        4.0 * view.channels[1:3, occupied[:, 0], occupied[:, 1]], [[1.5], [1.0]] * np.ones(len(occupied)), atol=0.1
     )
 
 
@@ -164,5 +164,5 @@ def test_history_empty_cloud_has_empty_grid() -> None:
     history = ScanHistory()
     for time in (0.0, 0.2):
         view = history.add(time, [reading(np.empty((0, 3)), FOOT_POSE)], FOOT_POSE, 0.0)
-        assert not view.grid.any()
+        assert not view.channels.any()
     assert view.age == pytest.approx(0.2)
