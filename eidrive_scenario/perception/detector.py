@@ -74,7 +74,8 @@ class Detector(ABC):
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {}
     """Sensors by name of a station that configures none; if empty, one of each kind in `needs`."""
     provides_velocity: ClassVar[bool] = False
-    """Whether the boxes have velocities; otherwise a tracker estimates them, unless the station disables it."""
+    """Whether the boxes have velocities that need no tracker; otherwise a tracker estimates them, unless the station
+    disables it."""
     detectable_signals: frozenset[str] = frozenset()
     """Kinds of signals that the detector reads, out of `light` and `stop sign`. The station takes the others from the
     map and the line of sight."""
