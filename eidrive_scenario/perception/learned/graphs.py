@@ -110,12 +110,19 @@ class Graph:
         attributes = {"coordinate_transformation_mode": "asymmetric", "mode": "nearest", "nearest_mode": "floor"}
         return self._add("Resize", (source, "", "doubled"), self._channels[source], **attributes)
 
-    def onnx(self, input_size: tuple[int, int], outputs: Mapping[str, int], ranges: Ranges | None) -> bytes:
+    def onnx(
+        self,
+        input_size: tuple[int, int],
+        outputs: Mapping[str, int],
+        ranges: Ranges | None,
+        single: Sequence[str] = (),
+    ) -> bytes:
         """Return the ONNX model.
 
         input_size  width and height of its input [px]
         outputs     layers whose outputs it returns, with the distance of their cells [px]
         ranges      of the layers, to compute with 8-bit integers; None: in single precision
+        single      layers whose outputs stay in single precision
 
         Raise ValueError if a range is missing.
         """
@@ -127,7 +134,7 @@ class Graph:
         nodes: Sequence[Node] = self._nodes
         tensors: Mapping[str, NDArray[Any]] = self._tensors
         if ranges is not None:
-            nodes, tensors = quantized(nodes, tensors, IMAGE, list(outputs), ranges)
+            nodes, tensors = quantized(nodes, tensors, IMAGE, list(outputs), ranges, single)
         return onnx_model(nodes, tensors, {IMAGE: (1, self._channels[IMAGE], height, width)}, shapes)
 
     def _relu(self, source: str) -> str:

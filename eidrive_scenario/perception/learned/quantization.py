@@ -31,13 +31,15 @@ def quantized(
     image: str,
     outputs: Sequence[str],
     ranges: Ranges,
+    single: Sequence[str] = (),
 ) -> tuple[list[Node], dict[str, NDArray[Any]]]:
     """Return the operations and constants of a graph whose convolutions compute with 8-bit integers.
 
     nodes    operations in the order of execution; tensors  their constants in single precision
     image    input of the graph; without a range, its values are multiples of 1/255 between 0 and 1
     outputs  layers whose outputs the graph returns
-    ranges   of all layers that `has_range` selects
+    ranges   of all layers that `has_range` selects, except `single`
+    single   layers whose outputs stay in single precision, with the convolutions that read them
 
     Raise ValueError if the range of a layer is missing.
     """
@@ -45,10 +47,10 @@ def quantized(
     graph.quantize(image, *ranges.get(image, (0.0, 1.0)))
     for node in nodes:
         inputs = [graph.integer_source.get(name, name) for name in node.inputs]
-        if node.operator == "Conv" and node.output not in outputs:
+        if node.operator == "Conv" and node.inputs[0] in graph.integer_source and node.output not in outputs:
             inputs[1:] = graph.integer_weights(*node.inputs)
         graph.nodes.append(Node(node.operator, inputs, node.output, node.attributes))
-        if has_range(node.operator, node.output, outputs):
+        if has_range(node.operator, node.output, outputs) and node.output not in single:
             if node.output not in ranges:
                 raise ValueError(f"the range of layer {node.output} is missing")
             graph.quantize(node.output, *ranges[node.output])

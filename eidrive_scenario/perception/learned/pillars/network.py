@@ -41,19 +41,23 @@ def features_onnx(arrays: Mapping[str, NDArray[Any]], ranges: Ranges | None = No
     """Return the ONNX model from a grid (1, 12, 256, 256) to its features (1, 96, 128, 128), with 8-bit integers if the
     ranges of its layers are given.
 
+    The outputs of the first block stay in single precision: few of them are large, and would leave few steps for the
+    others.
+
     Raise ValueError if the weights do not fit.
     """
     graph = Graph(arrays, CHANNELS)
-    x, levels = IMAGE, []
+    x, units, levels = IMAGE, [], []
     for block, (channels, depth) in enumerate(BLOCKS):
-        x = graph.relu_unit(x, f"block{block}.0", channels, 3, 2)
-        for layer in range(1, depth + 1):
-            x = graph.relu_unit(x, f"block{block}.{layer}", channels, 3)
+        for layer in range(depth + 1):
+            x = graph.relu_unit(x, f"block{block}.{layer}", channels, 3, 1 if layer else 2)
+            units.append(x)
         factor = 2**block
         enlarge = graph.relu_unit if factor == 1 else graph.enlarging_unit
         levels.append(enlarge(x, f"up{block}", UP, factor))
+    first = units[: BLOCKS[0][1] + 1]
     ranges = None if ranges is None else {IMAGE: INPUT_RANGE, **ranges}
-    return graph.onnx((CELLS, CELLS), {graph.concatenation(*levels): STRIDE}, ranges)
+    return graph.onnx((CELLS, CELLS), {graph.concatenation(*levels): STRIDE}, ranges, first)
 
 
 class PillarNetwork:
