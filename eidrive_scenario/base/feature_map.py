@@ -2,9 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Floats
+
+
+class LatentCodec(Protocol):
+    """Compression of features to the bytes of messages, and back. Arrays have one column per cell."""
+
+    @property
+    def scale(self) -> Any:
+        """Latent units of one step of an integer."""
+
+    def to_int8(self, latent: Floats) -> NDArray[np.int8]:
+        """Return compressed features (8, N) as integers (8, N)."""
+
+    def from_int8(self, steps: NDArray[np.int8]) -> Floats:
+        """Return the compressed features (8, N) that integers stand for."""
+
+    def to_codes(self, latent: Floats) -> NDArray[np.uint8]:
+        """Return the entries (N,) of the code book that are nearest to compressed features (8, N)."""
+
+    def from_codes(self, codes: NDArray[np.uint8]) -> Floats:
+        """Return entries of the code book as compressed features (8, N)."""
+
+    def expand(self, latent: Floats) -> Floats:
+        """Return the features (96, N) of compressed features (8, N)."""
 
 
 class FeatureMap(msgspec.Struct, frozen=True, gc=False):

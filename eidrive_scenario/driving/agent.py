@@ -12,7 +12,7 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.own_body import OwnBody
-from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore, PointCloudSharing, ReportStore
+from eidrive_scenario.driving.communication.report_store import PerceptionRegionStore, ReportStore, SensorDataSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.result_checks import check_control, check_followed, check_plan, is_valid_control
@@ -51,7 +51,7 @@ class Agent:
         message_generator: MessageGenerator,
         dt: float,
         receives_messages: bool = True,
-        points: PointCloudSharing | None = None,
+        sharing: SensorDataSharing | None = None,
     ) -> None:
         self.name = spec.name
         self.spec = spec
@@ -63,7 +63,7 @@ class Agent:
         self.controller = controller
         self.receives_messages = receives_messages
         """Whether the station receives messages; a station that does not drive may only transmit."""
-        self.points = points
+        self.sharing = sharing
         self._message_generator = message_generator
         self._detections = Detections(0.0)
         self._regions: PerceptionRegionStore | None = None
@@ -73,7 +73,7 @@ class Agent:
             self._view = (everywhere,) if planner.view is None else planner.view
         self._own_body = OwnBody(spec, duration=settings.report_lifetime, dt=dt)
         self._reports = ReportStore(
-            self.name, settings, fusion=fusion, own_body=self._own_body, regions=self._regions, points=points
+            self.name, settings, fusion=fusion, own_body=self._own_body, regions=self._regions, sharing=sharing
         )
 
     @property
@@ -143,7 +143,10 @@ class Agent:
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
         x, y, z = ego.position.tolist()
         state = StationState(ego.time, x, y, z, ego.yaw, ego.speed, covariance)
-        found = fresh if self.points is None else self.points.perceive(readings, fresh, self.perception.pose)
+        found = fresh
+        if self.sharing is not None:
+            found = self.sharing.perceive(readings, fresh, self.perception.pose)
+            found = None if found is None else self._own_body.without(found)
         if found is not None and not own_perception:
             own_state = replace(state, pose_covariance=None)
             change = self.perception.pose_change(found.time)
@@ -204,7 +207,7 @@ class Agent:
                 perceived.state,
                 action.shared(detections),
                 now,
-                self.points.own if self.points is not None else None,
+                () if self.sharing is None else self.sharing.own,
                 interval=perceived.message_interval,
             )
             if action.send

@@ -6,7 +6,7 @@ from typing import Any
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
-from eidrive_scenario.driving.communication.report_store import PointCloudSharing
+from eidrive_scenario.driving.communication.report_store import SensorDataSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.route_planner import Planner
@@ -66,15 +66,20 @@ def build_fusion(
 ) -> FusionMethod:
     """Build the fusion method of a station.
 
-    Raise SettingError with this location if its settings are invalid, or if it shares points that the detector does not
-    read.
+    Raise SettingError with this location if its settings are invalid, or if it shares sensor data that the detector
+    does not have.
     """
     name, given = settings.fusion, settings.fusion_settings
     kind: type[FusionMethod] = registry("fusion").load(name, FusionMethod)
     own = parse_own_settings("fusion", name, kind, given, setting="fusion_settings", source=source, line=line)
-    if kind.shares_points and "lidar" not in detector.needs:
-        message = f"fusion method {name!r} shares points, which detector {settings.detector!r} does not read"
-        raise SettingError(Diagnostic(message, "select a detector that reads lidars, such as 'lidar'", source, line))
+    lacking = {
+        "points": ("lidar" not in detector.needs, "does not read", "reads lidars, such as 'lidar'"),
+        "features": (not detector.provides_features, "does not compute", "computes features, such as 'pillars'"),
+    }
+    is_lacking, lacks, suitable = lacking.get(kind.shares or "", (False, "", ""))
+    if is_lacking:
+        message = f"fusion method {name!r} shares {kind.shares}, which detector {settings.detector!r} {lacks}"
+        raise SettingError(Diagnostic(message, f"select a detector that {suitable}", source, line))
     return _construct(kind, own=own)  # type: ignore[no-any-return]
 
 
@@ -121,15 +126,7 @@ def build_agent(
     fusion = build_fusion(settings, detector)
     used = [sensor for sensor in sensors.values() if sensor.kind in detector.needs]
     view = view_sectors(used, spec)
-    points = None
     listens = planner != NO_PLANNER or settings.restricts_senders
-    if fusion.shares_points:
-        joint = None
-        if listens:  # perception of merged points: that of the station, without localization
-            another = build_detector(settings)
-            another.setup(installation)
-            joint = Perception(another, tracker=_tracker(settings, another), latency=settings.detector_latency)
-        points = PointCloudSharing(fusion, joint)
     driver: Planner | None = None
     if planner != NO_PLANNER:
         driver = construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed)
@@ -142,18 +139,30 @@ def build_agent(
     if settings.localization == "ekf":
         imu = next(sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings))
         localizer = Localizer(spec.name, seed, noise=motion_noise(imu))
+    perception = Perception(
+        detector,
+        tracker=_tracker(settings, detector),
+        localizer=localizer,
+        latency=settings.detector_latency,
+        pose_error=settings.pose_error,
+        pose_noise=None if noise is None else PoseNoiseProcess(noise, spec.name, seed),
+        false_objects=settings.false_objects,
+    )
+    sharing = None
+    if fusion.shares is not None:
+        fusion.setup(detector)
+        joint = None
+        if listens:  # perception of merged data: that of the station, without localization
+            another = detector if fusion.shares == "features" else build_detector(settings)
+            if another is not detector:
+                another.setup(installation)
+            joint = Perception(another, tracker=_tracker(settings, another), latency=settings.detector_latency)
+        limit = settings.mtu - settings.security_bytes
+        sharing = SensorDataSharing(fusion, perception, joint, limit=limit, latency=settings.detector_latency)
     return Agent(
         spec,
         settings,
-        perception=Perception(
-            detector,
-            tracker=_tracker(settings, detector),
-            localizer=localizer,
-            latency=settings.detector_latency,
-            pose_error=settings.pose_error,
-            pose_noise=None if noise is None else PoseNoiseProcess(noise, spec.name, seed),
-            false_objects=settings.false_objects,
-        ),
+        perception=perception,
         fusion=fusion,
         planner=driver,
         controller=controller,
@@ -162,7 +171,7 @@ def build_agent(
         ),
         dt=dt,
         receives_messages=listens,
-        points=points,
+        sharing=sharing,
     )
 
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from msgspec.structs import replace
 from pydantic import PositiveFloat
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import points_in_box
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
 from eidrive_scenario.sensing.readings import LidarReading, Readings
-from eidrive_scenario.v2x.messages.message import PointCloud, compress
+from eidrive_scenario.v2x.messages.message import Payload, PointCloud, compress
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):
@@ -40,29 +41,41 @@ class EarlyFusion(CovarianceIntersectionFusion):
 
     settings_type: ClassVar[type[Settings] | None] = EarlyFusionSettings
 
-    shares_points: ClassVar[bool] = True
+    shares: ClassVar[Literal["points", "features"] | None] = "points"
 
     def __init__(self, settings: EarlyFusionSettings | None = None) -> None:
         self.early = settings or EarlyFusionSettings()
+        self._received: dict[str, tuple[float, Array]] = {}
+        """Time and points (N, 3) of the newest cloud of each station."""
         super().__init__(self.early)
 
     @property
-    def max_point_age(self) -> float:
+    def max_payload_age(self) -> float:
         return self.early.max_lateness
 
-    def shared_cloud(self, readings: Readings) -> PointCloud | None:
-        """Return the points of all lidars of a station for transmission; None without a lidar reading."""
+    def payloads(self, readings: Readings, limit: int) -> tuple[Payload, ...]:
+        """Return the points of all lidars of a station."""
         if not readings.lidars:
-            return None
+            return ()
         points = np.concatenate([_to_world(reading) for reading in readings.lidars.values()])
-        return compress(points, readings.time, self.early.cell)
+        return (compress(points, readings.time, self.early.cell),)
 
-    def merge_readings(self, readings: Readings, received: Sequence[Array]) -> Readings:
-        """Return the readings with received points (N, 3) added to those of the first lidar."""
-        if not readings.lidars or not received:
+    def add_payload(self, sender: str, payload: Payload, body: Array) -> None:
+        """Store a received cloud. An out-of-sequence cloud does not replace a newer one."""
+        held = self._received.get(sender)
+        if isinstance(payload, PointCloud) and (held is None or payload.time >= held[0]):
+            points = payload.points()
+            self._received[sender] = payload.time, points[~points_in_box(points, body)]
+
+    def merge_readings(self, readings: Readings) -> Readings:
+        """Return the readings with the received points added to those of the first lidar."""
+        oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
+        self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}
+        if not readings.lidars or not self._received:
             return readings
         name, first = next(iter(readings.lidars.items()))
         own = [_to_world(reading) for other, reading in readings.lidars.items() if other != name]
+        received = [points for _, (_, points) in sorted(self._received.items())]
         offset = np.concatenate([*own, *received]) - first.pose[:3, 3]
         points = np.concatenate([first.points, offset @ first.pose[:3, :3]])
         intensity = np.concatenate([first.intensity, np.ones(len(offset))])

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import msgspec
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.extensions.settings import Settings
+from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
-from eidrive_scenario.v2x.messages.message import PointCloud, StationState
+from eidrive_scenario.v2x.messages.message import Payload, StationState
 
 
 class Report(msgspec.Struct, frozen=True, gc=False):
@@ -42,8 +43,8 @@ class FusionMethod(ABC):
 
     settings_type: ClassVar[type[Settings] | None] = None
     """Settings class of the property `fusion_settings`; None if the method has no settings."""
-    shares_points: ClassVar[bool] = False
-    """Whether stations send lidar points beside their detections and detect in the points of all stations."""
+    shares: ClassVar[Literal["points", "features"] | None] = None
+    """Sensor data that stations send beside their detections. They detect in them together with those of others."""
     is_finite_by_construction: ClassVar[bool] = False
     """Whether this class, without those derived from it, only copies and averages finite numbers: its results are not
     checked."""
@@ -59,16 +60,25 @@ class FusionMethod(ABC):
         return math.inf
 
     @property
-    def max_point_age(self) -> float:
-        """Maximum age of received points that are merged [s]."""
+    def max_payload_age(self) -> float:
+        """Maximum age of received sensor data that are merged [s]."""
         return 0.0
 
-    def shared_cloud(self, readings: Readings) -> PointCloud | None:
-        """Return the points of a station that shares points, as it sends them; None if no lidar was read."""
-        return None
+    def setup(self, detector: Detector) -> None:  # noqa: B027 - optional
+        """Store the detector of a station that shares sensor data, before the first reading."""
 
-    def merge_readings(self, readings: Readings, received: Sequence[Array]) -> Readings:
-        """Return the readings of a station that shares points, with the received points (N, 3) merged."""
+    def payloads(self, readings: Readings, limit: int) -> tuple[Payload, ...]:
+        """Return the sensor data of a station as it sends them; empty if the readings contain none.
+
+        Points are part of a CPM. Features are frames of at most `limit` bytes, each in a separate message.
+        """
+        return ()
+
+    def add_payload(self, sender: str, payload: Payload, body: Array) -> None:  # noqa: B027 - optional
+        """Store received sensor data that are not too old, without those on the ego body (7,) at their time."""
+
+    def merge_readings(self, readings: Readings) -> Readings:
+        """Return the readings of a station with the received sensor data that are not too old."""
         return readings
 
     @abstractmethod

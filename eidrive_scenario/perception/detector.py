@@ -12,7 +12,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.base.feature_map import FeatureMap
+from eidrive_scenario.base.feature_map import FeatureMap, LatentCodec
 from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.roads import RoadNetwork
@@ -79,6 +79,8 @@ class Detector(ABC):
     detectable_signals: frozenset[str] = frozenset()
     """Kinds of signals that the detector reads, out of `light` and `stop sign`. The station takes the others from the
     map and the line of sight."""
+    provides_features: ClassVar[bool] = False
+    """Whether the detector computes `feature_map`, and detects in `Readings.features`."""
     settings_type: ClassVar[type[Settings] | None] = None
     """Type of the property `detector_settings`; None if the detector has no settings."""
     is_finite_by_construction: ClassVar[bool] = False
@@ -91,6 +93,11 @@ class Detector(ABC):
     """Detections in the last image of each camera, for detectors that process images; recorded with the boxes."""
     feature_map: FeatureMap | None = None
     """Features of the points in the last readings, for detectors that compute a grid of features."""
+
+    @property
+    def codec(self) -> LatentCodec | None:
+        """Compression of the features; None for a detector without features."""
+        return None
 
     def check_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - an optional hook
         """Raise SettingError if `load_weights` would refuse its data without reading it, as `eidrive check` reports."""

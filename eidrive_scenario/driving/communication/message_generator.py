@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -14,6 +15,7 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
 from eidrive_scenario.v2x.messages.generation import (
     CHECK,
     EQUAL,
@@ -26,7 +28,7 @@ from eidrive_scenario.v2x.messages.generation import (
     cpm_size,
     objects_that_fit,
 )
-from eidrive_scenario.v2x.messages.message import Message, PointCloud, StationState
+from eidrive_scenario.v2x.messages.message import Message, Payload, PointCloud, StationState, station_id
 from eidrive_scenario.world.actor import ActorSpec
 
 
@@ -62,6 +64,8 @@ class MessageGenerator:
         self._clock = settings.clock
         self.number = number
         """Sequence number of the next message."""
+        self._sent: tuple[Payload, ...] = ()
+        """Sensor data of the last CPM."""
         self._periods = -1
         start, elapsed = generator(seed, "message phase", spec.name).uniform(size=2).tolist()
         self._phase, fixed = 0.0, settings.message_phase
@@ -84,12 +88,13 @@ class MessageGenerator:
         state: StationState,
         detections: Detections,
         now: float,
-        points: PointCloud | None = None,
+        payloads: tuple[Payload, ...] = (),
         *,
         interval: float = 0.0,
     ) -> tuple[Message, ...]:
-        """Return the messages of this tick; the first CPM carries the points.
+        """Return the messages of this tick.
 
+        payloads  sensor data: the first CPM carries points; frames of features follow it, each in its own message, once
         interval  minimum time between two messages under congestion control [s], respected by the ETSI rules. With two
                   kinds of messages only the less recent kind is generated in a tick
         """
@@ -120,14 +125,35 @@ class MessageGenerator:
             else:  # an empty CPM states that no object is in sight
                 size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
                 messages = [self._message(state, detections, now, size, listed=self._sensors, sensors=self._view)]
-            if points is not None and messages and kind == "cpm":
-                messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
+            if messages and kind == "cpm":
+                messages += self._feature_messages(state, now, payloads)
+                for points in payloads:
+                    if isinstance(points, PointCloud):
+                        messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
             if messages:
                 self._last_generated[kind] = now
             generated += messages
         if self._offset > 0.0:
             generated = [replace(message, offset=self._offset) for message in generated]
         return tuple([self._clock.with_station_timestamps(message, now) for message in generated])
+
+    def _feature_messages(self, state: StationState, now: float, payloads: tuple[Payload, ...]) -> list[Message]:
+        """Return a message for each frame of a map, unless the frames of this map are sent already."""
+        if payloads is self._sent:
+            return []
+        self._sent = payloads
+        name, messages = self._spec.name, list[Message]()
+        for frame in payloads:
+            if isinstance(frame, FeatureFrame):
+                stamped = dataclasses.replace(frame, station=station_id(name))
+                size = frame.size + self._settings.security_bytes
+                messages.append(
+                    Message(
+                        name, self.number, now, state, Detections(frame.time), size, kind="features", features=stamped
+                    )
+                )
+                self.number += 1
+        return messages
 
     def _is_due_by_rate(self, now: float) -> bool:
         """Return True if a message is due in this tick, in each tick or at a rate."""

@@ -1,8 +1,9 @@
-"""Newest report of each station, from messages and own sensors, with perception regions and shared points."""
+"""Newest report of each station, from messages and own sensors, with perception regions and shared sensor data."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from msgspec.structs import replace
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.base.geometry import points_in_box
+from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
@@ -19,7 +20,8 @@ from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.sensing.readings import EgoState, Readings
-from eidrive_scenario.v2x.messages.message import Message, PointCloud, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
+from eidrive_scenario.v2x.messages.message import Message, Payload, PointCloud, ReceivedMessage, StationState
 
 
 def relative_state(state: StationState | None, ego: EgoState, covariance: Array | None) -> StationState | None:
@@ -132,45 +134,58 @@ class PerceptionRegionStore:
         return tuple(self._regions.values())
 
 
-class PointCloudSharing:
-    """Received point clouds, and detection in them together with the points of the station.
+class SensorDataSharing:
+    """Sensor data of the station as it sends them, and detection in them together with received ones.
 
-    perception   separate instance for the merged points, as detectors and trackers have state; None for a station that
-                 does not receive messages
+    fusion      method of the station, which shares sensor data
+    perception  perception of the station alone
+    joint       separate instance for the merged data, as detectors and trackers have state; None for a station that
+                does not receive messages
+    limit       maximum size of a message with features [bytes]
+    latency     computing time after which features are sent [s]; points are sent at once
     """
 
-    def __init__(self, fusion: FusionMethod, perception: Perception | None) -> None:
-        self.own: PointCloud | None = None
-        """Newest points of this station, as transmitted."""
+    def __init__(
+        self, fusion: FusionMethod, perception: Perception, joint: Perception | None, *, limit: int, latency: float
+    ) -> None:
+        self.own: tuple[Payload, ...] = ()
+        """Newest sensor data of this station that are ready for transmission."""
         self._fusion = fusion
         self._perception = perception
-        self._received: dict[str, tuple[float, Array]] = {}
+        self._joint = joint
+        self._limit = limit
+        self._latency = latency if fusion.shares == "features" else 0.0
+        self._features: FeatureMap | None = None
+        self._computing: deque[tuple[float, tuple[Payload, ...]]] = deque()
 
-    def add_points(self, sender: str, cloud: PointCloud, body: Array) -> None:
-        """Store a received cloud without points on the ego body (7,) at the time of measurement.
+    def accepts(self, payload: Payload) -> bool:
+        """Return whether the station merges sensor data of this type."""
+        return isinstance(payload, PointCloud if self._fusion.shares == "points" else FeatureFrame)
 
-        An out-of-sequence cloud does not replace a newer one.
-        """
-        held = self._received.get(sender)
-        if held is None or cloud.time >= held[0]:
-            points = cloud.points()
-            self._received[sender] = (cloud.time, points[~points_in_box(points, body)])
+    def add(self, sender: str, payload: Payload, body: Array) -> None:
+        """Store received sensor data without those on the ego body (7,) at the time of measurement."""
+        self._fusion.add_payload(sender, payload, body)
 
     def perceive(self, readings: Readings, alone: Detections | None, pose: PoseUncertainty | None) -> Detections | None:
-        """Return newly available objects in merged points, or None.
+        """Return newly available objects in merged sensor data, or None.
 
-        alone  objects in the ego points;  pose  uncertainty of the assumed pose; None: it is exact
+        alone  objects in the ego data;  pose  uncertainty of the assumed pose; None: it is exact
         """
-        self.own = self._fusion.shared_cloud(readings) or self.own
-        if self._perception is None:
+        if self._fusion.shares == "features":
+            newest = self._perception.detector.feature_map
+            readings = replace(readings, features=None if newest is self._features else newest)
+            self._features = newest
+        now = readings.time
+        payloads = self._fusion.payloads(readings, self._limit)
+        if payloads:
+            self._computing.append((now + self._latency, payloads))
+        while self._computing and self._computing[0][0] <= now + TIME_TOLERANCE:
+            self.own = self._computing.popleft()[1]
+        if self._joint is None:
             return alone
         if pose is not None:
-            self._perception.set_pose(pose)
-        oldest = readings.time - self._fusion.max_point_age - TIME_TOLERANCE
-        self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}
-        return self._perception.perceive(
-            self._fusion.merge_readings(readings, [points for _, (_, points) in sorted(self._received.items())])
-        )
+            self._joint.set_pose(pose)
+        return self._joint.perceive(self._fusion.merge_readings(readings))
 
 
 SENDER_REPORT_SUFFIX = " itself"
@@ -182,7 +197,7 @@ class ReportStore:
     those that are too old when they arrive.
 
     regions  perception regions that received CPMs are added to; None if the station does not use them
-    points   received point clouds; None if the station does not use them
+    sharing  received sensor data; None if the station does not use them
     """
 
     def __init__(
@@ -193,14 +208,14 @@ class ReportStore:
         fusion: FusionMethod,
         own_body: OwnBody,
         regions: PerceptionRegionStore | None,
-        points: PointCloudSharing | None,
+        sharing: SensorDataSharing | None,
     ) -> None:
         self._name = name
         self._clock = settings.clock
         self._fusion = fusion
         self._own_body = own_body
         self._regions = regions
-        self._points = points
+        self._sharing = sharing
         self._reports: dict[str, Report] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
         self._lifetime = min(settings.report_lifetime, fusion.max_report_age)
@@ -229,7 +244,7 @@ class ReportStore:
         ego              assumed pose of the station, with (3, 3) `pose_covariance` of x, y and yaw; None: it is exact
         own_perception   whether the channel carries the detections of a station back to itself
         """
-        name, regions, points = self._name, self._regions, self._points
+        name, regions, sharing = self._name, self._regions, self._sharing
         expired: list[int] = []
         for row, received in enumerate(inbox):
             message = self._clock.with_local_timestamps(received.message, now)
@@ -239,11 +254,14 @@ class ReportStore:
                 continue
             if regions is not None:
                 regions.add_message(message)
-            if points is not None and message.points is not None and not own:
-                if self._is_expired(message.points.time, self._fusion.max_point_age, now):
+            payload = message.payload
+            if sharing is not None and payload is not None and sharing.accepts(payload) and not own:
+                if self._is_expired(payload.time, self._fusion.max_payload_age, now):
                     expired.append(row)
                 else:
-                    points.add_points(sender, message.points, self._own_body.box(message.points.time))
+                    sharing.add(sender, payload, self._own_body.box(payload.time))
+                continue
+            if message.kind == "features":
                 continue
             if self._is_expired(message.detections.time, self._lifetime, now):
                 expired.append(row)

@@ -78,6 +78,8 @@ class MessageList:
 
 def describe_content(message: Message) -> str:
     """Return the content of a message: its kind, the number of objects by class, and whatever else it contains."""
+    if (frame := message.features) is not None:
+        return f"FEATURES, {len(frame.cells)} cells, frame {frame.number + 1} of {frame.count}"
     parts = [message.kind.upper()]
     numbers = Counter(message.detections.classes)
     listed = ", ".join(name if number == 1 else f"{name} ({number})" for name, number in sorted(numbers.items()))

@@ -21,7 +21,7 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
-from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.messages.message import Message, StationState, station_id
 
 TYPES = {"cam": "CAM", "cpm": "CPM"}
 """ASN.1 type of the message, by kind."""
@@ -253,8 +253,7 @@ def _sensor(number: int, sector: ViewSector | None = None) -> dict[str, Any]:
 
 
 def _header(number: int, sender: str) -> dict[str, int]:
-    station = sum(byte << (8 * place) for place, byte in enumerate(sender.encode()[-4:]))
-    return {"protocolVersion": 2, "messageID": number, "stationID": station}
+    return {"protocolVersion": 2, "messageID": number, "stationID": station_id(sender)}
 
 
 def _position(state: StationState) -> dict[str, Any]:

@@ -1,10 +1,11 @@
-"""Messages between stations, with lidar points, and the clocks that stamp them."""
+"""Messages between stations, with lidar points or features, and the clocks that stamp them."""
 
 from __future__ import annotations
 
 import dataclasses
+import struct
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -14,11 +15,13 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.v2x.messages.feature_frames import Bytes, FeatureFrame
 
-Bytes = NDArray[np.uint8]
-
-HEADER_BYTES = 32
-"""Size of the header [bytes]: time (8), corner (3 x 4), cell (2), cells along each axis (3 x 2), points (4)."""
+_HEADER = struct.Struct("<d3iH3s3sI")
+HEADER_BYTES = _HEADER.size
+"""Size of the header [bytes]: time (8), corner in cells (3 x 4), cell in mm (2), cells along y and z (2 x 3),
+points (4)."""
+_MILLIMETERS = 1000.0
 _SEVEN_BITS = 7
 _MAX_BYTES = 9
 """Maximum length of one encoded step [bytes]: 63 bits."""
@@ -29,7 +32,7 @@ class PointCloud:
     """Points measured at `time` [s], in the world frame by the pose estimate of the sender.
 
     corner  (3,) corner of the grid [m]
-    cell    edge length of the cells [m]
+    cell    edge length of the cells [m], a multiple of 1 mm
     shape   number of cells along x, y and z
     steps   index differences between occupied cells in the order of x, y, z, in LEB128 as in protobuf: base 128, least
             significant digit first, highest bit set in all bytes of a number except the last
@@ -53,9 +56,36 @@ class PointCloud:
         indices = np.stack([cells // (along * up), cells // up % along, cells % up], axis=1)
         return np.asarray(np.asarray(self.corner) + (indices + 0.5) * self.cell, dtype=np.float64)
 
+    def encode(self) -> bytes:
+        """Return the bytes of the point cloud."""
+        low = [round(edge / self.cell) for edge in self.corner]
+        along, up = (cells.to_bytes(3, "little") for cells in self.shape[1:])
+        points = int((self.steps < 128).sum())
+        header = _HEADER.pack(self.time, *low, round(self.cell * _MILLIMETERS), along, up, points)
+        return header + self.steps.tobytes()
+
+    @classmethod
+    def decode(cls, data: bytes) -> PointCloud:
+        """Return the point cloud of these bytes. Raise ValueError if they are none."""
+        if len(data) < HEADER_BYTES:
+            raise ValueError(f"a point cloud has at least {HEADER_BYTES} bytes (got {len(data)})")
+        time, *low, edge, along, up, points = _HEADER.unpack_from(data)
+        along, up = int.from_bytes(along, "little"), int.from_bytes(up, "little")
+        steps = np.frombuffer(data, np.uint8, offset=HEADER_BYTES)
+        if int((steps < 128).sum()) != points or (points and not (along and up and edge and steps[-1] < 128)):
+            raise ValueError(f"the bytes of a point cloud do not contain {points} points")
+        wide = int(_decode_numbers(steps).sum()) // (along * up) + 1 if points else 0
+        cell = edge / _MILLIMETERS
+        x, y, z = (place * cell for place in low)
+        return cls(time, (x, y, z), cell, (wide, along, up), steps)
+
 
 def compress(points: Array, time: float, cell: float) -> PointCloud:
-    """Return the points (N, 3) on a grid of this cell size [m], one point per cell, within half a cell."""
+    """Return the points (N, 3) on a grid of this cell size, one point per cell, within half a cell.
+
+    cell  edge length of the cells [m], which is rounded to mm
+    """
+    cell = max(1, round(cell * _MILLIMETERS)) / _MILLIMETERS
     if not len(points):
         return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))
     low = np.floor(points.min(axis=0) / cell).astype(np.int64)
@@ -85,6 +115,10 @@ def _decode_numbers(data: Bytes) -> NDArray[np.int64]:
     return np.asarray(np.add.reduceat((data.astype(np.int64) & 127) << (_SEVEN_BITS * place), starts), dtype=np.int64)
 
 
+Payload = PointCloud | FeatureFrame
+"""Sensor data of the sender in a message."""
+_Payload = TypeVar("_Payload", PointCloud, FeatureFrame)
+
 LineOfSight = Literal["los", "nlosv", "nlos"]
 """State of a line of sight: free, blocked by vehicles only, or by a building or the ground (3GPP TR 37.885, 6.2.1)."""
 
@@ -110,6 +144,7 @@ class Message(msgspec.Struct, frozen=True, gc=False):
 
     kind     cpm  collective perception message (ETSI TS 103 324): objects that the sender perceives
              cam  cooperative awareness message (ETSI EN 302 637-2): the sender as the only object
+             features  one frame of a feature map, without objects
     objects  object ids of the sender, one per row of `detections`; objects that are not listed keep the state of
              their last report. None: the list is complete
     """
@@ -122,7 +157,7 @@ class Message(msgspec.Struct, frozen=True, gc=False):
     detections: Detections
     size: int
     """Size of the message [bytes]."""
-    kind: Literal["cpm", "cam"] = "cpm"
+    kind: Literal["cpm", "cam", "features"] = "cpm"
     objects: tuple[int, ...] | None = None
     points: PointCloud | None = None
     """Shared lidar point cloud of the sender, included in `size`; None if it is not shared."""
@@ -130,6 +165,18 @@ class Message(msgspec.Struct, frozen=True, gc=False):
     """Sensor information of a CPM: sectors that the sender perceives, in its own frame; None: not in this message."""
     offset: float = 0.0
     """Time from the time step of the message until the sender passes it to the radio [s]; radio models include it."""
+    features: FeatureFrame | None = None
+    """Content of a message of the kind `features`, included in `size`."""
+
+    @property
+    def payload(self) -> Payload | None:
+        """Sensor data in the message; None without."""
+        return self.points if self.features is None else self.features
+
+
+def station_id(name: str) -> int:
+    """Return the number of a station in encoded messages: the last four bytes of its name."""
+    return sum(byte << (8 * place) for place, byte in enumerate(name.encode()[-4:]))
 
 
 class ReceivedMessage(msgspec.Struct, frozen=True, gc=False):
@@ -187,7 +234,10 @@ def _shift_timestamps(message: Message, error: float) -> Message:
         message,
         detections=replace(message.detections, time=message.detections.time + error),
         state=replace(message.state, time=message.state.time + error),
-        points=None
-        if message.points is None
-        else dataclasses.replace(message.points, time=message.points.time + error),
+        points=_shift_payload(message.points, error),
+        features=_shift_payload(message.features, error),
     )
+
+
+def _shift_payload(payload: _Payload | None, error: float) -> _Payload | None:
+    return None if payload is None else dataclasses.replace(payload, time=payload.time + error)

@@ -138,9 +138,7 @@ def test_message_with_shared_points_has_a_region(monkeypatch: pytest.MonkeyPatch
     seen: list[PerceptionRegion] = []
     assert agent.planner is not None
     monkeypatch.setattr(agent.planner, "observe_regions", seen.extend)
-    monkeypatch.setattr(
-        agent, "points", SimpleNamespace(add_points=lambda *_: None, perceive=lambda *_: None, own=None)
-    )
+    monkeypatch.setattr(agent, "sharing", SimpleNamespace(add=lambda *_: None, perceive=lambda *_: None, own=()))
     points = compress(np.zeros((1, 3)), 0.0, 0.1)
     message = replace(cpm(0.0, sensors=(AHEAD,)), points=points)
     truth = TruthReading((), (), np.zeros((0, 7)), np.zeros((0, 2)), np.ones(0))

@@ -18,7 +18,7 @@ from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import Simulation
-from eidrive_scenario.v2x.messages.message import HEADER_BYTES, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import HEADER_BYTES, PointCloud, ReceivedMessage
 from eidrive_scenario.world.actor import ActorSpec
 
 EGO = ActorSpec("Ego", "car", "car", (4.6, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.85, max_steering=0.6)
@@ -75,16 +75,17 @@ def test_early_fusion_is_registered_as_entry_point() -> None:
 def test_merge_readings_keeps_world_positions_of_received_points() -> None:
     fusion = EarlyFusion(EarlyFusionSettings(cell=0.05))
     other = readings(0.0, (40.0, -5.0, 2.5), car(*CAR, "f"))
-    cloud = fusion.shared_cloud(other)
-    assert cloud is not None
+    (cloud,) = fusion.payloads(other, 1400)
+    assert isinstance(cloud, PointCloud)
     own = readings(0.0, (1.0, 2.0, 0.3))
-    merged = fusion.merge_readings(own, [cloud.points()]).lidars["lidar"]
+    fusion.add_payload("RSU", cloud, np.array([100.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0]))
+    merged = fusion.merge_readings(own).lidars["lidar"]
     world = merged.points @ merged.pose[:3, :3].T + merged.pose[:3, 3]
     count = len(own.lidars["lidar"].points)
     np.testing.assert_array_equal(merged.points[:count], own.lidars["lidar"].points)
     np.testing.assert_allclose(world[count:], cloud.points(), atol=1e-9)
     assert len(merged.intensity) == len(merged.points)
-    assert fusion.shared_cloud(Readings(0.0, own.ego)) is None
+    assert fusion.payloads(Readings(0.0, own.ego), 1400) == ()
 
 
 def test_early_fusion_detects_car_in_received_points_without_forwarding_it() -> None:

@@ -29,6 +29,7 @@ from eidrive_scenario.reporting.replay.frame_data import (
 from eidrive_scenario.reporting.replay.page import camera_files
 from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, PointCloud, StationState
 from eidrive_scenario.world.view import Contact
 
@@ -257,6 +258,11 @@ def test_content_of_messages_names_objects_and_other_parts() -> None:
     assert describe_content(sent_message(("car",), objects=(3,))) == "CPM, updates of car"
     full = sent_message(("bus",), points=cloud, sensors=(ViewSector(0.0, 0.0, 1.0, 0.0, 1.0, 50.0),))
     assert describe_content(full) == "CPM, bus, sensor information, point cloud of 100 bytes"
+    frame = FeatureFrame(
+        0, 5, 1, 2, 0.1, 0.0, 0.0, 0.0, 1.8, 0.0, 0.8, (128, 128), "int8", 0.1, np.zeros((31, 10), np.uint8)
+    )
+    features = sent_message((), kind="features", features=frame)
+    assert describe_content(features) == "FEATURES, 31 cells, frame 2 of 2"
     assert len(describe_content(sent_message(("x" * 1000,)))) == 200
 
 

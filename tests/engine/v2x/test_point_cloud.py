@@ -55,6 +55,27 @@ def test_compress_sweep_has_a_fifth_of_its_float_size() -> None:
     assert compress(points, 0.0, 0.1).size < 12_000
 
 
+@pytest.mark.parametrize("cell", [0.05, 0.1, 0.2, 1.0])
+@pytest.mark.parametrize("count", [0, 1, 500])
+def test_decoded_cloud_equals_encoded_one(count: int, cell: float) -> None:
+    cloud = compress(generator(0, "bytes").uniform(-300, 300, (count, 3)), 2.5, cell)
+    data = cloud.encode()
+    assert len(data) == cloud.size
+    again = PointCloud.decode(data)
+    np.testing.assert_array_equal(again.steps, cloud.steps)
+    assert (again.time, again.corner, again.shape) == (cloud.time, cloud.corner, cloud.shape)
+    np.testing.assert_array_equal(again.points(), cloud.points())
+    with pytest.raises(ValueError, match="point"):
+        PointCloud.decode(data[:31])
+    with pytest.raises(ValueError, match="point"):
+        PointCloud.decode(data + b"x")
+
+
+def test_compress_rounds_cells_to_millimeters() -> None:
+    assert compress(np.ones((1, 3)), 0.0, 0.1003).cell == 0.1
+    assert compress(np.ones((1, 3)), 0.0, 1e-6).cell == 0.001
+
+
 def test_recording_codec_preserves_point_cloud() -> None:
     cloud = compress(generator(0, "few").uniform(-5, 5, (20, 3)), 2.5, 0.1)
     kept = codec(PointCloud)

@@ -1,0 +1,274 @@
+"""Intermediate fusion: bird's-eye-view features of several stations are fused before objects are detected in them."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from msgspec.structs import replace
+from pydantic import Field, PositiveFloat
+
+from eidrive_scenario.base.arrays import Array, Bools, Floats
+from eidrive_scenario.base.feature_map import LatentCodec
+from eidrive_scenario.base.geometry import points_in_box
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
+from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.extensions.settings import Settings
+from eidrive_scenario.fusion.covariance_intersection import (
+    CovarianceIntersectionFusion,
+    CovarianceIntersectionSettings,
+)
+from eidrive_scenario.fusion.feature_warp import Grid, attend, warp
+from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.v2x.messages.feature_frames import Encoding, FeatureFrame, split, to_cells
+from eidrive_scenario.v2x.messages.message import Payload
+
+BOX_MARGIN = 0.8
+"""Margin around a reported box within which cells move with it [m]: features of an object reach beyond its outline."""
+_SMOOTHING = (0.054489, 0.244201, 0.40262, 0.244201, 0.054489)
+"""Gaussian of 5 cells with a standard deviation of 1 cell, along one axis; the sum is 1."""
+
+
+class IntermediateFusionSettings(CovarianceIntersectionSettings):
+    """Settings of intermediate fusion (property `fusion_settings`). Inherited ones apply to fused boxes.
+
+    share         share of the cells of a map that is sent, the most confident ones
+    encoding      `int8`: 8 bytes per cell; `codes`: 1 byte per cell, an entry of the code book of the network
+    max_lateness  maximum age of fused features [s]
+    """
+
+    share: float = Field(default=1.0, gt=0.0, le=1.0)
+    encoding: Encoding = "int8"
+    max_lateness: PositiveFloat = 0.5
+
+
+@dataclass
+class _ReceivedMap:
+    """Cells of the newest map of a station that have arrived.
+
+    latent (n, m, 8), present (n, m) whether the features of a cell have arrived
+    """
+
+    sequence: int
+    time: float
+    grid: Grid
+    latent: Floats
+    present: Bools
+
+
+@dataclass(frozen=True)
+class _MovingBox:
+    """Reported box at `time` [s]: center, length, width, heading and velocity in the plane [m, rad, m/s]."""
+
+    time: float
+    x: float
+    y: float
+    length: float
+    width: float
+    yaw: float
+    vx: float
+    vy: float
+
+
+class IntermediateFusion(CovarianceIntersectionFusion):
+    """Abstract base class of fusion methods for features: a station sends cells of its features beside its boxes.
+
+    Received cells are placed on the grid of the station by the poses of both, and moved by the velocity of the reported
+    box in which they are. `fuse_maps` of a derived class fuses them with the features of the station, and the detector
+    detects objects in the result. Boxes of other stations whose features are missing are fused by covariance
+    intersection. The station reports only objects in its own features.
+    """
+
+    settings_type: ClassVar[type[Settings] | None] = IntermediateFusionSettings
+
+    shares: ClassVar[Literal["points", "features"] | None] = "features"
+
+    def __init__(self, settings: IntermediateFusionSettings | None = None) -> None:
+        self.intermediate = settings or IntermediateFusionSettings()
+        self._detector: Detector | None = None
+        self._maps = 0
+        """Number of maps of this station."""
+        self._grid: Grid | None = None
+        """Grid of the last map of this station."""
+        self._received: dict[str, _ReceivedMap] = {}
+        self._boxes: dict[str, dict[int, _MovingBox]] = {}
+        """Newest moving boxes of each station, by object."""
+        super().__init__(self.intermediate)
+
+    @abstractmethod
+    def fuse_maps(self, own: Floats, received: Floats, present: Bools) -> Floats:
+        """Return the fused features (C, n, m), at least 0.
+
+        own       (C, n, m) features of the station
+        received  (S, C, n, m) features of S other stations on the same grid, 0 in absent cells
+        present   (S, n, m) whether the features of a station are present in a cell
+        """
+
+    @property
+    def max_payload_age(self) -> float:
+        return self.intermediate.max_lateness
+
+    def setup(self, detector: Detector) -> None:
+        self._detector = detector
+
+    @property
+    def _codec(self) -> LatentCodec:
+        codec = None if self._detector is None else self._detector.codec
+        if codec is None:
+            raise InvalidResult(self._detector, "codec", "is None (expected the codec of the features)")
+        return codec
+
+    def payloads(self, readings: Readings, limit: int) -> tuple[Payload, ...]:
+        """Return the frames of the most confident cells of new features."""
+        features = readings.features
+        if features is None:
+            return ()
+        codec, settings = self._codec, self.intermediate
+        confidence = _smoothed(features.confidence).ravel()
+        count = max(1, round(settings.share * confidence.size))
+        chosen = np.argsort(-confidence, kind="stable")[:count]
+        latent = features.latent.reshape(len(features.latent), -1)[:, chosen]
+        codes = codec.to_int8(latent) if settings.encoding == "int8" else codec.to_codes(latent)
+        rows, columns = features.confidence.shape
+        self._maps += 1
+        whole = FeatureFrame(
+            0, self._maps % 65536, 0, 1, features.time, features.x, features.y, features.yaw, features.height,
+            features.foot, features.cell, (rows, columns), settings.encoding, float(codec.scale),
+            to_cells(chosen, codes),
+        )  # fmt: skip
+        return split(whole, limit)
+
+    def add_payload(self, sender: str, payload: Payload, body: Array) -> None:
+        """Add the cells of a frame to the map of their sender; a newer map replaces it.
+
+        Frames of older maps, and those that do not match the map or the network, are ignored.
+        """
+        if not isinstance(payload, FeatureFrame) or payload.scale != float(np.float32(self._codec.scale)):
+            return
+        try:
+            payload.check()
+        except ValueError:
+            return
+        integers = payload.encoding == "int8"
+        latent = self._codec.from_int8(payload.integers) if integers else self._codec.from_codes(payload.codes)
+        grid = Grid(payload.x, payload.y, payload.yaw, payload.cell, payload.shape)
+        held = self._received.get(sender)
+        if held is None or held.sequence != payload.sequence:
+            if held is not None and payload.time <= held.time:
+                return
+            values, present = np.zeros((*grid.shape, len(latent)), np.float32), np.zeros(grid.shape, np.bool_)
+            held = self._received[sender] = _ReceivedMap(payload.sequence, payload.time, grid, values, present)
+        elif held.grid != grid:
+            return
+        cells = np.stack(np.unravel_index(payload.indices, grid.shape), axis=-1)
+        length, width = body[3] + grid.cell, body[4] + grid.cell  # all cells that overlap with the body
+        outline = np.array([*body[:2], 0.0, length, width, 1.0, body[6]])
+        kept = ~points_in_box(np.column_stack([grid.to_world(cells), np.zeros(len(cells))]), outline)
+        rows, columns = cells[kept].T
+        held.latent[rows, columns] = latent.T[kept]
+        held.present[rows, columns] = True
+
+    def add_report(self, report: Report) -> None:
+        """Store the moving boxes of a report, and process its boxes whose features have not arrived."""
+        detections, station = report.detections, report.station
+        held = self._boxes.setdefault(station, {})
+        oldest = detections.time - self.settings.max_age
+        boxes = {} if report.complete else {number: box for number, box in held.items() if box.time >= oldest}
+        numbers = detections.tracks or range(len(detections))
+        for number, box, (vx, vy) in zip(numbers, detections.boxes.tolist(), detections.velocity.tolist(), strict=True):
+            boxes.pop(number, None)
+            if math.hypot(vx, vy) > 0.0:  # not if it is unknown
+                x, y, _, length, width, _, yaw = box
+                boxes[number] = _MovingBox(detections.time, x, y, length, width, yaw, vx, vy)
+        self._boxes[station] = boxes
+        arrived = self._received.get(station)
+        if arrived is not None and len(detections) and arrived.time >= report.arrived - self.max_payload_age:
+            rows = np.flatnonzero(~self._covered(arrived, detections.boxes[:, :2])).tolist()
+            report = replace(report, detections=detections.subset(rows))
+        super().add_report(report)
+
+    def _covered(self, arrived: _ReceivedMap, points: Array) -> Bools:
+        """Return whether the features at points (N, 2) of the world are in the fused map."""
+        inside = np.zeros(len(points), np.bool_) if self._grid is None else self._grid.cells(points)[1]
+        cells, in_map = arrived.grid.cells(points)
+        covered: Bools = inside & in_map
+        covered[covered] = arrived.present[tuple(cells[covered].T)]
+        return covered
+
+    def merge_readings(self, readings: Readings) -> Readings:
+        """Return the readings with fused features; without lidars if there are no new features."""
+        features = readings.features
+        if features is None:
+            return replace(readings, lidars={})
+        oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
+        self._received = {sender: held for sender, held in self._received.items() if held.time >= oldest}
+        shape = features.confidence.shape
+        self._grid = Grid(features.x, features.y, features.yaw, features.cell, (shape[0], shape[1]))
+        if not self._received:
+            return readings
+        received = np.zeros((len(self._received), *features.features.shape), np.float32)
+        present = np.zeros((len(self._received), *shape), np.bool_)
+        for row, (sender, held) in enumerate(sorted(self._received.items())):
+            boxes = self._boxes.get(sender, {}).values()
+            moving = np.array([
+                (box.x + box.vx * (held.time - box.time), box.y + box.vy * (held.time - box.time), box.yaw,
+                 box.length + 2.0 * BOX_MARGIN, box.width + 2.0 * BOX_MARGIN, box.vx, box.vy)
+                for box in boxes
+            ]).reshape(-1, 7)  # fmt: skip
+            latent, present[row] = warp(
+                held.latent, held.present, self._pose(sender, held), self._grid, moving, features.time - held.time
+            )
+            received[row][:, present[row]] = self._codec.expand(np.ascontiguousarray(latent[present[row]].T))
+        fused = self.fuse_maps(features.features, received, present)
+        return replace(readings, features=replace(features, features=fused))
+
+    def _pose(self, sender: str, held: _ReceivedMap) -> Grid:
+        """Return the grid of a sender at the pose that it has stated."""
+        return held.grid
+
+
+class MaxFusion(IntermediateFusion):
+    """Maximum of the features of all stations (F-Cooper: Chen et al., SEC 2019)."""
+
+    def fuse_maps(self, own: Floats, received: Floats, present: Bools) -> Floats:
+        fused = own.copy()
+        for features, is_present in zip(received, present, strict=True):
+            np.maximum(fused, features, out=fused, where=is_present)
+        return fused
+
+
+class AttentionFusion(IntermediateFusion):
+    """Attention of the own features to those of all stations in each cell (AttFuse: Xu et al., OPV2V, ICRA 2022)."""
+
+    def fuse_maps(self, own: Floats, received: Floats, present: Bools) -> Floats:
+        return attend(own, received, present)
+
+
+class Where2commSettings(IntermediateFusionSettings):
+    """Settings of the fusion method `where2comm`: those of intermediate fusion, with a share of 1 %."""
+
+    share: float = Field(default=0.01, gt=0.0, le=1.0)
+
+
+class Where2commFusion(AttentionFusion):
+    """Attention to the most confident cells of other stations (Where2comm: Hu et al., NeurIPS 2022)."""
+
+    settings_type: ClassVar[type[Settings] | None] = Where2commSettings
+
+    def __init__(self, settings: Where2commSettings | None = None) -> None:
+        super().__init__(settings or Where2commSettings())
+
+
+def _smoothed(confidence: Floats) -> Array:
+    """Return the confidence (n, m) after a Gaussian of 5 x 5 cells, with zeros beyond the border."""
+    rows, columns = confidence.shape
+    padded, smoothed = np.pad(confidence.astype(np.float64), 2), np.zeros(confidence.shape)
+    for i, along in enumerate(_SMOOTHING):
+        for j, across in enumerate(_SMOOTHING):
+            smoothed += along * across * padded[i : i + rows, j : j + columns]
+    return smoothed
