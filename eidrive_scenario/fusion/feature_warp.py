@@ -1,4 +1,4 @@
-"""Placement of received features on the grid of the receiver, and attention to them."""
+"""Received features on the grid of the receiver, and attention to them."""
 
 from __future__ import annotations
 
@@ -118,6 +118,19 @@ def _warp(latent: Floats, present: Bools, transform: Array, boxes: Array, warped
             else:
                 for channel in range(channels):
                     warped[i, j, channel] = 0.0
+
+
+@kernel("void(f4[:,::1], b1[:,::1], f4[:,:,::1])")
+def place(features: Floats, present: Bools, grid: Floats) -> None:
+    """Write features (C, N) of the N present cells (n, m), in their order, into a grid (C, n, m)."""
+    rows, columns = present.shape
+    for channel in range(len(features)):
+        cell = 0
+        for i in range(rows):
+            for j in range(columns):
+                if present[i, j]:
+                    grid[channel, i, j] = features[channel, cell]
+                    cell += 1
 
 
 def attend(own: Floats, received: Floats, present: Bools) -> Floats:

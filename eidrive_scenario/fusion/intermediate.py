@@ -21,7 +21,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
-from eidrive_scenario.fusion.feature_warp import Grid, attend, warp
+from eidrive_scenario.fusion.feature_warp import Grid, attend, place, warp
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
@@ -223,7 +223,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
             latent, present[row] = warp(
                 held.latent, held.present, self._pose(sender, held), self._grid, moving, features.time - held.time
             )
-            received[row][:, present[row]] = self._codec.expand(np.ascontiguousarray(latent[present[row]].T))
+            place(self._codec.expand(np.ascontiguousarray(latent[present[row]].T)), present[row], received[row])
         fused = self.fuse_maps(features.features, received, present)
         return replace(readings, features=replace(features, features=fused))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.fusion.feature_warp import ENOUGH, Grid, attend, warp
+from eidrive_scenario.fusion.feature_warp import ENOUGH, Grid, attend, place, warp
 
 N, C = 24, 8
 HERE = Grid(10.0, -5.0, 0.4, 0.5, (N, N))
@@ -162,6 +162,15 @@ def test_far_grid_has_no_features() -> None:
     latent, present = features()
     for far in (Grid(1e9, -1e9, 1.0, 0.8, (N, N)), Grid(40.0, 0.0, 0.0, 1e-3, (N, N))):
         assert not warp(latent, present, HERE, far, NOTHING, 0.0)[1].any()
+
+
+def test_place_equals_assignment_by_mask() -> None:
+    random = generator(0, "place")
+    present, values = random.random((6, 7)) < 0.4, random.random((3, 42)).astype(np.float32)
+    grid, expected = np.zeros((2, 3, 6, 7), np.float32)
+    place(np.ascontiguousarray(values[:, : present.sum()]), present, grid)
+    expected[:, present] = values[:, : present.sum()]
+    np.testing.assert_array_equal(grid, expected)
 
 
 def test_attention_equals_plain_statement() -> None:

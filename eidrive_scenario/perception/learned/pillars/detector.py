@@ -58,6 +58,7 @@ class PillarDetector(Detector):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
+    provides_features: ClassVar[bool] = True
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {"lidar": LidarSettings(rate=10.0, rotation=10.0)}
     settings_type: ClassVar[type[Settings] | None] = PillarSettings
 
