@@ -5,6 +5,7 @@ Stable: all names.
 
 from eidrive_scenario.base.arrays import Array as Array
 from eidrive_scenario.base.arrays import Bools as Bools
+from eidrive_scenario.base.arrays import Floats as Floats
 from eidrive_scenario.base.arrays import Integers as Integers
 from eidrive_scenario.base.geometry import box_distance as box_distance
 from eidrive_scenario.base.geometry import footprint as footprint

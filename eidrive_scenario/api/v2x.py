@@ -8,8 +8,10 @@ from eidrive_scenario.v2x.channel import Channel as Channel
 from eidrive_scenario.v2x.channel import LinkChannel as LinkChannel
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel as ComposedChannel
 from eidrive_scenario.v2x.link_models.composed import ComposedProfile as ComposedProfile
+from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame as FeatureFrame
 from eidrive_scenario.v2x.messages.message import LinkEvent as LinkEvent
 from eidrive_scenario.v2x.messages.message import Message as Message
+from eidrive_scenario.v2x.messages.message import PointCloud as PointCloud
 from eidrive_scenario.v2x.messages.message import ReceivedMessage as ReceivedMessage
 from eidrive_scenario.v2x.messages.message import StationState as StationState
 from eidrive_scenario.v2x.profile import ChannelProfile as ChannelProfile

@@ -1,4 +1,4 @@
-"""Intermediate fusion: bird's-eye-view features of several stations are fused before objects are detected in them."""
+"""Intermediate fusion: features of several stations are fused before objects are detected in them."""
 
 from __future__ import annotations
 

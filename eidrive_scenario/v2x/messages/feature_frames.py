@@ -1,4 +1,4 @@
-"""Frames of bird's-eye-view features: cells of one map, each frame within the MTU and decodable alone."""
+"""Frames of feature maps: cells of one map, each frame within the MTU and decodable alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames of bird's-eye-view features: bytes, and their distribution over frames."""
+"""Frames of feature maps: bytes, and their distribution over frames."""
 
 from __future__ import annotations
 
