@@ -37,7 +37,8 @@ class LatentCodec(Protocol):
 class FeatureMap(msgspec.Struct, frozen=True, gc=False):
     """Features of one station at one instant on a grid in plan view.
 
-    The grid is centered on the first lidar of the station; its x axis has the heading of this lidar, y is to the left.
+    The grid is centered on the first lidar of the station, to the nearest multiple of a cell. Its axes are those of the
+    world, as the station assumes them.
     Arrays have the index [channel, i, j], where i is along x and j along y. The center of cell (i, j) of n x n cells
     is at ((i + 0.5 - n / 2) cell, (j + 0.5 - n / 2) cell).
 

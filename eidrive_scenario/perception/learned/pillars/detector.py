@@ -31,8 +31,20 @@ from eidrive_scenario.perception.learned.runtimes import (
 )
 from eidrive_scenario.perception.learned.weights import OWN_SUFFIX, Precision, check_weights_exist
 from eidrive_scenario.perception.lidar.station import StationLidars
-from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
+
+
+def grid_frame(reading: LidarReading) -> LevelFrame:
+    """Return the frame of the grid of a station with this reading: axes of the world, its origin on a multiple of the
+    output cells.
+
+    Features depend on the axes: those of stations with other headings would show turned boxes. With common axes and
+    exact poses, the cells of all stations coincide.
+    """
+    x, y, height = reading.pose[:3, 3].tolist()
+    side = STRIDE * CELL
+    return LevelFrame(round(x / side) * side, round(y / side) * side, height, 0.0)
 
 
 class PillarSettings(Settings):
@@ -110,7 +122,7 @@ class PillarDetector(Detector):
         if not readings.lidars:
             return Detections(readings.time)
         clouds = list(self._lidars.revolutions(readings).values())
-        frame, foot = LevelFrame.of(clouds[0].pose), float(readings.ego.position[2])
+        frame, foot = grid_frame(clouds[0]), float(readings.ego.position[2])
         grid = self._history.add(readings.time, clouds, frame, foot)
         features = network.features(grid.channels)
         maps = network.objects(features)
@@ -133,7 +145,7 @@ class PillarDetector(Detector):
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show; 0 outside of the grid."""
         shares = self._lidars.in_view(boxes, readings, found)
         for reading in list(readings.lidars.values())[:1]:
-            offset = np.abs(LevelFrame.of(reading.pose).to_local(boxes[:, :2]))
+            offset = np.abs(grid_frame(reading).to_local(boxes[:, :2]))
             shares[offset.max(axis=1, initial=0.0) > CELLS * CELL / 2.0] = 0.0
         return shares
 

@@ -1,0 +1,1 @@
+"""Training of the detector `pillars` on lidar scans that are cast on a GPU."""

@@ -1,0 +1,232 @@
+"""Input grids and targets of a batch of scenes, on the device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from training.pillars.network import BOX, CELLS, CHANNELS, OUT, REACH, SIDE, STRIDE_SIDE
+from training.pillars.scans import GROUND, Heads, Meshes, Scans, cast
+from training.pillars.scenes import CLASSES, LAG, STATIONS
+
+CLEARANCE, TALLEST = 0.25, 4.5
+"""Heights between which a point stands on the ground [m]."""
+GROUND_NOISE = 0.02
+"""Standard deviation of the estimated height of the ground [m]."""
+FEWEST = 3
+"""Fewest points on a body that the network has to detect; those with fewer are neither required nor errors."""
+PATCH = 4
+"""Half the edge of the square of cells around an object that has targets [cells]."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Scenes with N = S · STATIONS stations.
+
+    grids   (N, 12, 256, 256)
+    center  (N, 2) center of the grid of each station, a multiple of its output cells, in the scene [m]
+    boxes   (S, B, 7), velocity (S, B, 2), classes (S, B) as in the scene
+    own     (N,) slot of the carrier; -1: a mast
+    points  (N, B) number of points of each station on each body
+    known   (N,) whether the grid has the earlier scan
+    """
+
+    grids: Tensor
+    center: Tensor
+    boxes: Tensor
+    velocity: Tensor
+    classes: Tensor
+    own: Tensor
+    points: Tensor
+    known: Tensor
+
+
+class Sampler:
+    """Maker of batches on the device."""
+
+    def __init__(self, meshes: Meshes, device: str) -> None:
+        self._meshes, self._device = meshes, device
+        self.device_type = torch.device(device).type
+
+    def batch(self, arrays: dict[str, Any]) -> Batch:
+        """Return the batch of scenes of `SceneMaker.batch`, each turned by a random angle."""
+        scene = {
+            name: torch.as_tensor(value).to(self._device, non_blocking=True)
+            for name, value in arrays.items()
+            if name not in ("rings", "columns")
+        }
+        _turn(scene)
+        rings, columns = int(arrays["rings"]), int(arrays["columns"])
+        count = len(scene["bodies"])
+        share = torch.linspace(0.0, 1.0, rings, device=self._device)
+        upper, lower = scene["upper"].flatten()[:, None], scene["lower"].flatten()[:, None]
+        numbers = torch.arange(count, device=self._device).repeat_interleave(STATIONS)
+        own = scene["own"].flatten()
+
+        def heads(place: Tensor) -> Heads:
+            return Heads(
+                numbers, own, place, scene["yaw"].flatten(), upper + (lower - upper) * share,
+                scene["half_field"].flatten(), scene["reach"].flatten(), scene["fade"].flatten(), columns,
+            )  # fmt: skip
+
+        place = scene["place"].reshape(-1, 3)
+        before = place.clone()
+        before[:, :2] -= LAG * scene["speed"].reshape(-1, 2)
+        moved = scene["bodies"].clone()
+        moved[:, :, 1:3] -= LAG * scene["velocity"]
+        now = cast(self._meshes, scene["bodies"], scene["count"], heads(place))
+        earlier = cast(self._meshes, moved, scene["count"], heads(before))
+        phase = (torch.rand(len(place), 2, device=self._device) - 0.5) * STRIDE_SIDE
+        center = place[:, :2] + phase
+        grids = _grids(
+            _placed(now, place, scene["yaw"], center), now, _placed(earlier, before, scene["yaw"], center), earlier
+        )
+        known = torch.rand(len(place), device=self._device) < 0.9  # the earlier scan is sometimes missing
+        grids[:, 8:] *= known[:, None, None, None]
+        slots = scene["bodies"].shape[1]
+        hits = torch.zeros(len(place), slots + 1, device=self._device)
+        rows = torch.where(now.returned & (now.rows >= 0), now.rows, slots).long()
+        hits.scatter_add_(1, rows, torch.ones_like(rows, dtype=torch.float32))
+        return Batch(
+            grids, center, scene["boxes"], scene["velocity"], scene["classes"].long(), own.long(),
+            hits[:, :slots], known,
+        )  # fmt: skip
+
+
+def _turn(scene: dict[str, Tensor]) -> None:
+    """Turn each scene by a random angle."""
+    angle = torch.rand(len(scene["bodies"]), device=scene["bodies"].device) * 6.283185307
+    cos, sin = torch.cos(angle)[:, None], torch.sin(angle)[:, None]
+
+    def turned(x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
+        return cos * x - sin * y, sin * x + cos * y
+
+    for name, column in (("bodies", 1), ("bodies", 4), ("velocity", 0), ("boxes", 0), ("place", 0), ("speed", 0)):
+        part = scene[name]
+        x, y = turned(part[..., column], part[..., column + 1])
+        part[..., column], part[..., column + 1] = x, y
+    scene["boxes"][..., 6] += angle[:, None]
+    scene["yaw"] += angle[:, None]
+
+
+def _placed(scans: Scans, place: Tensor, yaw: Tensor, center: Tensor) -> Tensor:
+    """Return the points (N, M, 3) relative to the center of the grid and the ground."""
+    yaw = yaw.flatten()[:, None]
+    cos, sin = torch.cos(yaw), torch.sin(yaw)
+    x, y, z = scans.points.unbind(2)
+    shift = (place[:, :2] - center)[:, None]
+    height = z + place[:, 2:3] + GROUND_NOISE * torch.randn(len(place), 1, device=z.device)
+    return torch.stack([cos * x - sin * y + shift[..., 0], sin * x + cos * y + shift[..., 1], height], dim=2)
+
+
+def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor:
+    """Return the input of the network (N, 12, 256, 256)."""
+    number, height, x, y, standing, cell, size = _cells(points, now.returned)
+    count = _sum(standing, cell, torch.ones_like(height), size)
+    some = count > 0.0
+    per = count.clamp(min=1.0)
+    high = torch.zeros(size, device=height.device).scatter_reduce_(0, cell[standing], height[standing], "amax")
+    low = torch.full((size,), 1e9, device=height.device).scatter_reduce_(0, cell[standing], height[standing], "amin")
+    low = torch.where(some, low, 0.0)
+    ground = _sum(now.returned & (height <= CLEARANCE) & (cell >= 0), cell, torch.ones_like(height), size)
+    channels = [
+        torch.log1p(count) / 3.0, high / 4.0, low / 4.0, _sum(standing, cell, height, size) / per / 4.0,
+        _sum(standing, cell, now.intensity, size) / per, _sum(standing, cell, x, size) / per,
+        _sum(standing, cell, y, size) / per, torch.log1p(ground) / 3.0,
+    ]  # fmt: skip
+    _, height, x, y, standing, cell, _ = _cells(before, earlier.returned)
+    count = _sum(standing, cell, torch.ones_like(height), size)
+    per = count.clamp(min=1.0)
+    high = torch.zeros(size, device=height.device).scatter_reduce_(0, cell[standing], height[standing], "amax")
+    channels += [torch.log1p(count) / 3.0, high / 4.0, _sum(standing, cell, x, size) / per,
+                 _sum(standing, cell, y, size) / per]  # fmt: skip
+    grids = torch.stack([channel.reshape(number, CELLS, CELLS) for channel in channels], dim=1)
+    assert grids.shape[1] == CHANNELS
+    return grids
+
+
+def _cells(points: Tensor, returned: Tensor) -> tuple[int, Tensor, Tensor, Tensor, Tensor, Tensor, int]:
+    """Return number of scans; heights, offsets in the cell, whether they stand, and cells of the points; cells in all."""
+    number = len(points)
+    i = torch.floor((points[..., 0] + REACH) / SIDE)
+    j = torch.floor((points[..., 1] + REACH) / SIDE)
+    inside = returned & (i >= 0) & (i < CELLS) & (j >= 0) & (j < CELLS)
+    x, y = (points[..., 0] + REACH) / SIDE - i - 0.5, (points[..., 1] + REACH) / SIDE - j - 0.5
+    first = torch.arange(number, device=points.device)[:, None] * (CELLS * CELLS)
+    cell = torch.where(inside, first + (i * CELLS + j).long().clamp(0, CELLS * CELLS - 1), -1)
+    height = points[..., 2]
+    standing = inside & (height > CLEARANCE) & (height < TALLEST)
+    return number, height, x, y, standing, cell, number * CELLS * CELLS
+
+
+def _sum(chosen: Tensor, cell: Tensor, value: Tensor, size: int) -> Tensor:
+    return torch.zeros(size, device=value.device).index_add_(0, cell[chosen], value[chosen])
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Targets of N grids.
+
+    heat     (N, K, 128, 128) 1 at the cell of an object's center, lower around it
+    cells    (P,) cells with boxes in the flattened (N, 128, 128), values (P, 13) of their boxes, weights (P,)
+    moving   (P,) whether the displacement is known
+    objects  number of required objects
+    """
+
+    heat: Tensor
+    cells: Tensor
+    values: Tensor
+    weights: Tensor
+    moving: Tensor
+    objects: Tensor
+
+
+def targets(batch: Batch, points: Tensor) -> Targets:
+    """Return the targets of each station, for bodies with these numbers of points (N, B)."""
+    number, slots = points.shape
+    device = points.device
+    scene = torch.arange(len(batch.boxes), device=device).repeat_interleave(STATIONS)
+    boxes, velocity, classes = batch.boxes[scene], batch.velocity[scene], batch.classes[scene]
+    offset = boxes[..., :2] - batch.center[:, None]
+    i, j = (torch.floor((offset[..., axis] + REACH) / STRIDE_SIDE) for axis in (0, 1))
+    inside = (i >= 0) & (i < OUT) & (j >= 0) & (j < OUT) & (classes >= 0) & (points > 0)
+    inside &= torch.arange(slots, device=device) != batch.own[:, None]
+    n, b = torch.nonzero(inside, as_tuple=True)
+    required = points[n, b] >= FEWEST
+    box, kind, center = boxes[n, b], classes[n, b], offset[n, b]
+    i, j = i[n, b].long(), j[n, b].long()
+    sigma = (0.17 / STRIDE_SIDE * torch.sqrt(box[:, 3] * box[:, 4])).clamp(0.6, 1.5)
+    around = torch.arange(-PATCH, PATCH + 1, device=device)
+    di, dj = (part.flatten() for part in torch.meshgrid(around, around, indexing="ij"))
+    pi, pj = i[:, None] + di, j[:, None] + dj
+    on = (pi >= 0) & (pi < OUT) & (pj >= 0) & (pj < OUT)
+    value = torch.exp(-(di * di + dj * dj) / (2.0 * sigma[:, None] ** 2))
+    value = torch.where((di == 0) & (dj == 0) & ~required[:, None], 0.99, value)
+    cell = (n[:, None] * OUT + pi.clamp(0, OUT - 1)) * OUT + pj.clamp(0, OUT - 1)
+    heat = torch.zeros(number * OUT * OUT, len(CLASSES), device=device)
+    flat = cell * len(CLASSES) + kind[:, None]
+    heat.view(-1).scatter_reduce_(0, flat[on], value[on], "amax")
+    heat = heat.reshape(number, OUT, OUT, len(CLASSES)).permute(0, 3, 1, 2)
+    near = on & (di.abs() <= 1) & (dj.abs() <= 1) & required[:, None]
+    rows, columns = torch.nonzero(near, as_tuple=True)
+    held, point = box[rows], center[rows]
+    cx = (pi[rows, columns] + 0.5) * STRIDE_SIDE - REACH
+    cy = (pj[rows, columns] + 0.5) * STRIDE_SIDE - REACH
+    shift = velocity[n, b][rows] * LAG
+    values = torch.stack(
+        [
+            (point[:, 0] - cx) / STRIDE_SIDE, (point[:, 1] - cy) / STRIDE_SIDE, held[:, 2],
+            *torch.log(held[:, 3:6].clamp(min=0.1)).unbind(1), torch.cos(held[:, 6]), torch.sin(held[:, 6]),
+            torch.cos(2.0 * held[:, 6]), torch.sin(2.0 * held[:, 6]), shift[:, 0], shift[:, 1],
+            torch.zeros_like(held[:, 0]),
+        ],
+        dim=1,
+    )  # fmt: skip
+    assert values.shape[1] == BOX
+    weights = value[rows, columns]
+    return Targets(
+        heat, cell[rows, columns], values, weights, batch.known[n][rows].float(), required.sum().clamp(min=1).float()
+    )

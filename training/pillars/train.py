@@ -1,0 +1,311 @@
+"""Training of the network `pillars` on a GPU: first single stations, then fusion of three stations.
+
+Each batch is cast anew, so that no scene occurs twice.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
+
+from training.pillars.network import (
+    BOX,
+    LATENT,
+    LATENT_LIMIT,
+    OUT,
+    REACH,
+    STRIDE_SIDE,
+    Pillars,
+    fuse,
+    most_confident,
+    probabilities,
+    warp,
+)
+from training.pillars.samples import Batch, Sampler, Targets, targets
+from training.pillars.scans import Meshes
+from training.pillars.scenes import CLASSES, STATIONS, Assets, SceneMaker
+
+RATE = 3e-3
+DECAY = 0.01
+AVERAGE = 0.998
+"""Decay of the moving average of the weights in each step."""
+SHARES = (1.0, 1.0, 0.1, 0.05, 0.02, 0.01)
+"""Shares of the cells that senders of a batch send."""
+LARGEST_NOISE = 0.4
+"""Largest standard deviation of the pose error of a sender, in meters and in degrees; half of the batches have none."""
+TEST_SEED = 10**6
+_BOX_WEIGHTS = (2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+K = len(CLASSES)
+
+
+class Scenes(IterableDataset[dict[str, Any]]):
+    """Endless batches of scenes, made by the workers of a loader."""
+
+    def __init__(self, assets: Path, seed: int, scenes: int) -> None:
+        self._assets, self._seed, self._scenes = assets, seed, scenes
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        maker, worker = SceneMaker(Assets.load(self._assets)), get_worker_info()
+        number = 0
+        while True:
+            yield maker.batch((self._seed, worker.id if worker else 0, number), self._scenes)
+            number += 1
+
+
+def heat_loss(logits: Tensor, target: Targets) -> Tensor:
+    """Return the focal loss of the class maps per object (Zhou, Wang, Krähenbühl: Objects as points, 2019)."""
+    logits = logits.float()
+    share = torch.sigmoid(logits)
+    positive = (target.heat >= 0.999).float()
+    hit = -functional.logsigmoid(logits) * (1.0 - share) ** 2 * positive
+    miss = -functional.logsigmoid(-logits) * share**2 * (1.0 - target.heat) ** 4 * (1.0 - positive)
+    return (hit + miss).sum() / target.objects
+
+
+def box_loss(maps: Tensor, target: Targets) -> Tensor:
+    """Return the loss of the boxes per weight, and of the standard deviation of the position."""
+    boxes = maps[:, K:].permute(0, 2, 3, 1).reshape(-1, BOX)[target.cells].float()
+    error = functional.smooth_l1_loss(boxes[:, :-1], target.values[:, :-1], reduction="none", beta=0.1)
+    scale = error.new_tensor(_BOX_WEIGHTS).expand_as(error).clone()
+    scale[:, 10:] *= target.moving[:, None]
+    weight = target.weights[:, None] / target.weights.sum().clamp(min=1.0)
+    distance = ((boxes[:, :2] - target.values[:, :2]).detach() * STRIDE_SIDE).square().mean(dim=1, keepdim=True)
+    spread = boxes[:, -1:].clamp(-4.0, 2.0)
+    likelihood = 0.5 * distance * torch.exp(-2.0 * spread) + spread
+    return ((error * scale).sum(dim=1, keepdim=True) * weight).sum() + 0.1 * (likelihood * weight).sum()
+
+
+def loss_of(maps: Tensor, target: Targets) -> Tensor:
+    """Return the loss of head maps (N, K + 13, 128, 128)."""
+    return heat_loss(maps[:, :K], target) + 2.0 * box_loss(maps, target)
+
+
+def union(batch: Batch) -> Tensor:
+    """Return the number of points of all stations of the scene on each body (N, B)."""
+    return batch.points.reshape(-1, STATIONS, batch.points.shape[1]).sum(dim=1).repeat_interleave(STATIONS, dim=0)
+
+
+def received_maps(
+    network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, noise: float
+) -> tuple[Tensor, Tensor]:
+    """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells."""
+    number = len(latent)
+    row = torch.arange(number, device=latent.device)
+    scene, station = row // STATIONS, row % STATIONS
+    maps, present = [], []
+    for step in range(1, STATIONS):
+        sender = scene * STATIONS + (station + step) % STATIONS
+        error = noise * torch.randn(number, 3, device=latent.device)
+        turn = torch.deg2rad(error[:, 2])
+        shift = batch.center - batch.center[sender] + error[:, :2]
+        values, held = warp(latent[sender], mask[sender], shift, turn)
+        held = held * ~_own_cells(batch)
+        maps.append(network.received(values.to(latent.dtype)))
+        present.append(held)
+    return torch.stack(maps), torch.stack(present)
+
+
+def _own_cells(batch: Batch) -> Tensor:
+    """Return the cells of each grid on the body of its station (N, H, W)."""
+    number = len(batch.own)
+    scene = torch.arange(number, device=batch.own.device) // STATIONS
+    box = batch.boxes[scene, batch.own.clamp(min=0)]
+    cell = (torch.arange(OUT, device=box.device) + 0.5) * STRIDE_SIDE - REACH
+    x = cell[None, :, None] + (batch.center[:, 0] - box[:, 0])[:, None, None]
+    y = cell[None, None, :] + (batch.center[:, 1] - box[:, 1])[:, None, None]
+    cos, sin = torch.cos(box[:, 6])[:, None, None], torch.sin(box[:, 6])[:, None, None]
+    ahead, aside = cos * x + sin * y, cos * y - sin * x
+    on = (ahead.abs() < box[:, 3, None, None] / 2 + 0.4) & (aside.abs() < box[:, 4, None, None] / 2 + 0.4)
+    return on & (batch.own >= 0)[:, None, None]
+
+
+def train(network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], arguments: argparse.Namespace) -> Pillars:
+    """Train until the time is over; return the moving average of the network."""
+    joint = arguments.stage == "fusion"
+    network.train()
+    average = copy.deepcopy(network).eval()
+    parameters = [entry for entry in network.parameters() if entry.requires_grad]
+    optimizer = torch.optim.AdamW(parameters, lr=RATE, weight_decay=DECAY)
+    features = torch.compile(network.features) if arguments.compile else network.features
+    random = np.random.default_rng(arguments.seed + (1 if joint else 0))
+    start, step, held = time.monotonic(), 0, []
+    peak = RATE * (0.4 if joint else 1.0)
+    while (progress := (time.monotonic() - start) / (60.0 * arguments.minutes)) < 1.0:
+        rate = peak * min(1.0, (step + 1) / 300.0) * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * progress)))
+        for group in optimizer.param_groups:
+            group["lr"] = rate
+        with torch.no_grad():
+            batch = sampler.batch(next(scenes))
+            own = targets(batch, batch.points)
+        with torch.autocast(sampler.device_type, torch.bfloat16):
+            own_features = features(batch.grids.contiguous(memory_format=torch.channels_last))
+            own_maps = network.head(own_features)
+            latent = network.sent(own_features)
+            restored = network.head(network.received(latent))
+        loss = loss_of(own_maps, own) + 0.5 * loss_of(restored, own)
+        if joint:
+            together = targets(batch, union(batch))
+            share = float(random.choice(SHARES))
+            noise = float(random.uniform(0.0, LARGEST_NOISE)) if random.random() < 0.5 else 0.0
+            mask = most_confident(probabilities(own_maps.detach()), share)
+            with torch.autocast(sampler.device_type, torch.bfloat16):
+                maps, present = received_maps(network, batch, latent, mask, noise)
+                fused = fuse(own_features.float(), maps.float(), present, str(random.choice(["max", "attention"])))
+                fused_maps = network.head(fused)
+            loss = loss + loss_of(fused_maps, together)
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(parameters, 10.0)
+        optimizer.step()
+        with torch.no_grad():
+            decay = min(AVERAGE, (step + 1) / (step + 20))
+            for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True):
+                if kept.dtype.is_floating_point:
+                    kept.lerp_(new, 1.0 - decay)
+        held.append(loss.detach())
+        step += 1
+        if step % 100 == 0:
+            mean = torch.stack(held[-100:]).mean().item()
+            print(f"step {step}  {time.monotonic() - start:.0f} s  loss {mean:.3f}  rate {rate:.2e}", flush=True)
+    print(f"{step} steps of {arguments.scenes * STATIONS} grids", flush=True)
+    return average
+
+
+def peaks(maps: Tensor, count: int = 100) -> tuple[Tensor, Tensor, Tensor]:
+    """Return scores, classes and centers of the best local maxima of head maps: (N, count), (N, count), (N, count, 2)."""
+    share = torch.sigmoid(maps[:, :K].float())
+    best, kind = share.max(dim=1)
+    best = torch.where(functional.max_pool2d(best[:, None], 3, 1, 1)[:, 0] == best, best, 0.0)
+    scores, rows = best.flatten(1).topk(count, dim=1)
+    i, j = rows // OUT, rows % OUT
+    offset = maps[:, K : K + 2].float().flatten(2).gather(2, rows[:, None].expand(-1, 2, -1))
+    x = (i + 0.5 + offset[:, 0]) * STRIDE_SIDE - REACH
+    y = (j + 0.5 + offset[:, 1]) * STRIDE_SIDE - REACH
+    return scores, kind.flatten(1).gather(1, rows), torch.stack([x, y], dim=2)
+
+
+def average_precision(entries: list[tuple[float, bool]], objects: int) -> float:
+    """Return the area below precision over recall of detections (score, correct)."""
+    entries = sorted(entries, key=lambda entry: -entry[0])
+    hits = np.cumsum([hit for _, hit in entries])
+    precision = hits / np.arange(1, len(entries) + 1)
+    precision = np.maximum.accumulate(precision[::-1])[::-1]
+    recall = np.concatenate([[0.0], hits / max(objects, 1)])
+    return float((np.diff(recall) * precision).sum())
+
+
+@torch.no_grad()
+def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, batches: int = 12) -> dict[str, float]:
+    """Return the average precision by distance of centers below 1 m, on scenes that training does not see."""
+    maker = SceneMaker(Assets.load(arguments.assets))
+    found: dict[str, list[tuple[float, bool]]] = {}
+    objects: dict[str, int] = {}
+    for number in range(batches):
+        batch = sampler.batch(maker.batch((TEST_SEED, number), arguments.scenes))
+        features = network.features(batch.grids)
+        own = network.head(features)
+        latent = network.sent(features)
+        results = {"single": (own, batch.points), "restored": (network.head(network.received(latent)), batch.points),
+                   "none": (own, union(batch))}  # fmt: skip
+        for share, noise, methods in ((1.0, 0.0, ("max", "attention")), (0.01, 0.0, ("attention",)),
+                                      (0.05, 0.0, ("attention",)), (1.0, 0.4, ("attention",))):  # fmt: skip
+            mask = most_confident(probabilities(own), share)
+            maps, present = received_maps(network, batch, latent, mask, noise)
+            for method in methods:
+                name = f"{method} {share:g} {noise:g}"
+                results[name] = (network.head(fuse(features, maps, present, method)), union(batch))
+        scene = torch.arange(len(batch.own), device=batch.own.device) // STATIONS
+        centers = batch.boxes[scene][..., :2] - batch.center[:, None]
+        inside = (centers.abs() < REACH).all(dim=2) & (batch.classes[scene] >= 0)
+        inside &= torch.arange(centers.shape[1], device=centers.device) != batch.own[:, None]
+        for name, (maps, points) in results.items():
+            scores, _, places = (part.cpu().numpy() for part in peaks(maps))
+            truth = (inside & (points > 0)).cpu().numpy()
+            distance = torch.cdist(torch.as_tensor(places), centers.cpu().float()).numpy()
+            for row in range(len(scores)):
+                open_rows = truth[row].copy()
+                objects[name] = objects.get(name, 0) + int(open_rows.sum())
+                for rank in range(scores.shape[1]):
+                    if scores[row, rank] < 0.05:
+                        break
+                    near = np.where(open_rows, distance[row, rank], np.inf)
+                    best = int(near.argmin())
+                    hit = bool(near[best] < 1.0)
+                    open_rows[best] &= not hit
+                    found.setdefault(name, []).append((float(scores[row, rank]), hit))
+    return {name: round(average_precision(found.get(name, []), objects[name]), 4) for name in objects}
+
+
+@torch.no_grad()
+def codebook(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, entries: int = 256) -> np.ndarray[Any, Any]:
+    """Return the centers (256, 8) of the values of the most confident cells, by k-means."""
+    maker = SceneMaker(Assets.load(arguments.assets))
+    held = []
+    for number in range(12):
+        batch = sampler.batch(maker.batch((arguments.seed, 10**5, number), arguments.scenes))
+        features = network.features(batch.grids)
+        mask = most_confident(probabilities(network.head(features)), 0.05).flatten(1) > 0.0
+        values = network.sent(features).flatten(2).permute(0, 2, 1)[mask]
+        held.append(values[torch.randperm(len(values), device=values.device)[:20_000]])
+    values = torch.cat(held).float()
+    generator = torch.Generator(device=values.device).manual_seed(arguments.seed)
+    centers = values[torch.randperm(len(values), generator=generator, device=values.device)[:entries]].clone()
+    for _ in range(60):
+        nearest = torch.cdist(values, centers).argmin(dim=1)
+        sums = torch.zeros_like(centers).index_add_(0, nearest, values)
+        counts = torch.zeros(entries, device=values.device).index_add_(0, nearest, torch.ones(len(values), device=values.device))
+        centers = torch.where(counts[:, None] > 0, sums / counts[:, None].clamp(min=1.0), centers)
+    assert centers.shape == (entries, LATENT) and float(centers.abs().max()) <= LATENT_LIMIT
+    return centers.cpu().numpy()
+
+
+def main() -> None:
+    """Train one stage, and write its state, and after the second stage the weights."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("stage", choices=("single", "fusion"))
+    parser.add_argument("--minutes", type=float, default=8.0)
+    parser.add_argument("--scenes", type=int, default=32, help="scenes of a batch, with three stations each")
+    parser.add_argument("--workers", type=int, default=15)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--assets", type=Path, default=Path("training/data/pillars_assets.npz"))
+    parser.add_argument("--start", type=Path, help="state of an earlier stage")
+    parser.add_argument("--out", type=Path, default=Path("training/out"))
+    parser.add_argument("--device", default="cuda")
+    parser.add_argument("--compile", action="store_true")
+    arguments = parser.parse_args()
+    torch.manual_seed(arguments.seed)
+    torch.backends.cudnn.benchmark = True
+    with np.load(arguments.assets) as file:
+        meshes = Meshes.of(file["triangles"], file["reflectivity"], file["first"], arguments.device)
+    sampler = Sampler(meshes, arguments.device)
+    network = Pillars().to(arguments.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    if arguments.start is not None:
+        network.load_state_dict(torch.load(arguments.start, map_location=arguments.device))
+    loader = DataLoader(
+        Scenes(arguments.assets, arguments.seed + (1000 if arguments.stage == "fusion" else 0), arguments.scenes),
+        batch_size=None, num_workers=arguments.workers, prefetch_factor=4 if arguments.workers else None,
+    )  # fmt: skip
+    average = train(network, sampler, iter(loader), arguments)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    torch.save(average.state_dict(), arguments.out / f"pillars_{arguments.stage}.pt")
+    scores = evaluate(average, sampler, arguments)
+    print(json.dumps(scores), flush=True)
+    arrays = {**average.folded(), "codebook": codebook(average, sampler, arguments)}
+    np.savez(arguments.out / f"pillars_{arguments.stage}.npz", **arrays)
+    (arguments.out / f"pillars_{arguments.stage}_scores.json").write_text(json.dumps(scores, indent=2))
+
+
+if __name__ == "__main__":
+    main()
