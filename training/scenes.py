@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller
@@ -31,8 +32,12 @@ EVERY = 10
 
 @dataclass(frozen=True)
 class StationScene:
-    """Readings of one station with camera and lidar, and the labels of its camera image."""
+    """Readings of one station with camera and lidar, the labels of its camera image, and boxes (M, 7) of all other
+    actors with their categories.
+    """
 
+    boxes: Array
+    categories: tuple[str, ...]
     readings: Readings
     labels: list[Label]
     weather: str
@@ -119,5 +124,7 @@ def _read(
     view = world.view()
     for name, readings in read_all(list(rigs.values()), world, view).items():
         labels = actor_labels(readings.cameras["camera"], view, specs, (name,))
+        rows = [row for other, row in view.rows.items() if other != name]
         context = DetectorContext(specs[name], dict(sensors or default_sensors()), roads, 1)
-        yield StationScene(readings, labels, weather, context)
+        categories = tuple(view.categories[row] for row in rows)
+        yield StationScene(view.boxes[rows].reshape(-1, 7), categories, readings, labels, weather, context)

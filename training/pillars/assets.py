@@ -54,9 +54,7 @@ def write_assets(path: Path, places: int, seed: int = SEED) -> None:
     for number in range(places):
         place = random_place(rng)
         lanes.append(_lanes(place, number))
-        houses += [
-            (*house.center[:2], *house.size, house.yaw, float(number)) for house in place.houses
-        ]
+        houses += [(*house.center[:2], *house.size, house.yaw, float(number)) for house in place.houses]
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(
         path,

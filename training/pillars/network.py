@@ -57,7 +57,9 @@ class Pillars(nn.Module):
         self.compress = nn.Conv2d(FEATURES, LATENT, 1)
         self.expand = nn.Conv2d(LATENT, FEATURES, 1)
         self.head = nn.Conv2d(FEATURES, len(CLASSES) + BOX, 1)
-        nn.init.constant_(self.head.bias[: len(CLASSES)], -4.0)
+        bias = self.head.bias
+        assert bias is not None
+        nn.init.constant_(bias[: len(CLASSES)], -4.0)
 
     def features(self, grid: Tensor) -> Tensor:
         """Return features (N, 96, 128, 128) of grids (N, 12, 256, 256)."""
@@ -67,7 +69,7 @@ class Pillars(nn.Module):
 
     def sent(self, features: Tensor) -> Tensor:
         """Return the values (N, 8, 128, 128) that a receiver decodes; gradients pass the rounding."""
-        latent = self.compress(features).clamp(-LATENT_LIMIT, LATENT_LIMIT)
+        latent: Tensor = self.compress(features).clamp(-LATENT_LIMIT, LATENT_LIMIT)
         scale = LATENT_LIMIT / 127.0
         return latent + (torch.round(latent / scale) * scale - latent).detach()
 
@@ -81,9 +83,11 @@ class Pillars(nn.Module):
 
         def fold(name: str, unit: nn.Sequential) -> None:
             convolution, norm = unit[0], unit[1]
+            assert isinstance(convolution, nn.Conv2d | nn.ConvTranspose2d)
             assert isinstance(norm, nn.BatchNorm2d)
+            assert norm.running_var is not None
+            assert norm.running_mean is not None
             weight = convolution.weight.detach().double().cpu()
-            assert isinstance(weight, Tensor) and norm.running_var is not None and norm.running_mean is not None
             gain = (norm.weight.double() / torch.sqrt(norm.running_var.double() + norm.eps)).detach().cpu()
             axis = (1, -1, 1, 1) if isinstance(convolution, nn.ConvTranspose2d) else (-1, 1, 1, 1)
             arrays[f"{name}.weight"] = (weight * gain.reshape(axis)).float().numpy()
@@ -98,7 +102,7 @@ class Pillars(nn.Module):
         for name in ("compress", "expand", "head"):
             arrays[f"{name}.weight"] = getattr(self, name).weight.detach().float().cpu().numpy()
             arrays[f"{name}.bias"] = getattr(self, name).bias.detach().float().cpu().numpy()
-        arrays["latent_scale"] = np.float32(LATENT_LIMIT / 127.0)
+        arrays["latent_scale"] = np.array(LATENT_LIMIT / 127.0, dtype=np.float32)
         return arrays
 
 

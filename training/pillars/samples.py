@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from training.pillars.network import BOX, CELLS, CHANNELS, OUT, REACH, SIDE, STRIDE_SIDE
-from training.pillars.scans import GROUND, Heads, Meshes, Scans, cast
+from training.pillars.scans import Heads, Meshes, Scans, cast
 from training.pillars.scenes import CLASSES, LAG, STATIONS
 
 CLEARANCE, TALLEST = 0.25, 4.5
@@ -149,7 +149,7 @@ def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor
 
 
 def _cells(points: Tensor, returned: Tensor) -> tuple[int, Tensor, Tensor, Tensor, Tensor, Tensor, int]:
-    """Return number of scans; heights, offsets in the cell, whether they stand, and cells of the points; cells in all."""
+    """Return number of scans; heights, offsets in the cell, whether they stand, cells of the points; cells in all."""
     number = len(points)
     i = torch.floor((points[..., 0] + REACH) / SIDE)
     j = torch.floor((points[..., 1] + REACH) / SIDE)

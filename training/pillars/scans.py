@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
-import triton
-import triton.language as tl
+import triton  # type: ignore[import-not-found]
+import triton.language as tl  # type: ignore[import-not-found]
 
 CHUNK = 16
 """Triangles that share a bounding box."""
@@ -40,11 +42,15 @@ class Meshes:
 
     @classmethod
     def of(
-        cls, triangles: np.ndarray, reflectivity: np.ndarray, first: np.ndarray, device: str
+        cls,
+        triangles: np.ndarray[Any, Any],
+        reflectivity: np.ndarray[Any, Any],
+        first: np.ndarray[Any, Any],
+        device: str,
     ) -> Meshes:
         """Return the meshes of bodies: triangles (K, 3, 3) [m], reflectivity (K,), first triangle of each (M + 1,)."""
         rows, boxes, chunks, bounds = [], [], [0], []
-        for start, end in zip(first[:-1], first[1:], strict=True):
+        for start, end in pairwise(first.tolist()):
             corners = triangles[start:end].astype(np.float64)
             order = _morton_order(corners.mean(axis=1))
             order = np.concatenate([order, np.full(-len(order) % CHUNK, order[-1])])  # repeated ones change nothing
@@ -59,7 +65,7 @@ class Meshes:
             points = corners.reshape(-1, 3)
             bounds.append(np.concatenate([points.min(axis=0), points.max(axis=0)]))
 
-        def tensor(value: np.ndarray) -> torch.Tensor:
+        def tensor(value: np.ndarray[Any, Any]) -> torch.Tensor:
             return torch.tensor(value, dtype=torch.float32, device=device)
 
         return cls(
@@ -70,7 +76,7 @@ class Meshes:
         )
 
 
-def _morton_order(points: np.ndarray) -> np.ndarray:
+def _morton_order(points: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Return the order of points (N, 3) along a Morton curve."""
     extent = np.maximum(np.ptp(points, axis=0), 1e-9)
     cells = ((points - points.min(axis=0)) / extent * 1023).astype(np.int64)
@@ -81,7 +87,7 @@ def _morton_order(points: np.ndarray) -> np.ndarray:
     return np.argsort(code, kind="stable")
 
 
-@triton.jit
+@triton.jit  # type: ignore[untyped-decorator]
 def _enters(ox, oy, oz, ix, iy, iz, box):
     """Return where rays enter and leave an axis-aligned box, from the inverses of their directions."""
     x0, x1 = (tl.load(box) - ox) * ix, (tl.load(box + 3) - ox) * ix
@@ -92,8 +98,8 @@ def _enters(ox, oy, oz, ix, iy, iz, box):
     return near, far
 
 
-@triton.jit
-def _cast(
+@triton.jit  # type: ignore[untyped-decorator]
+def _cast(  # type: ignore[no-untyped-def]
     triangles, boxes, chunks, bounds, bodies, counts, scenes, heads, elevations, distance, rows, brightness,
     rings, columns, slots, block: tl.constexpr, chunk: tl.constexpr,
 ):  # fmt: skip
@@ -180,8 +186,11 @@ class Heads:
 
 @dataclass(frozen=True)
 class Scans:
-    """Returns of N scans of M rays: points (N, M, 3) relative to the sensor, in axes of its heading [m], whether there is
-    a return (N, M), its intensity, and the slot of the body that it shows (GROUND for the ground, NOTHING for the air).
+    """Returns of N scans of M rays.
+
+    points     (N, M, 3) relative to the sensor, in axes of its heading [m]
+    returned   (N, M) whether there is a return;  intensity (N, M)
+    rows       (N, M) slot of the body that it shows, GROUND, or NOTHING for the air
     """
 
     points: torch.Tensor

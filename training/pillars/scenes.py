@@ -1,4 +1,4 @@
-"""Random scenes with stations, as arrays. This module needs NumPy only, so that it runs on a machine without the engine."""
+"""Random scenes with stations, as arrays. NumPy is sufficient, so that machines without the engine make scenes."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def overlaps(box: Array, boxes: Array) -> bool:
     turn = others[:, 4] - box[4]
     cos, sin = np.abs(np.cos(turn)), np.abs(np.sin(turn))
     apart = np.zeros(len(others), dtype=bool)
-    for heading, own, other in ((np.full(len(others), box[4]), box[None, 2:4], others[:, 2:4]),
-                                (others[:, 4], others[:, 2:4], np.broadcast_to(box[2:4], (len(others), 2)))):  # fmt: skip
+    first, second = np.broadcast_to(box, others.shape), others
+    for heading, own, other in ((box[4], first[:, 2:4], second[:, 2:4]), (others[:, 4], second[:, 2:4], first[:, 2:4])):
         along = np.cos(heading) * offset[:, 0] + np.sin(heading) * offset[:, 1]
         aside = np.cos(heading) * offset[:, 1] - np.sin(heading) * offset[:, 0]
         apart |= np.abs(along) > (own[:, 0] + other[:, 0] * cos + other[:, 1] * sin) / 2.0
@@ -134,7 +134,7 @@ class SceneMaker:
             fastest = {"pedestrian": 2.5, "bicycle": 7.0}.get(shape, 15.0)
             stands = kind == 1 or shape in ("rsu", "box") or rng.random() < (0.7 if turned and not person else 0.3)
             scale = tuple(rng.uniform(0.95, 1.05, 3).tolist()) if shape not in ("rsu",) else (1.0, 1.0, 1.0)
-            return add(mesh, x, y, heading, 0.0 if stands else float(rng.uniform(0.5, fastest)), scale)  # type: ignore[arg-type]
+            return add(mesh, x, y, heading, 0.0 if stands else float(rng.uniform(0.5, fastest)), scale)
 
         stations = []
         for number in range(STATIONS):
@@ -156,11 +156,15 @@ class SceneMaker:
                         stations.append((-1, x, y, tall, yaw, 0.0, 0.0, math.pi))
                         break
                 else:
-                    shape = str(rng.choice(["car", "van", "truck", "bus", "firetruck"], p=[0.7, 0.12, 0.08, 0.06, 0.04]))
+                    shape = str(
+                        rng.choice(["car", "van", "truck", "bus", "firetruck"], p=[0.7, 0.12, 0.08, 0.06, 0.04])
+                    )
                     if body(start, shape, straight=True):
                         _, x, y, _, heading, *_, vx, vy, length, _, height = entries[-1]
                         front = rng.random() < 0.25
-                        ahead, up = (length / 2.0 + 0.06, 1.0) if front else (float(rng.uniform(-0.9, 0.3)), height + 0.35)
+                        ahead, up = (
+                            (length / 2.0 + 0.06, 1.0) if front else (float(rng.uniform(-0.9, 0.3)), height + 0.35)
+                        )
                         half = math.radians(float(rng.choice([360.0, 180.0, 120.0, 100.0]))) / 2.0 if front else math.pi
                         stations.append((
                             len(entries) - 1, x + ahead * math.cos(heading), y + ahead * math.sin(heading), up, heading,
@@ -199,7 +203,9 @@ class SceneMaker:
             "count": np.array(float(len(entries))),
             "velocity": table[:, 8:10],
             "boxes": np.column_stack([table[:, 1:4], table[:, 10:13], table[:, 4]]),
-            "classes": np.where(np.arange(SLOTS) < len(entries), assets.classes[table[:, 0].astype(int)], -1).astype(float),
+            "classes": np.where(np.arange(SLOTS) < len(entries), assets.classes[table[:, 0].astype(int)], -1).astype(
+                float
+            ),
             "own": stand[:, 0],
             "place": stand[:, 1:4],
             "yaw": stand[:, 4],

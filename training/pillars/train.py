@@ -97,9 +97,7 @@ def union(batch: Batch) -> Tensor:
     return batch.points.reshape(-1, STATIONS, batch.points.shape[1]).sum(dim=1).repeat_interleave(STATIONS, dim=0)
 
 
-def received_maps(
-    network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, noise: float
-) -> tuple[Tensor, Tensor]:
+def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, noise: float) -> tuple[Tensor, Tensor]:
     """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells."""
     number = len(latent)
     row = torch.arange(number, device=latent.device)
@@ -131,7 +129,9 @@ def _own_cells(batch: Batch) -> Tensor:
     return on & (batch.own >= 0)[:, None, None]
 
 
-def train(network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], arguments: argparse.Namespace) -> Pillars:
+def train(
+    network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], arguments: argparse.Namespace
+) -> Pillars:
     """Train until the time is over; return the moving average of the network."""
     joint = arguments.stage == "fusion"
     network.train()
@@ -184,7 +184,7 @@ def train(network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], 
 
 
 def peaks(maps: Tensor, count: int = 100) -> tuple[Tensor, Tensor, Tensor]:
-    """Return scores, classes and centers of the best local maxima of head maps: (N, count), (N, count), (N, count, 2)."""
+    """Return scores (N, count), classes and centers (N, count, 2) of the best local maxima of head maps."""
     share = torch.sigmoid(maps[:, :K].float())
     best, kind = share.max(dim=1)
     best = torch.where(functional.max_pool2d(best[:, None], 3, 1, 1)[:, 0] == best, best, 0.0)
@@ -249,7 +249,9 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
 
 
 @torch.no_grad()
-def codebook(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, entries: int = 256) -> np.ndarray[Any, Any]:
+def codebook(
+    network: Pillars, sampler: Sampler, arguments: argparse.Namespace, entries: int = 256
+) -> np.ndarray[Any, Any]:
     """Return the centers (256, 8) of the values of the most confident cells, by k-means."""
     maker = SceneMaker(Assets.load(arguments.assets))
     held = []
@@ -265,9 +267,12 @@ def codebook(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
     for _ in range(60):
         nearest = torch.cdist(values, centers).argmin(dim=1)
         sums = torch.zeros_like(centers).index_add_(0, nearest, values)
-        counts = torch.zeros(entries, device=values.device).index_add_(0, nearest, torch.ones(len(values), device=values.device))
+        counts = torch.zeros(entries, device=values.device).index_add_(
+            0, nearest, torch.ones(len(values), device=values.device)
+        )
         centers = torch.where(counts[:, None] > 0, sums / counts[:, None].clamp(min=1.0), centers)
-    assert centers.shape == (entries, LATENT) and float(centers.abs().max()) <= LATENT_LIMIT
+    assert centers.shape == (entries, LATENT)
+    assert float(centers.abs().max()) <= LATENT_LIMIT
     return centers.cpu().numpy()
 
 
@@ -303,7 +308,7 @@ def main() -> None:
     scores = evaluate(average, sampler, arguments)
     print(json.dumps(scores), flush=True)
     arrays = {**average.folded(), "codebook": codebook(average, sampler, arguments)}
-    np.savez(arguments.out / f"pillars_{arguments.stage}.npz", **arrays)
+    np.savez(arguments.out / f"pillars_{arguments.stage}.npz", allow_pickle=False, **arrays)
     (arguments.out / f"pillars_{arguments.stage}_scores.json").write_text(json.dumps(scores, indent=2))
 
 

@@ -1,0 +1,122 @@
+"""Shipped weights of `pillars` from the result of training: ranges for 8-bit integers, confidence, and a card."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace
+
+from eidrive_scenario.base.arrays import Array, Bools, Floats
+from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import iou_bev, points_in_box
+from eidrive_scenario.experiments.average_precision import average_precision, best_confidence, match_by_share
+from eidrive_scenario.perception.learned.network_loading import SHIPPED
+from eidrive_scenario.perception.learned.pillars.detector import PillarDetector, PillarSettings, grid_frame
+from eidrive_scenario.perception.learned.pillars.grid import CELLS, ScanHistory
+from eidrive_scenario.perception.learned.pillars.network import features_onnx
+from eidrive_scenario.perception.learned.weights import DESCRIPTION
+from eidrive_scenario.sensing.readings import LidarReading
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
+from eidrive_scenario.world.weather import Weather
+from training.calibrate import write_description
+from training.pillars.scenes import CLASSES, LAG
+from training.quantize import layer_ranges
+from training.scenes import StationScene, random_scenes
+
+SENSORS: dict[str, SensorSettings] = {
+    "camera": CameraSettings(width=64, height=48),
+    "lidar": LidarSettings(rate=10.0, rotation=10.0),
+}
+FEWEST = 3
+"""Fewest points on a required object; others are neither required nor errors."""
+LEAST = 0.02
+"""Confidence of the detections for the average precision."""
+MARGIN = 0.1
+"""Growth of a body on each side, for the noise of points on its surface [m]."""
+WITHIN = 45.0
+"""Maximum distance of required objects from the lidar along each axis [m]."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Grid (1, 12, 256, 256), detections, boxes (M, 7) of road users, and which are required (M,)."""
+
+    grid: Floats
+    detections: Detections
+    boxes: Array
+    required: Bools
+
+
+def measured(scenes: Iterator[StationScene], path: Path, precision: str = "float32") -> Iterator[Measured]:
+    """Yield the detections of a weight file in lidar scans of scenes at rest."""
+    settings = PillarSettings.model_validate({"weights": str(path), "confidence": LEAST, "precision": precision})
+    for scene in scenes:
+        detector, readings = PillarDetector(settings), scene.readings
+        detector.setup(scene.context)
+        cloud, foot, history = readings.lidars["lidar"], float(readings.ego.position[2]), ScanHistory()
+        for time in (readings.time, readings.time + LAG):
+            detections = detector.detect(replace(readings, time=time))
+            grid = history.add(time, [cloud], grid_frame(cloud), foot)
+        boxes = scene.boxes[[row for row, name in enumerate(scene.categories) if name in CLASSES]]
+        yield Measured(grid.channels[None], detections, boxes, _required(boxes, cloud))
+
+
+def _required(boxes: Array, cloud: LidarReading) -> Bools:
+    points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+    near = np.abs(boxes[:, :2] - cloud.pose[:2, 3]).max(axis=1, initial=0.0) < WITHIN
+    grown = boxes + np.array([0.0, 0.0, 0.1, MARGIN, MARGIN, -0.1, 0.0])
+    hit: Bools = np.array([points_in_box(points, box).sum() >= FEWEST for box in grown], dtype=bool)
+    return near & hit
+
+
+def scores(results: list[Measured], overlap: float) -> tuple[float, float]:
+    """Return the average precision at an overlap, and the confidence with the greatest F1 score."""
+    matches = [
+        match_by_share(iou_bev(scan.detections.boxes, scan.boxes), scan.detections.scores, ~scan.required, overlap)
+        for scan in results
+    ]
+    objects = sum(int(scan.required.sum()) for scan in results)
+    return average_precision(matches, objects), best_confidence(matches, objects)
+
+
+def main() -> None:
+    """Write weights and card."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("trained", type=Path, nargs="?", default=Path("training/out/pillars_fusion.npz"))
+    parser.add_argument("--places", type=int, default=40)
+    parser.add_argument("--out", type=Path, default=SHIPPED / "pillars.npz")
+    options = parser.parse_args()
+    with np.load(options.trained) as file:
+        arrays = {name: file[name] for name in file.files}
+    description = {"network": "pillars", "classes": CLASSES, "input_size": [CELLS, CELLS], "confidence": 0.3}
+    np.savez_compressed(options.out, allow_pickle=False, **{**arrays, DESCRIPTION: np.array(json.dumps(description))})
+    training = list(measured(random_scenes(1, "train", options.places, Weather(), sensors=SENSORS), options.out))
+    ranges = layer_ranges(features_onnx(arrays), (scan.grid for scan in training))
+    rounded = {name: np.round(limits, 5).tolist() for name, limits in ranges.items()}
+    _, confidence = scores(training, 0.5)
+    write_description(options.out, ranges=rounded, confidence=round(confidence, 3))
+    card: dict[str, object] = {**description, "confidence": round(confidence, 3), "date": str(date.today())}
+    validation = list(random_scenes(1, "validation", options.places, Weather(), sensors=SENSORS))
+    for precision in ("float32", "int8"):
+        results = list(measured(iter(validation), options.out, precision))
+        card[f"validation_{precision}"] = {
+            "scans": len(results),
+            "objects": sum(int(scan.required.sum()) for scan in results),
+            **{f"ap{round(100 * overlap)}": round(scores(results, overlap)[0], 4) for overlap in (0.3, 0.5, 0.7)},
+        }
+    for stage in ("single", "fusion"):
+        path = options.trained.with_name(f"pillars_{stage}_scores.json")
+        if path.exists():
+            card[f"{stage}_ap_1m"] = json.loads(path.read_text(encoding="utf-8"))
+    options.out.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(card, indent=1))
+
+
+if __name__ == "__main__":
+    main()
