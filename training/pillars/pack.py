@@ -72,7 +72,8 @@ def _required(boxes: Array, cloud: LidarReading) -> Bools:
     near = np.abs(boxes[:, :2] - cloud.pose[:2, 3]).max(axis=1, initial=0.0) < WITHIN
     grown = boxes + np.array([0.0, 0.0, 0.1, MARGIN, MARGIN, -0.1, 0.0])
     hit: Bools = np.array([points_in_box(points, box).sum() >= FEWEST for box in grown], dtype=bool)
-    return near & hit
+    required: Bools = near & hit
+    return required
 
 
 def scores(results: list[Measured], overlap: float) -> tuple[float, float]:

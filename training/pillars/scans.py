@@ -87,8 +87,8 @@ def _morton_order(points: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return np.argsort(code, kind="stable")
 
 
-@triton.jit  # type: ignore[untyped-decorator]
-def _enters(ox, oy, oz, ix, iy, iz, box):
+@triton.jit
+def _enters(ox, oy, oz, ix, iy, iz, box):  # type: ignore[no-untyped-def]
     """Return where rays enter and leave an axis-aligned box, from the inverses of their directions."""
     x0, x1 = (tl.load(box) - ox) * ix, (tl.load(box + 3) - ox) * ix
     y0, y1 = (tl.load(box + 1) - oy) * iy, (tl.load(box + 4) - oy) * iy
