@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal, Self
 
@@ -33,7 +34,7 @@ from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readi
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 
 
-class LearnedDetector(Detector):
+class ImageDetector(Detector):
     """Detections of a network in the images of all cameras, lifted by lidar points if there are any, else by the
     ground.
 
@@ -45,18 +46,11 @@ class LearnedDetector(Detector):
         "camera": CameraSettings(width=512, height=384, rate=10.0),
         "lidar": LidarSettings(rate=10.0, field_of_view=110.0),
     }
-    settings_type: ClassVar[type[Settings] | None] = LearnedSettings
-    network: ClassVar[Literal["yolov5", "ssd"]]
 
-    def __init__(self, settings: LearnedSettings | None = None) -> None:
-        self.settings = settings or LearnedSettings()
+    def __init__(self) -> None:
         self.image_detections: Mapping[str, ImageDetections] = {}
         self._signals: tuple[SignalReading, ...] = ()
-        path = weights_path(self.network, self.settings)
-        check_weights_exist(path)
-        self.library_versions = runtime_versions(runtime_of(path, self.settings))
         self._network: ImageNetwork | None = None
-        self.processes_batches = self.settings.device == "cuda"
         self._prepared: Mapping[str, ImageDetections] = {}
         """Detections in the next images, by camera, after `prepare_batch`."""
         self._map_context = MapContext(None)
@@ -64,14 +58,14 @@ class LearnedDetector(Detector):
         self._lights = LightsOnMap(None)
         self._roads: weakref.ref[RoadNetwork] | None = None
 
-    def check_weights(self, *, allow_torchscript: bool = False) -> None:
-        """Raise SettingError if a run refuses the weights, without reading them."""
-        check_network(self.network, self.settings, allow_torchscript=allow_torchscript)
+    @abstractmethod
+    def build_network(self, *, allow_torchscript: bool = False) -> ImageNetwork:
+        """Return the network. Raise SettingError if its weights are not suitable."""
 
     def load_weights(self, *, allow_torchscript: bool = False) -> None:
         """Create the network. Raise SettingError if its weights are not suitable."""
         if self._network is None:
-            self._network = build_network(self.network, self.settings, allow_torchscript=allow_torchscript)
+            self._network = self.build_network(allow_torchscript=allow_torchscript)
             self.detectable_signals = signal_kinds(self._network.classes)
 
     def setup(self, context: DetectorContext) -> None:
@@ -177,6 +171,28 @@ class LearnedDetector(Detector):
             ]
         )
         return lifted if lifted.scores.all() else lifted.subset(np.flatnonzero(lifted.scores).tolist())
+
+
+class LearnedDetector(ImageDetector):
+    """Detector of a network of this project, or of one from an ONNX or TorchScript file."""
+
+    settings_type: ClassVar[type[Settings] | None] = LearnedSettings
+    network: ClassVar[Literal["yolov5", "ssd"]]
+
+    def __init__(self, settings: LearnedSettings | None = None) -> None:
+        super().__init__()
+        self.settings = settings or LearnedSettings()
+        path = weights_path(self.network, self.settings)
+        check_weights_exist(path)
+        self.library_versions = runtime_versions(runtime_of(path, self.settings))
+        self.processes_batches = self.settings.device == "cuda"
+
+    def check_weights(self, *, allow_torchscript: bool = False) -> None:
+        """Raise SettingError if a run refuses the weights, without reading them."""
+        check_network(self.network, self.settings, allow_torchscript=allow_torchscript)
+
+    def build_network(self, *, allow_torchscript: bool = False) -> ImageNetwork:
+        return build_network(self.network, self.settings, allow_torchscript=allow_torchscript)
 
 
 class YoloDetector(LearnedDetector):
