@@ -3,7 +3,8 @@
 The detectors are evaluated on at least 1,000 held-out images, which are rendered if they are missing, and on the scenes
 of the library: average precision at overlap 0.5 with detections sorted over the whole set; recall by class, distance
 and weather; causes of misses; traffic lights; errors of lifted centers by distance; recall against fog and darkness;
-size and time; average precision by runtime. Writes reports/detection.md, .json and .png.
+size and time; average precision by runtime; recall of `ssd_openimages`, if it is installed. Writes
+reports/detection.md, .json and .png.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import cv2
 from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
+from eidrive_scenario.perception.learned.openimages import ARCHIVE
 from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.world.weather import Weather, load_weather
 from training.image_evaluation import (
@@ -32,6 +34,7 @@ from training.image_evaluation import (
 from training.light_scenes import light_scenes
 from training.light_scores import light_table, readings
 from training.misses import misses
+from training.realism import realism_tables
 from training.runtime_scores import runtime_table
 from training.scenes import StationScene, library_scenes, random_scenes
 from training.scoring import EvaluatedImage, Part, score
@@ -72,6 +75,7 @@ def evaluate(options: argparse.Namespace) -> None:
     evaluated = {name: evaluate_dataset(sensitive_networks[name], dataset, networks[name].confidence) for name in names}
     add([*tables_of(evaluated, "Held-out images"), misses(evaluated, dataset)])
     add([runtime_table(names, dataset, options.runtime_pictures, LOW)])
+    add(realism_tables(dataset, options.openimages, options.photographs, networks))
     in_library = {name: evaluate_scenes(sensitive_networks[name], scenes, networks[name].confidence) for name in names}
     add(tables_of(in_library, "Library scenes"))
     lights = light_scenes(options.seed, "lights held_out", options.light_worlds, options.processes)
@@ -141,6 +145,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--pictures", type=int, default=1200, help="number of held-out images; rendered once")
     parser.add_argument("--runtime-pictures", type=int, default=240, help="number of these images for each runtime")
+    parser.add_argument("--openimages", type=Path, default=Path(ARCHIVE), help="npm package of ssd_openimages")
+    parser.add_argument(
+        "--photographs", type=Path, help="folder with the folders darknet and opencv of training/realism.py"
+    )
     parser.add_argument("--light-worlds", type=int, default=80, help="places with six images of traffic lights each")
     parser.add_argument("--worlds", type=int, default=30, help="places of random scenes with lidar")
     parser.add_argument("--sweep-worlds", type=int, default=20, help="number of scenes per weather of the curves")

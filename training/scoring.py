@@ -41,19 +41,25 @@ class EvaluatedImage:
 
 @dataclass(frozen=True)
 class Part:
-    """Subset of objects: classes, distances [m], minimum height [px], weather."""
+    """Subset of objects: classes, distances [m], minimum and maximum height [px], weather.
+
+    detected_as  classes of detections that count; none: the same
+    """
 
     names: tuple[str, ...]
     nearest: float = 0.0
     farthest: float = np.inf
     height: float = 0.0
     weather: str = ""
+    max_height: float = np.inf
+    detected_as: tuple[str, ...] = ()
 
     def required(self, objects: Objects) -> Bools:
         """Return the objects (M,) of this subset."""
         of_classes = np.array([name in self.names for name in objects.names], dtype=bool)
         near = (objects.distance >= self.nearest) & (objects.distance < self.farthest)
-        return of_classes & near & (objects.height >= self.height) & objects.to_find
+        high = (objects.height >= self.height) & (objects.height < self.max_height)
+        return of_classes & near & high & objects.to_find
 
 
 @dataclass(frozen=True)
@@ -72,13 +78,14 @@ def score(images: Sequence[EvaluatedImage], part: Part) -> Score:
     """
     matches: list[Matches] = []
     count = 0
+    names = {*part.names, *part.detected_as}
     for image in images:
         if part.weather and image.weather != part.weather:
             continue
         objects = image.objects
         required = part.required(objects)
-        of_classes = np.array([name in part.names for name in objects.names], dtype=bool) | ~objects.to_find
-        detected = np.array([name in part.names for name in image.found.classes], dtype=bool)
+        of_classes = np.array([name in names for name in objects.names], dtype=bool) | ~objects.to_find
+        detected = np.array([name in (part.detected_as or part.names) for name in image.found.classes], dtype=bool)
         matches.append(
             match(
                 image.found.boxes[detected],

@@ -16,7 +16,8 @@ from training import runtime_scores
 from training.dataset import Dataset, encode, write
 from training.light_scores import Reading, light_table
 from training.misses import CAUSES, causes, misses
-from training.scoring import EvaluatedImage, Objects
+from training.realism import HEIGHTS, PHOTOGRAPHS
+from training.scoring import EvaluatedImage, Objects, Part, score
 from training.tables import as_markdown
 
 CAR, WALKER = IMAGE_CLASSES.index("car"), IMAGE_CLASSES.index("pedestrian")
@@ -144,3 +145,30 @@ def test_runtime_table_compares_classes_with_torch_and_repetitions(
     assert by_runtime["torch"]["largest difference"] == "0.000000"
     assert by_runtime["torch"]["equal when repeated"] == "yes"
     assert built == ["onnxruntime", "onnxruntime", "torch", "torch"]
+
+
+def test_score_counts_detections_of_related_classes_within_heights() -> None:
+    """A bus found as truck counts for buses; the truck beside it is ignored, and the low bus is outside the subset."""
+    boxes = np.array([[0.0, 0.0, 40.0, 40.0], [50.0, 0.0, 70.0, 40.0], [80.0, 0.0, 100.0, 10.0]])
+    image = EvaluatedImage(
+        Objects(boxes, ("bus", "truck", "bus"), np.array([40.0, 40.0, 10.0]), np.full(3, 20.0), np.ones(3, dtype=bool)),
+        ImageDetections(boxes, np.array([0.9, 0.8, 0.7]), ("truck", "truck", "car")),
+        "clear",
+        confidence=0.5,
+    )
+    alone = score([image], Part(("bus",)))
+    assert (alone.recall, alone.objects) == (0.0, 2)
+    related = score([image], Part(("bus",), height=20.0, max_height=64.0, detected_as=("car", "truck")))
+    assert (related.precision, related.recall, related.objects) == (1.0, 1.0, 1)
+    low = score([image], Part(("bus",), max_height=20.0, detected_as=("car", "truck")))
+    assert (low.recall, low.objects) == (1.0, 1)
+
+
+def test_marked_objects_of_photographs_are_high_enough() -> None:
+    """Heights of the photographs [px] are those of the files in both packages."""
+    rows = dict(zip(PHOTOGRAPHS, (576, 424, 900, 680, 938), strict=True))
+    for name, objects in PHOTOGRAPHS.items():
+        for _, (left, top, right, bottom) in objects:
+            assert 0 <= left < right
+            assert 0 <= top < bottom <= rows[name]
+            assert (bottom - top) * 300 / rows[name] >= HEIGHTS[-1][0]
