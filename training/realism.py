@@ -1,6 +1,6 @@
 """An outside judge of the renderer: recall of `ssd_openimages` on rendered images, beside that on photographs.
 
-The detector was trained on photographs only: its recall on rendered images tells how much objects resemble real ones.
+The detector was trained on photographs only: its recall on rendered images measures their realism.
 The photographs are in two packages under free licenses, `darknet` 0.0.0+git20180914 of Debian 13 (GPL-3.0+, MIT or
 WTFPL) and `opencv` 7.0.0 of npm (MIT). Their objects were marked by hand: all road users that are visible to at least
 a half and at least 16 pixels high at the input size of the network.

@@ -141,7 +141,8 @@ def decode(encoded: Floats, logits: Floats, confidence: float) -> Candidates:
     Labels are independent, and a car is a vehicle, too: the score of a vehicle is that of the greater of both. It is a
     car if that is at least as probable as not, given a vehicle, and else a truck, whose sizes include those of a bus.
     """
-    probability = 1.0 / (1.0 + np.exp(-logits[0].astype(float)))
+    with np.errstate(over="ignore"):  # infinity gives 0
+        probability = 1.0 / (1.0 + np.exp(-logits[0].astype(float)))
     car, vehicle = probability[:, _CAR], probability[:, _VEHICLE]
     is_car = car >= 0.5 * vehicle
     of_vehicle = np.maximum(car, vehicle)
@@ -158,8 +159,9 @@ def decode(encoded: Floats, logits: Floats, confidence: float) -> Candidates:
     center_y, center_x, height, width = (encoded[0, rows].astype(float) / _CODE_DIVISORS).T
     anchor = _ANCHORS[rows]
     center = np.stack([center_x, center_y], axis=1) * anchor[:, 2:] + anchor[:, :2]
-    half = np.exp(np.stack([width, height], axis=1)) * anchor[:, 2:] / 2.0
-    boxes = np.concatenate([center - half, center + half], axis=1) * SIDE
+    with np.errstate(over="ignore", invalid="ignore"):  # boxes that are not finite are removed later
+        half = np.exp(np.stack([width, height], axis=1)) * anchor[:, 2:] / 2.0
+        boxes = np.concatenate([center - half, center + half], axis=1) * SIDE
     return Candidates(boxes, scores[rows].max(axis=1), scores[rows].argmax(axis=1))
 
 
