@@ -123,9 +123,10 @@ def test_missing_runtime_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_missing_package_names_the_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    detectors = OpenImagesDetector(), OpenImagesDetector(OpenImagesSettings(weights="none.tgz"))
     monkeypatch.setattr(openimages, "_is_installed", lambda: True)
     monkeypatch.chdir(tmp_path)
-    for detector in (OpenImagesDetector(), OpenImagesDetector(OpenImagesSettings(weights="none.tgz"))):
+    for detector in detectors:
         with pytest.raises(SettingError, match=r"npm pack @mediapipe/objectron@0\.4\.1675468480"):
             detector.check_weights()
 
