@@ -9,6 +9,7 @@ from eidrive_scenario.experiments.average_precision import area_in_order as area
 from eidrive_scenario.experiments.average_precision import average_precision as average_precision
 from eidrive_scenario.experiments.average_precision import match_by_share as match_by_share
 from eidrive_scenario.experiments.average_precision import matching_order as matching_order
+from eidrive_scenario.experiments.commands import command_of as command_of
 from eidrive_scenario.experiments.repetitions import Job as Job
 from eidrive_scenario.experiments.repetitions import cores as cores
 from eidrive_scenario.experiments.repetitions import jobs_of as jobs_of

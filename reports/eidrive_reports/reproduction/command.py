@@ -13,7 +13,7 @@ def reproduce(
         list[str] | None,
         typer.Argument(
             metavar="PART",
-            help="table2, table3, detection, pipeline, ei, sensitivity, channels, perception, or all.",
+            help="table2, table3, detection, pipeline, ei, sensitivity, channels, perception, or all; benchmark.",
             show_default="all",
         ),
     ] = None,
@@ -23,12 +23,40 @@ def reproduce(
             min=1,
             max=10_000,
             help="Episodes of each cell, with seeds from 1.",
-            show_default="table2: 20, table3: 40, sensitivity: 3, channels: 10, perception: 4, else 5",
+            show_default="table2: 20, table3: 40, sensitivity: 3, channels, benchmark: 10, perception: 4, else 5",
         ),
     ] = None,
     detectors: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="the paper's; table3: oracle"),
+        typer.Option(
+            metavar="A,B",
+            help="Detectors of the stations.",
+            show_default="the paper's; table3: oracle; benchmark: lidar",
+        ),
+    ] = None,
+    fusion: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="benchmark: methods, NAME[:DETECTOR].",
+            show_default=False,
+        ),
+    ] = None,
+    channels: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="benchmark: channel profiles, or RATEmbit_STATIONS.",
+            show_default=False,
+        ),
+    ] = None,
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="benchmark: names, files, or families such as ncap.",
+            show_default=False,
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the tables and of the records of all runs.")] = Path(
         "reports/paper"
@@ -48,17 +76,29 @@ def reproduce(
 ) -> None:
     """Reproduce the experiments of the EI-Drive paper, and write reports with its numbers beside the measured ones.
 
+    The part benchmark compares fusion methods by channel and scenario.
+
     Example: eidrive reproduce table2 --episodes 5 --out reports/paper
     """
     from rich.console import Console
 
+    from eidrive_reports.reproduction import benchmark
+    from eidrive_reports.reproduction.benchmark_page import write_benchmark_page
     from eidrive_reports.reproduction.figures import draw
     from eidrive_reports.reproduction.page import write_paper_page, write_part_replays
     from eidrive_reports.reproduction.parts import ALL, selected_detectors, selected_parts
     from eidrive_reports.reproduction.reproduce import reproduce as reproduce_part
 
-    names = [] if detectors is None else [name.strip() for name in detectors.split(",")]
-    chosen = [(part, selected_detectors(part, names)) for part in selected_parts(parts or [ALL])]
+    names = _names(detectors) or []
+    given = {"fusion": _names(fusion), "channels": _names(channels), "scenarios": _names(scenarios)}
+    sets = {option: texts for option, texts in given.items() if texts is not None}
+    others = {}
+    if benchmark.NAME in (parts or ()):
+        others = {benchmark.NAME: benchmark.benchmark_part(names, **sets)}
+    elif sets:
+        raise typer.BadParameter(f"has an effect on the part {benchmark.NAME} only", param_hint=f"--{next(iter(sets))}")
+    selected = selected_parts(parts or [ALL], others)
+    chosen = [(part, selected_detectors(part, names)) for part in selected]
     for part, used in chosen:
         done = reproduce_part(
             part,
@@ -75,7 +115,7 @@ def reproduce(
             typer.echo(f"{part.name}: wrote {written}")
         elif replays:
             typer.echo(f"{part.name}: --replays has no effect on this part", err=True)
-        page = write_paper_page(out)
+        page = write_benchmark_page(out) if part.name == benchmark.NAME else write_paper_page(out)
         kept = len(done.episodes) - done.added
         typer.echo(
             f"{part.name}: {done.added} runs in {done.elapsed_s:.0f} s, {kept} from the record; all "
@@ -83,3 +123,7 @@ def reproduce(
         )
         if done.unused:
             typer.echo(f"{part.name}: {done.unused} runs of the record have other settings, seeds or code", err=True)
+
+
+def _names(text: str | None) -> list[str] | None:
+    return None if text is None else [name.strip() for name in text.split(",")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import msgspec
@@ -12,9 +13,9 @@ from eidrive_reports.cooperative_perception.scores import PerceptionRecord
 from eidrive_reports.cooperative_perception.trial import run_trial
 from eidrive_reports.paper import EGO
 from eidrive_reports.reproduction.channel_load import with_load
-from eidrive_scenario.api.criteria import Frame
+from eidrive_scenario.api.criteria import Frame, LinkStatistics
 from eidrive_scenario.api.experiments import Job, resolve_scenario
-from eidrive_scenario.api.run import run_file
+from eidrive_scenario.api.run import NOT_JUDGED, run_file
 
 
 class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -27,6 +28,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     counts   number of objects that the counted station knew at each time step, after fusion
     wall_s   duration of the run [s]
     perception  detections of the ego by condition, of a run that measures them
+    passed   whether the run passed; None if no criterion judges it
     """
 
     scenario: str
@@ -40,6 +42,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     failed: tuple[str, ...] = ()
     counts: tuple[int, ...] = ()
     perception: PerceptionRecord | None = None
+    passed: bool | None = None
 
     @property
     def key(self) -> tuple[str, str, int, str]:
@@ -99,6 +102,7 @@ def run_episode(job: EpisodeJob) -> Episode:
         path = resolve_scenario(job.scenario)
         source = with_load(path, job.load) if job.load else path
         result = run_file(source, seed=job.seed, settings=job.settings, observers=observers)
+    metrics = {**result.metrics, **air_metrics(result.links)}
     return Episode(
         scenario=job.scenario,
         arm=job.arm,
@@ -107,8 +111,22 @@ def run_episode(job: EpisodeJob) -> Episode:
         trace_hash=result.trace_hash,
         simulated_s=result.simulated_s,
         wall_s=round(result.wall_s, 3),
-        metrics={name: float(value) for name, value in result.metrics.items() if math.isfinite(value)},
+        metrics={name: float(value) for name, value in metrics.items() if math.isfinite(value)},
         failed=tuple(verdict.name for verdict in result.criteria if not verdict.passed),
         counts=tuple(counter.counts),
         perception=perception,
+        passed=None if result.exit_code == NOT_JUDGED else result.passed,
     )
+
+
+BYTES, BUSY = "air.bytes", "air.busy"
+"""Metrics of the radio: transmitted bytes of all stations, and largest channel busy ratio that one of them measures."""
+
+
+def air_metrics(links: Mapping[tuple[str, str], LinkStatistics]) -> dict[str, float]:
+    """Return the metrics of the radio. A message counts once, whatever the number of its receivers."""
+    sent: dict[str, int] = {}
+    for (sender, _), link in links.items():
+        sent[sender] = max(sent.get(sender, 0), link.bytes_sent)
+    busy = [link.channel_busy_ratio for link in links.values() if link.channel_busy_ratio is not None]
+    return {BYTES: float(sum(sent.values())), **({BUSY: max(busy)} if busy else {})}

@@ -86,7 +86,7 @@ def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
         sections = [
             {
                 "title": str(section["title"]),
-                "paragraphs": [_with_code(str(text)) for text in section["paragraphs"]],
+                "paragraphs": [text_with_code(str(text)) for text in section["paragraphs"]],
                 "columns": [str(title) for title in section["columns"]],
                 "rows": [[str(cell) for cell in row] for row in section["rows"]],
             }
@@ -101,12 +101,12 @@ def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
         "title": title,
         "sections": sections,
         "figure": png_address(figure.read_bytes()) if figure.is_file() else "",
-        "origin": ", ".join(_origin(origin)),
+        "origin": ", ".join(origin_texts(origin)),
         "replays": replays_page(name) if (out / replays_page(name)).is_file() else "",
     }
 
 
-def _origin(origin: Mapping[str, Any]) -> list[str]:
+def origin_texts(origin: Mapping[str, Any]) -> list[str]:
     """Return version, commit, seeds and durations as texts, without unknown ones."""
     texts = {
         "version": "eidrive-scenario {}",
@@ -121,7 +121,7 @@ def _origin(origin: Mapping[str, Any]) -> list[str]:
     return [text.format(origin[key]) for key, text in texts.items() if origin.get(key) is not None]
 
 
-def _with_code(text: str) -> Markup:
+def text_with_code(text: str) -> Markup:
     """Return a paragraph as HTML, with words between backticks as code."""
     parts = text.split("`")
     return Markup("").join(

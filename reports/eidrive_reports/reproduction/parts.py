@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from eidrive_reports.reproduction import (
     channels,
@@ -21,13 +21,18 @@ MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels, per
 PARTS = {module.PART.name: module.PART for module in MODULES}
 """Parts by name."""
 ALL = "all"
-"""Name of all parts together."""
+"""Name of all parts in PARTS together."""
 
 
-def selected_parts(names: Sequence[str]) -> tuple[Part, ...]:
-    """Return the parts of these names in the order of the paper. Raise SettingError for an unknown name."""
-    _check("part", names, (*PARTS, ALL))
-    return tuple(part for name, part in PARTS.items() if ALL in names or name in names)
+def selected_parts(names: Sequence[str], others: Mapping[str, Part] | None = None) -> tuple[Part, ...]:
+    """Return the parts of these names in the order of the paper, then those of `others`, which `all` omits.
+
+    Raise SettingError for an unknown name.
+    """
+    others = others or {}
+    _check("part", names, (*PARTS, *others, ALL))
+    chosen = [part for name, part in PARTS.items() if ALL in names or name in names]
+    return (*chosen, *(part for name, part in others.items() if name in names))
 
 
 def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
@@ -35,7 +40,7 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
 
     Raise SettingError for a name that no part uses, or if the part uses none of them.
     """
-    _check("--detectors", names, dict.fromkeys(name for one in PARTS.values() for name in one.detectors))
+    _check("--detectors", names, dict.fromkeys(name for one in (*PARTS.values(), part) for name in one.detectors))
     detectors = tuple(name for name in part.detectors if name in names) if names else part.default
     if not detectors:
         message = f"--detectors: part {part.name} uses none of them (got {quoted(','.join(names))})"

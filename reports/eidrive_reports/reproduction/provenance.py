@@ -18,7 +18,7 @@ from typing import Any
 from eidrive_reports import cooperative_perception
 from eidrive_reports.cooperative_perception.receivers import Condition
 from eidrive_reports.reproduction import channel_load, episodes
-from eidrive_scenario.api.common import Diagnostic, SettingError, load_json, write_atomically
+from eidrive_scenario.api.common import Diagnostic, SettingError, load_json, registry, write_atomically
 from eidrive_scenario.api.experiments import (
     average_precision,
     canonical_json,
@@ -50,9 +50,30 @@ def job_digest(scenario: str, settings: RunSettings, *, load: int = 0, condition
     """
     given = {name: str(value) for name, value in asdict(settings).items()}
     content = {"code": code_digest(), "scenario": _scenario_digest(scenario), "settings": given, "load": load}
+    own = _own_files(settings)
+    if own:
+        content["files"] = [sha256_of(path.read_bytes()) for path in own]
     if conditions:
         content |= {"conditions": [one.name for one in conditions], "measurement": _measurement_digest()}
     return sha256_of(canonical_json(content).encode())[:_LENGTH]
+
+
+def _own_files(settings: RunSettings) -> list[Path]:
+    """Return the modules of extensions of others, and the files, that settings name.
+
+    Raise SettingError or RegistryError if an extension does not load.
+    """
+    named = (("detectors", settings.detector), ("fusion", settings.fusion), ("planners", settings.planner))
+    used = [(registry(kind), name) for kind, name in named if name is not None]
+    modules = [Path(getfile(found.load(name))) for found, name in used if found.distribution(name) is not None]
+    return modules + [path for path in map(Path, map(str, settings.sources)) if _is_file(path)]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # the text of a profile is longer than a name may be
+        return False
 
 
 @cache

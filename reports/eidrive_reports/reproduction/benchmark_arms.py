@@ -1,0 +1,191 @@
+"""Methods, channels and scenarios of the benchmark, and the texts that select them on the command line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any
+
+from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, registry
+from eidrive_scenario.api.experiments import describe_scenarios, library_path, resolve_scenario
+from eidrive_scenario.api.run import RunSettings
+from eidrive_scenario.api.v2x import load_profile
+
+NO_COOPERATION = "none"
+"""Name of the method, and of the channel, without messages."""
+METHODS = (NO_COOPERATION, "average", "covariance_intersection", "early")
+"""Methods without an option."""
+NEEDED = {"early": "lidar"}
+"""Detector that a method needs. Other methods are run with each detector of `--detectors`."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """Fusion method and detector of all stations; the method `none` uses no messages."""
+
+    fusion: str
+    detector: str
+
+    @property
+    def name(self) -> str:
+        """Name in the record and in tables, and text on the command line."""
+        return f"{self.fusion}:{self.detector}"
+
+    @property
+    def cooperates(self) -> bool:
+        """Whether stations use messages."""
+        return self.fusion != NO_COOPERATION
+
+
+def methods_of(texts: Sequence[str], detectors: Sequence[str]) -> tuple[Method, ...]:
+    """Return the methods of texts `FUSION` or `FUSION:DETECTOR`, each once.
+
+    A text without a detector stands for the one that the method needs, or for each of `detectors`.
+    Raise SettingError for the name of an unknown method or detector.
+    """
+    methods: dict[Method, None] = {}
+    for text in texts:
+        fusion, _, detector = text.partition(":")
+        if fusion != NO_COOPERATION and fusion not in registry("fusion"):
+            unknown = registry("fusion").unknown(fusion, also=(NO_COOPERATION,))
+            raise SettingError(Diagnostic(f"--fusion: {unknown.message}", unknown.hint))
+        if ":" in text and detector not in registry("detectors"):
+            unknown = registry("detectors").unknown(detector)
+            raise SettingError(Diagnostic(f"--fusion: {unknown.message}", unknown.hint))
+        needed = [detector] if detector else [NEEDED[fusion]] if fusion in NEEDED else detectors
+        methods |= dict.fromkeys(Method(fusion, name) for name in needed)
+    return tuple(methods)
+
+
+RATE = 6
+"""Data rate of all stations, the default of ITS-G5 [Mbit/s]."""
+SENSED_ROAD = 584.15
+"""Length of road from which a station senses 23 dBm, each meter weighted by the probability [m]: equation (34) of
+Sepulcre et al., arXiv:2104.07923, divided by the load of one vehicle per meter."""
+MOST_STATIONS = 350
+"""Maximum number of stations on a shared channel; the channel busy ratio of the model is valid up to 385."""
+RATES = (1, 3, 6)
+"""Rates that a station can use on the channels without an option [Mbit/s]."""
+STATIONS = (2, 40, 80)
+"""Numbers of stations on the channels without an option."""
+
+
+def shared_channel(rate: float, stations: int) -> Mapping[str, Any]:
+    """Return the profile of IEEE 802.11p in urban streets, shared with further stations.
+
+    rate      mean rate at which a station may send [Mbit/s]: a share of the time at 6 Mbit/s, kept by congestion
+              control. So the range is the same at all rates
+    stations  number of stations that a station senses, with itself and one sender of the scenario. The others send 300
+              bytes at 10 Hz, as in the profile `80211p_urban`, and are not simulated
+    """
+    profile: dict[str, Any] = {
+        "model": "radio",
+        "path_loss": {"kind": "tr37885", "environment": "urban"},
+        "data_rate_mbps": RATE,
+        "queue": {"discipline": "lcfs"},
+    }
+    if rate < RATE:
+        share = round(rate / RATE, 4)
+        profile["congestion"] = {"kind": "limeric", "share_min": share, "share_max": share, "interval_min": 0.0}
+    if stations > 2:
+        density = round((stations - 2) / SENSED_ROAD, 5)
+        profile["background"] = {"kind": "80211p", "density": density, "rate": 10, "size": 300, "power_dbm": 23}
+    return profile
+
+
+@dataclass(frozen=True)
+class BenchmarkChannel:
+    """Channel of the benchmark.
+
+    rate, stations  of a shared channel; None for a profile of the library or of a file
+    """
+
+    name: str
+    profile: str | Mapping[str, Any] = field(hash=False)
+    rate: float | None = None
+    stations: int | None = None
+
+    @property
+    def title(self) -> str:
+        """Title in tables."""
+        return self.name if self.rate is None else f"{self.rate:g} Mbit/s, {self.stations} stations"
+
+
+CHANNELS = tuple(f"{rate}mbit_{stations}" for stations, rate in product(STATIONS, RATES))
+"""Names of the channels without an option."""
+SILENT = BenchmarkChannel(NO_COOPERATION, NO_COOPERATION)
+"""Channel of runs without cooperation."""
+_SHARED = re.compile(r"(\d+(?:\.\d+)?)mbit_(\d+)")
+
+
+def channel_of(text: str) -> BenchmarkChannel:
+    """Return the shared channel of a text such as `3mbit_40`, or the channel of a profile's name or file.
+
+    Raise SettingError for an invalid profile, a rate above that of the channel or an invalid number of stations.
+    """
+    match = _SHARED.fullmatch(text)
+    if match is None:
+        load_profile(text, (library_path() / "channels",), origin="--channels")
+        return BenchmarkChannel(text, text)
+    rate, stations = float(match[1]), int(match[2])
+    if not 0.0 < rate <= RATE or not 2 <= stations <= MOST_STATIONS:
+        hint = f"RATEmbit_STATIONS with a rate of at most {RATE} Mbit/s and 2 to {MOST_STATIONS} stations"
+        raise SettingError(Diagnostic(f"--channels: invalid shared channel {quoted(text)}", hint))
+    return BenchmarkChannel(text, shared_channel(rate, stations), rate, stations)
+
+
+SCENARIOS = (
+    *(f"coop/scenario_{number}" for number in (5, 6, 7, 8)),
+    "corner_cases/pedestrian_parked_cars",
+    "corner_cases/wrong_way_driver",
+    "corner_cases/emergency_vehicle",
+    "corner_cases/tunnel_breakdown",
+    "corner_cases/cyclist_right_turn",
+    "corner_cases/jam_end",
+    "corner_cases/ghost",
+    "corner_cases/contradicting_senders",
+    "corner_cases/wrong_clock",
+    "ncap/crossing_car",
+    "ncap/crossing_child",
+)
+"""Scenarios without an option. `corner_cases/jammer` is none of them: its events select its channels."""
+PARTNERS = {
+    "corner_cases/pedestrian_parked_cars": "Child",
+    "corner_cases/wrong_way_driver": "WrongWay",
+    "corner_cases/emergency_vehicle": "Ambulance",
+    "corner_cases/tunnel_breakdown": "Truck",
+    "corner_cases/cyclist_right_turn": "Cyclist",
+    "corner_cases/jam_end": "Right1",
+    "corner_cases/wrong_clock": "Crossing",
+    "ncap/crossing_car": "Other",
+    "ncap/crossing_child": "Walker",
+}
+"""Actor whose minimum distance to the ego is measured, where the scenario has no criterion for it."""
+EGO = "Ego"
+
+
+def scenarios_of(texts: Sequence[str]) -> tuple[str, ...]:
+    """Return the scenarios of names, files, or families such as `ncap`, each once.
+
+    Raise SettingError for an unknown one, or for a file that is not a scenario.
+    """
+    scenarios: dict[str, None] = {}
+    families: dict[str, list[str]] = {}
+    for entry in describe_scenarios():
+        families.setdefault(entry.family, []).append(entry.name)
+    for text in texts:
+        if text not in families:
+            resolve_scenario(text)
+        scenarios |= dict.fromkeys(families.get(text, [text]))
+    return tuple(scenarios)
+
+
+def settings_of(scenario: str, method: Method, channel: BenchmarkChannel) -> RunSettings:
+    """Return the settings of the runs of a cell."""
+    partner = PARTNERS.get(scenario)
+    criteria = None if partner is None else {"min_distance": {"of": EGO, "to": partner}}
+    if not method.cooperates:
+        return RunSettings(channel=NO_COOPERATION, detector=method.detector, criteria=criteria)
+    return RunSettings(channel=channel.profile, detector=method.detector, fusion=method.fusion, criteria=criteria)
