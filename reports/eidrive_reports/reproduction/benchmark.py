@@ -80,7 +80,7 @@ def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
     collisions     runs in which the ego touches anything
     distance, distance_low, distance_high  mean of the minimum distance between the bodies of the ego and its partner
                    [m], 0 after a contact, and its interval; None without a criterion, and limits None of one run
-    bytes_per_s    mean of the bytes that all stations of the scenario send per second
+    bytes_per_s    mean of the bytes per second of messages that another station uses, lost ones included
     busy           mean of the largest channel busy ratio of the stations; None if the channel has none
     """
     passed = sum(episode.passed is True for episode in episodes)
@@ -234,8 +234,8 @@ def setup(episodes: Sequence[Episode], plan: Plan) -> tuple[str, ...]:
         "with the same detector, by pairs of equal scenario and seed, with Tango's intervals. Methods of equal rank "
         "have equal shares.",
         "The minimum distance is that between the bodies of the ego and the vehicle or person in its way, 0 after a "
-        "contact. Bytes are those of the encoded messages of all stations of the scenario, each message once, and "
-        "channel busy is the largest channel busy ratio that one of them measures. The digest in the column traces is "
+        "contact. Bytes are those of the encoded messages that another station uses, each message once, lost ones "
+        "included, and channel busy is the largest channel busy ratio that one of them measures. The digest in the column traces is "
         "that of the trace hashes of all seeds: equal digests stand for runs that are equal to the bit.",
     ]
     if shared:
