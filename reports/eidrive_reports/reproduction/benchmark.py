@@ -234,8 +234,8 @@ def setup(episodes: Sequence[Episode], plan: Plan) -> tuple[str, ...]:
         "with the same detector, by pairs of equal scenario and seed, with Tango's intervals. Methods of equal rank "
         "have equal shares.",
         "The minimum distance is that between the bodies of the ego and the vehicle or person in its way, 0 after a "
-        "contact. Bytes are those of the encoded messages that another station uses, each message once, lost ones "
-        "included, and channel busy is the largest channel busy ratio that one of them measures. The digest in the column traces is "
+        "contact. Bytes are those of the messages that another station uses, each once, lost ones included, and "
+        "channel busy is the largest channel busy ratio that a station measures. The digest in the column traces is "
         "that of the trace hashes of all seeds: equal digests stand for runs that are equal to the bit.",
     ]
     if shared:

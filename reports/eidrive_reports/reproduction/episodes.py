@@ -120,7 +120,7 @@ def run_episode(job: EpisodeJob) -> Episode:
 
 
 BYTES, BUSY = "air.bytes", "air.busy"
-"""Metrics of the radio: bytes of the messages that another station uses, and largest channel busy ratio of a station."""
+"""Metrics of the radio: bytes of the messages that another station uses, and largest channel busy ratio."""
 
 
 def air_metrics(links: Mapping[tuple[str, str], LinkStatistics]) -> dict[str, float]:
