@@ -104,7 +104,8 @@ def _verdicts(run: RecordedRun) -> Iterator[Row]:
         run.warnings.append("the recording contains no verdicts: the run did not end, or an older version recorded it")
         return
     for one in outcome.criteria:
-        yield (one.name, one.passed, one.value, one.limit, one.unit, one.first_violation, one.reason)
+        state = "; ".join(one.violation_state)
+        yield (one.name, one.passed, one.value, one.limit, one.unit, one.first_violation, one.reason, state)
 
 
 _TIME = _floats("time")
@@ -164,7 +165,7 @@ TABLES: Mapping[str, Table] = {
             **_floats("value", "limit"),
             "unit": str,
             **_floats("first_violation"),
-            "reason": str,
+            **dict.fromkeys(("reason", "violation_state"), str),
         },
         _verdicts,
     ),

@@ -55,7 +55,8 @@ class RunMessages:
         due = [one for one in self._violations if (one.first_violation or 0.0) <= time + TIME_TOLERANCE]
         for verdict in due:
             level = "INFO" if verdict.passed else "ERROR"
-            yield self._message(time, level, "criterion", f"{verdict.name}: violated; {verdict.reason}")
+            lines = (f"{verdict.name}: violated; {verdict.reason}", *verdict.violation_state)
+            yield self._message(time, level, "criterion", "\n".join(lines))
         self._violations = [one for one in self._violations if one not in due]
 
     def of_links(self, events: Sequence[LinkEvent], time: float) -> Iterator[Any]:

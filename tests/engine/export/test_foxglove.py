@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -28,6 +30,7 @@ from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.v2x.messages.message import Message, StationState, compress
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
+LAYOUT = Path(__file__).parents[3] / "examples" / "foxglove_layout.json"
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 
@@ -116,6 +119,34 @@ def test_metrics_are_numbers_for_plots(scenario_1: tuple[list[Frame], Topics, di
     assert counts == [len(frame.steps["Ego"].fused) for frame in frames]
 
 
+def panels_of(layout: Any) -> Iterator[str]:
+    """Yield the panels of a layout tree, whose nodes have two parts."""
+    if isinstance(layout, str):
+        yield layout
+    else:
+        assert layout["direction"] in ("row", "column")
+        assert 0 < layout["splitPercentage"] < 100
+        for part in ("first", "second"):
+            yield from panels_of(layout[part])
+
+
+def test_layout_shows_topics_and_numbers_of_a_run(scenario_1: tuple[list[Frame], Topics, dict[str, str]]) -> None:
+    """Keys are those of the type LayoutData and of the panels of Lichtblick (suite-base, MPL-2.0)."""
+    _, topics, _ = scenario_1
+    layout = json.loads(LAYOUT.read_bytes())
+    assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+    panels = layout["configById"]
+    assert sorted(panels_of(layout["layout"])) == sorted(panels)
+    assert {name.partition("!")[0] for name in panels} == {"3D", "Plot", "RosOut"}
+    assert panels["3D!scene"]["followTf"] == "actor/Ego"
+    assert [name for name in panels["3D!scene"]["topics"] if name not in topics] == []
+    assert panels["RosOut!log"]["topicToRender"] in topics
+    for name, panel in panels.items():
+        for path in panel.get("paths", ()):
+            topic, _, number = path["value"].rpartition(".")
+            assert any(number in entry for entry in topics[topic]), (name, path["value"])
+
+
 def test_violation_is_logged_at_its_time(tmp_path: Path) -> None:
     result = run_and_save(PASSING_BY, settings=RunSettings(parameters={"OtherY": "0"}), out=tmp_path)
     assert result.recording is not None
@@ -126,6 +157,8 @@ def test_violation_is_logged_at_its_time(tmp_path: Path) -> None:
     time = entries[0].timestamp.seconds + 1e-9 * entries[0].timestamp.nanos
     assert collision.first_violation is not None
     assert 0.0 <= time - collision.first_violation < 0.06
+    assert collision.violation_state
+    assert entries[0].message.splitlines()[1:] == list(collision.violation_state)
 
 
 def test_camera_images_have_calibration_and_frame(tmp_path: Path) -> None:

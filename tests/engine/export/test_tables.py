@@ -97,6 +97,8 @@ def test_tables_contain_the_frames_without_loss(recorded: tuple[RunResult, Recor
     assert {"delivered", "lost"} == set(tables["messages"].outcome)
     assert tables["messages"].arrives.isna().sum() == sum(event.arrives is None for event in events)
     assert tables["verdicts"].value.tolist() == [verdict.value for verdict in result.criteria]
+    states = ["; ".join(verdict.violation_state) for verdict in result.criteria]
+    assert tables["verdicts"].violation_state.tolist() == states
     assert len(tables["transitions"]) == sum(len(frame.changes) for frame in frames)
     assert set(tables["plans"].station) == {"Ego"}
 
