@@ -11,11 +11,10 @@ from eidrive_scenario.reporting.drawing.image_canvas import Image as Image
 from eidrive_scenario.reporting.drawing.image_canvas import ImageCanvas as ImageCanvas
 from eidrive_scenario.reporting.drawing.road_drawing import house_outline as house_outline
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing as road_drawing
+from eidrive_scenario.reporting.drawing.snapshot_picture import draw_snapshot as draw_snapshot
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing as RoadDrawing
 from eidrive_scenario.reporting.drawing.top_view import Window as Window
-from eidrive_scenario.reporting.drawing.top_view import legend as legend
-from eidrive_scenario.reporting.drawing.top_view import roads_symbol as roads_symbol
-from eidrive_scenario.reporting.drawing.top_view import top_view as top_view
+from eidrive_scenario.reporting.drawing.vector_canvas import LegendEntries as LegendEntries
 from eidrive_scenario.reporting.drawing.vector_canvas import write_figure as write_figure
 from eidrive_scenario.reporting.page import png_address as png_address
 from eidrive_scenario.reporting.page import write_page as write_page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -28,6 +29,7 @@ class StationSnapshot:
     own       detections that the station uses; if they pass the channel, those that have been delivered
     received  newest message per sender and kind, completed by earlier reports on objects that it omits
     links     newest message outcome per sender
+    speeds    speed of each actor [m/s]; that before the contact where one begins, as the view has that of the bounce
     """
 
     station: str
@@ -37,6 +39,7 @@ class StationSnapshot:
     fused: Detections
     links: tuple[LinkEvent, ...]
     step: AgentStep | None
+    speeds: Mapping[str, float]
 
     @property
     def time(self) -> float:
@@ -53,6 +56,7 @@ class SnapshotBuilder:
         self._newest: dict[tuple[str, str], ReceivedMessage] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
         self._links: dict[str, LinkEvent] = {}
+        self._speeds: Mapping[str, float] = {}
         self._own_travels = False
 
     def observe(self, frame: Frame) -> StationSnapshot:
@@ -74,6 +78,9 @@ class SnapshotBuilder:
         }
         oldest = now - LINK_LIFETIME - TIME_TOLERANCE
         self._links = {name: event for name, event in self._links.items() if event.sent >= oldest}
+        speeds = dict(zip(frame.view.names, frame.view.speed.tolist(), strict=True))
+        touching = {name for contact in frame.view.contacts for name in (contact.first, contact.second)}
+        before, self._speeds = self._speeds, speeds
         return StationSnapshot(
             station=self.station,
             view=frame.view,
@@ -82,6 +89,7 @@ class SnapshotBuilder:
             fused=step.fused if step else Detections(now),
             links=tuple(event for name, event in self._links.items() if name != self.station),
             step=step,
+            speeds={name: before.get(name, speed) if name in touching else speed for name, speed in speeds.items()},
         )
 
     def _receive(self, received: ReceivedMessage) -> None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 from markupsafe import Markup
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from rich import box as boxes
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -29,14 +34,14 @@ from eidrive_reports.paper import (
 from eidrive_scenario.api.common import Array
 from eidrive_scenario.api.pages import (
     ChartSeries,
+    ImageCanvas,
+    LegendEntries,
     ReportedRun,
     RoadDrawing,
     Window,
-    legend,
+    draw_snapshot,
     line_chart,
     png_address,
-    roads_symbol,
-    top_view,
     write_run_report,
 )
 
@@ -94,6 +99,10 @@ def _lines(check: PublishedClaim) -> RenderableType:
 
 COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHED = {"none", "error"}
+PICTURE = (480, 480)
+"""Width and height of a key frame [pixels]."""
+QUALITY = (cv2.IMWRITE_WEBP_QUALITY, 85)
+"""Quality of key frames, which take a ninth of the size of PNG images."""
 HORIZON = 12.0
 """Maximum distance between the cars in the chart [m]."""
 
@@ -132,7 +141,6 @@ def write_demo(
     `stories` are those of the seed `watched`, by scenario and channel.
     """
     windows = {scenario: _window(scenario, stories) for scenario in links.scenarios}
-    symbols = "".join(roads_symbol(sites[name].roads, _identifier(name)) for name in links.scenarios)
     values = {
         table.variant.name: {
             "title": table.variant.title,
@@ -147,13 +155,10 @@ def write_demo(
         out,
         template="demo.html.jinja",
         title="Cooperative perception of an occluded car",
-        symbols=Markup(
-            f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{symbols}</defs></svg>'
-        ),
         colors=COLORS,
         seeds=len(links.cells[0].seeds),
         watched=watched,
-        legend=Markup(legend()),
+        legend=_legend(stories, sites, windows),
         links=values[links.variant.name],
         own=values[own.variant.name],
         sentence=difference(links, own),
@@ -181,10 +186,7 @@ def _scenario(
                 "title": arm.title,
                 "color": COLORS[arm.name],
                 "summary": _summary(table.cell(scenario, arm.name), mine[arm.name], watched),
-                "images": [
-                    _figure(moment, mine[arm.name], arm, site, window, _identifier(scenario))
-                    for moment in mine[arm.name].moments
-                ],
+                "images": [_figure(moment, mine[arm.name], arm, site, window) for moment in mine[arm.name].moments],
             }
             for arm in ARMS
         ],
@@ -197,26 +199,47 @@ def _speed(speed: float) -> str:
     return f"at {rounded} km/h" if rounded >= 0 else f"moving backwards at {-rounded} km/h"
 
 
-def _figure(
-    moment: Moment, story: Story, arm: ExperimentArm, site: DemoSite, window: Window, roads_id: str
-) -> dict[str, Any]:
+def _figure(moment: Moment, story: Story, arm: ExperimentArm, site: DemoSite, window: Window) -> dict[str, Any]:
     snapshot = moment.snapshot
     if snapshot is None:
-        return {"title": moment.title, "caption": "", "svg": None}
+        return {"title": moment.title, "caption": "", "address": ""}
     row = story.times.index(snapshot.time)
     lost = sum(event.outcome == "lost" for event in snapshot.links)
     caption = (
         f"at {snapshot.time:.2f} s, {story.centers[row]:.1f} m between centers, "
         f"{story.ego} {_speed(story.speeds[row])}" + (", last message lost" if lost else "")
     )
-    svg = top_view(
-        snapshot,
-        window,
-        roads_id=roads_id,
-        conflict_areas=site.conflict_areas,
-        description=f"{arm.title}: {moment.title} {caption}",
-    )
-    return {"title": moment.title, "caption": caption, "svg": Markup(svg)}
+    canvas = ImageCanvas(window, PICTURE)
+    draw_snapshot(canvas, snapshot, site.roads, site.conflict_areas)
+    _, image = cv2.imencode(".webp", canvas.image, QUALITY)
+    return {
+        "title": moment.title,
+        "caption": caption,
+        "address": "data:image/webp;base64," + b64encode(image.tobytes()).decode(),
+        "description": f"{arm.title}: {moment.title} {caption}",
+    }
+
+
+def _legend(
+    stories: Mapping[tuple[str, str], Story], sites: Mapping[str, DemoSite], windows: Mapping[str, Window]
+) -> list[dict[str, Any]]:
+    """Return color and text of each entry of the legend of all key frames; lines are dashed or not."""
+    entries: dict[str, Patch | Line2D] = {}
+    for (scenario, _), story in stories.items():
+        canvas = LegendEntries(windows[scenario], PICTURE)
+        for moment in story.moments:
+            if moment.snapshot is not None:
+                draw_snapshot(canvas, moment.snapshot, sites[scenario].roads, sites[scenario].conflict_areas)
+        entries |= canvas.entries
+    return [
+        {
+            "text": text,
+            "color": to_hex(entry.get_facecolor() if isinstance(entry, Patch) else entry.get_color(), keep_alpha=True),
+            "edge": to_hex(entry.get_edgecolor()) if isinstance(entry, Patch) else "",
+            "is_dashed": isinstance(entry, Line2D) and entry.get_linestyle() != "-",
+        }
+        for text, entry in entries.items()
+    ]
 
 
 def _summary(cell: Cell, story: Story, watched: int) -> str:
@@ -256,8 +279,5 @@ def _window(scenario: str, stories: Mapping[tuple[str, str], Story]) -> Window:
         if moment.snapshot is not None
         for center in moment.snapshot.view.centers.tolist()
     ]
-    return Window.enclosing(points or [(0.0, 0.0)], margin=7.0)
-
-
-def _identifier(scenario: str) -> str:
-    return "roads-" + "".join(letter if letter.isalnum() else "-" for letter in scenario)
+    width, height = PICTURE
+    return Window.enclosing(points or [(0.0, 0.0)], margin=7.0).widened(width / height, 0.0)

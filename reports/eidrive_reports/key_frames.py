@@ -36,7 +36,7 @@ class Story:
     times    (N,) [s]
     centers  (N,) distance between centers [m]
     boxes    (N,) distance between bodies [m]
-    speeds   (N,) of the ego [m/s]
+    speeds   (N,) of the ego [m/s]; that of the impact where a contact begins
     """
 
     ego: str
@@ -128,7 +128,7 @@ class KeyFrames:
         self._common_times.append(snapshot.time)
         self._centers.append(center)
         self._boxes.append(box)
-        self._speeds.append(float(snapshot.view.speed[snapshot.view.row(self.ego)]))
+        self._speeds.append(snapshot.speeds[self.ego])
         if self._touched:
             return
         pair = {self.ego, self.hidden}

@@ -112,10 +112,13 @@ def test_demo_page_shows_tables_and_folds_figures(page: str) -> None:
     assert not html.fromstring(page).findall(".//details[@open]")
 
 
-def test_demo_page_draws_roads_once_per_scenario(page: str) -> None:
-    for name in ("roads-coop-scenario-1", "roads-coop-scenario-2"):
-        assert page.count(f'id="{name}"') == 1
-        assert page.count(f'href="#{name}"') > 10
+def test_demo_page_explains_the_colors_of_key_frames(page: str) -> None:
+    root = html.fromstring(page)
+    entries = [str(entry.xpath("string()")) for entry in root.iterfind(".//div[@class='legend']/span")]
+    expected = {"conflict area", "received from others", "message delivered", "after fusion", "Ego"}
+    assert expected <= set(entries)
+    pictures = [picture.get("alt", "") for picture in root.iterfind(".//div[@class='strip']/figure/img")]
+    assert any(text.startswith("cooperation: Ego receives Incoming only from RSU at 1.45 s") for text in pictures)
 
 
 def test_demo_page_contains_checks_difference_and_charts(page: str) -> None:
@@ -126,7 +129,7 @@ def test_demo_page_contains_checks_difference_and_charts(page: str) -> None:
 
 
 def test_demo_page_embeds_images_with_escaped_captions(page: str) -> None:
-    assert page.count("data:image/png;base64,iVBORw==") == 2
+    assert page.count('"data:image/png;base64,iVBORw=="') == 2
     assert "a &lt;truck&gt;" in page
 
 

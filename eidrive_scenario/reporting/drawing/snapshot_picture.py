@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import footprint
 from eidrive_scenario.reporting.drawing.canvas import Canvas, ellipse_of_95_percent
 from eidrive_scenario.reporting.drawing.image_canvas import Image, ImageCanvas
 from eidrive_scenario.reporting.drawing.labels import Rectangle, wrapped, write_labels
 from eidrive_scenario.reporting.drawing.top_view import (
+    AREA,
     BRAKING,
     FUSED,
     LINK,
@@ -51,13 +54,17 @@ def snapshot_picture(
     return canvas.image
 
 
-def draw_snapshot(canvas: Canvas, snapshot: StationSnapshot, roads: RoadDrawing) -> None:
-    """Draw a snapshot on its roads.
+def draw_snapshot(
+    canvas: Canvas, snapshot: StationSnapshot, roads: RoadDrawing, conflict_areas: Sequence[Array] = ()
+) -> None:
+    """Draw a snapshot on its roads and on conflict areas, polygons (M, 2) [m].
 
     Boxes are blue if the station detects them itself, orange if it received them, violet after fusion. The planned path
     and delivered messages are green; a path with demanded braking and lost messages are red.
     """
     canvas.roads(roads)
+    for area in conflict_areas:
+        canvas.fill(area, AREA, 0.2, legend="conflict area")
     _draw_plan(canvas, snapshot)
     _draw_links(canvas, snapshot)
     for received in snapshot.received:
@@ -130,6 +137,6 @@ def _write_labels(canvas: Canvas, snapshot: StationSnapshot) -> None:
     )
     texts = []
     for row in order:
-        speed = float(view.speed[row])
+        speed = snapshot.speeds[view.names[row]]
         texts.append(f"{view.names[row]}  {speed:.1f} m/s" if abs(speed) > 0.05 else view.names[row])
     write_labels(canvas, texts, [footprint(view.boxes[row]) for row in order], titles)

@@ -11,6 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import open_recording
@@ -19,6 +20,8 @@ from eidrive_scenario.reporting.drawing.labels import label_places, overlaps, wr
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.reporting.replay import film
 from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4
+from eidrive_scenario.reporting.snapshot import SnapshotBuilder
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 Play = Callable[..., list[Frame]]
 
@@ -73,6 +76,21 @@ def test_picture_before_the_entry_of_the_station_shows_its_place(street: Play, t
     entry = shifted[40].centers[shifted[40].row("Ego"), :2]
     assert station.name == "Ego"
     assert next(iter(station._centered()))[1] == pytest.approx(tuple(entry))
+
+
+def test_speed_at_a_contact_is_that_of_the_impact() -> None:
+    """In the frame of the contact the view has the speed after it."""
+    builder, speeds = SnapshotBuilder("Ego"), [(0.0, 0.0)]
+    with Simulation(resolve_scenario("coop/scenario_1"), settings=RunSettings(channel="none")) as simulation:
+        while True:
+            frame, end = simulation.tick()
+            snapshot = builder.observe(frame)
+            speeds.append((float(frame.view.speed[frame.view.row("Ego")]), snapshot.speeds["Ego"]))
+            if frame.view.contacts or end is not None:
+                break
+    assert frame.view.contacts
+    assert [view for view, _ in speeds[:-1]] == [shown for _, shown in speeds[:-1]]
+    assert speeds[-1][0] < speeds[-1][1] == speeds[-2][0]
 
 
 @pytest.mark.parametrize("time", [-1.0, 99.0])
