@@ -84,6 +84,7 @@ def page_values(
     live: bool = False,
     other: RunOfPage | None = None,
     labels: tuple[str, str] = ("", ""),
+    library: str = "",
 ) -> dict[str, Any]:
     """Return the values of the template `TEMPLATE`.
 
@@ -97,6 +98,7 @@ def page_values(
     live      whether the page receives the data of the frames from a server
     other     run that the page shows over this one
     labels    what distinguishes this run and the other one
+    library   address of a file with three.js; "" if the page contains it
     """
     shown = {**packed(data), "roads": _roads(roads), "street": street, "colors": COLORS, "images": images}
     if other is not None:
@@ -111,7 +113,8 @@ def page_values(
         "complete": complete,
         "live": live,
         "data": shown,
-        "three": three_library(),
+        "three": [] if library else three_library(),
+        "library": library,
         "other": other,
         "differences": [] if other is None else _differences(facts, other.facts),
         "labels": labels,
@@ -186,10 +189,12 @@ def make_replay(
     out: Path,
     *,
     other: Recording | None = None,
+    library: str = "",
 ) -> Replay:
     """Write the replay of a recording to the file `out`, with the verdicts of the result in its folder.
 
-    other  recording that the page shows over this one, with the verdicts of the result in its folder
+    other    recording that the page shows over this one, with the verdicts of the result in its folder
+    library  address of a file with three.js, see `write_replays`; "" if the page contains it
 
     The readable part of a damaged recording is shown, and the page lists the damage. Raise InputError if no frame can
     be read, the result is invalid, or the roads of the recordings differ.
@@ -221,6 +226,7 @@ def make_replay(
         images=camera_files(recording.path.parent, out.parent),
         other=second,
         labels=labels,
+        library=library,
     )
     return Replay(write_page(out, TEMPLATE, **values), damage)
 
@@ -338,6 +344,8 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
 
 FOLDER = "replays"
 """Folder of the replays beside the report."""
+LIBRARY = "three.js"
+"""File in this folder with three.js, which its replays share: it is most of a replay."""
 MOST = 200
 """Maximum number of replays of a report; runs that did not pass come first."""
 
@@ -355,6 +363,8 @@ def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[Repor
         for index, run in sorted(enumerate(runs), key=lambda entry: entry[1].passed)
         if run.folder is not None and (run.folder / RECORDING).is_file()
     ]
+    if recordings:
+        write_page(beside / FOLDER / LIBRARY, "replay/library.js.jinja", three=three_library())
     for index, recording in recordings[:MOST]:
         name = recording.parent.name
         while name in taken:
@@ -362,7 +372,7 @@ def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[Repor
         taken.add(name)
         page = beside / FOLDER / f"{name}.html"
         try:
-            make_replay(open_recording(recording), page)
+            make_replay(open_recording(recording), page, library=LIBRARY)
         except InputError as error:
             omitted.append(f"{recording}: {error.diagnostics[0].message}; the run has no replay")
             continue

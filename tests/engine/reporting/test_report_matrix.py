@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from report_table import listed_runs
 
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.replay.page import write_replays
+from eidrive_scenario.recording.recording import open_recording
+from eidrive_scenario.recording.run_files import RECORDING
+from eidrive_scenario.reporting.replay.page import make_replay, write_replays
 from eidrive_scenario.reporting.run_report.rates import parameter_matrix, scenario_matrix
 from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run, read_runs
@@ -102,6 +105,21 @@ def test_runs_of_equal_names_have_replays_of_their_own(street: Play, tmp_path: P
     files = [stored_run(tmp_path / part, "run", street(1)[:3]) for part in ("x", "y")]
     linked, _ = write_replays(read_runs(files)[0], tmp_path / "out")
     assert len({entry.replay for entry in linked}) == 2
+
+
+def test_replays_of_a_report_share_one_file_of_three_js(street: Play, tmp_path: Path) -> None:
+    files = [stored_run(tmp_path, name, street(1)[:3]) for name in ("a", "b")]
+    linked, _ = write_replays(read_runs(files)[0], tmp_path / "out")
+    folder = tmp_path / "out" / "replays"
+    assert sorted(path.name for path in folder.iterdir()) == ["a.html", "b.html", "three.js"]
+    alone = make_replay(open_recording(files[0].with_name(RECORDING)), tmp_path / "alone.html").page
+    shared = (folder / "three.js").read_text(encoding="utf-8")
+    assert shared in alone.read_text(encoding="utf-8")
+    for entry in linked:
+        text = (tmp_path / "out" / entry.replay).read_text(encoding="utf-8")
+        assert re.findall(r'src="([^"]*)"', text) == ["three.js"]
+        assert "threeModules =" not in text
+        assert len(text) < len(alone.read_text(encoding="utf-8")) - len(shared) + 100
 
 
 def test_damaged_recording_is_reported_without_replay(tmp_path: Path) -> None:

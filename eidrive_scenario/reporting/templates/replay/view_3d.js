@@ -17,11 +17,12 @@ async function inflate(text) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 }
 
-/* Load three.js, and build what stands still. Without WebGL the drawing in perspective remains. */
+/* Load three.js, and build what stands still. Without WebGL, or without the file of three.js that the replays of a report
+   share, the drawing in perspective remains. */
 async function loadSpace() {
   space.state = "loading";
   try {
-    const sources = await Promise.all(JSON.parse(element("three").textContent).map(inflate));
+    const sources = await Promise.all(threeModules.map(inflate));
     const [core, main] = sources.map((bytes) => new TextDecoder().decode(bytes));
     const address = (text) => URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
     space.three = await import(address(main.replaceAll("./three.core.min.js", address(core))));
