@@ -150,7 +150,7 @@ SCENARIOS = (
     "ncap/crossing_car",
     "ncap/crossing_child",
 )
-"""Scenarios without an option. `corner_cases/jammer` is none of them: its events select its channels."""
+"""Scenarios without an option. `corner_cases/jammer` is none of them: other channels have no jammer."""
 PARTNERS = {
     "corner_cases/pedestrian_parked_cars": "Child",
     "corner_cases/wrong_way_driver": "WrongWay",
