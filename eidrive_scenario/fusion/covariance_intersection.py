@@ -16,6 +16,7 @@ from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, means
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Objects, Table, group_tracks
+from eidrive_scenario.fusion.pose_alignment import PoseAligner
 from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, fuse_headings
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
@@ -31,12 +32,14 @@ class CovarianceIntersectionSettings(Settings):
     gate_distance  maximum distance between centers of one object if a report has no covariance [m]
     max_age        time after the last report of an object at which its track is deleted, and maximum age of reports [s]
     existence      minimum existence probability of reported objects; from 0.5 existence is the likelier hypothesis
+    align_poses    whether the pose of a sender that states its covariance is corrected by shared objects
     """
 
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
     gate_distance: PositiveFloat = 4.0
     max_age: PositiveFloat = REPORT_LIFETIME
     existence: float = Field(default=0.5, ge=0.0, le=1.0)
+    align_poses: bool = False
 
 
 class CovarianceIntersectionFusion(FusionMethod):
@@ -56,6 +59,7 @@ class CovarianceIntersectionFusion(FusionMethod):
         self.settings = settings or CovarianceIntersectionSettings()
         self._gate = AssociationGate.of(self.settings.gate, self.settings.gate_distance)
         self._history = ReportHistory(self.settings.max_age, self._gate)
+        self._aligner = PoseAligner(self._history) if self.settings.align_poses else None
         self._order: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
         """Stations of the last reports, and the same in order of their names."""
 
@@ -64,7 +68,7 @@ class CovarianceIntersectionFusion(FusionMethod):
         return self.settings.max_age
 
     def add_report(self, report: Report) -> None:
-        self._history.add_report(report)
+        (self._aligner or self._history).add_report(report)
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
         return _fuse_batch([self], [reports], now)[0]
@@ -78,7 +82,7 @@ class CovarianceIntersectionFusion(FusionMethod):
         batches: dict[tuple[float, ...], list[int]] = {}
         for place, method in enumerate(methods):
             settings = method.settings
-            key = (settings.gate, settings.gate_distance, settings.max_age, settings.existence)
+            key = settings.gate, settings.gate_distance, settings.max_age, settings.existence, settings.align_poses
             batches.setdefault(key, []).append(place)
         fused: dict[int, Detections] = {}
         for places in batches.values():
@@ -102,7 +106,13 @@ def _fuse_batch(
 ) -> list[Detections]:
     """Return the objects of several receiving stations, whose methods have equal settings."""
     settings, gate = methods[0].settings, methods[0]._gate
-    ReportHistory.process([method._history for method in methods])
+    histories = [method._history for method in methods]
+    ReportHistory.process(histories)
+    if settings.align_poses:
+        for method in methods:
+            if method._aligner is not None:
+                method._aligner.align(now)
+        ReportHistory.process(histories)
     for method in methods:
         method._history.evict_stale(now)
     rows, ranks = zip(*(method._select(held) for method, held in zip(methods, reports, strict=True)), strict=True)

@@ -18,7 +18,7 @@ from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, pose_covariance_at
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
 from eidrive_scenario.v2x.messages.message import Message, Payload, PointCloud, ReceivedMessage, StationState
@@ -31,15 +31,12 @@ def relative_state(state: StationState | None, ego: EgoState, covariance: Array 
     covariance  (3, 3) of its x, y and yaw; None: the pose is exact
 
     The receiver steers relative to its assumed pose, of which its own detections are free of error. The two pose errors
-    are independent, so that objects of the other station have both. An error of the yaw at the receiver moves a point
-    at distance d by d times the error: about the place of the other station, the error of the receiver is T e with
-    T = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]].
+    are independent, so that objects of the other station have both.
     """
     if state is None or covariance is None:
         return state
     dx, dy = state.x - float(ego.position[0]), state.y - float(ego.position[1])
-    about = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
-    own = about @ covariance @ about.T
+    own = pose_covariance_at(dx, dy, covariance)
     return replace(state, pose_covariance=own if state.pose_covariance is None else state.pose_covariance + own)
 
 

@@ -45,6 +45,16 @@ def pose_jacobian(points: Array, x: float, y: float) -> Array:
     return jacobian
 
 
+def pose_covariance_at(dx: float, dy: float, covariance: Array) -> Array:
+    """Return the covariance (3, 3) of the pose error of a station at the place (dx, dy) [m] from it.
+
+    An error of the yaw moves a point at distance d by d times the error: there, the error e is T e with
+    T = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]].
+    """
+    about = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
+    return np.asarray(about @ covariance @ about.T)
+
+
 class PoseErrors:
     """Uncertainty of the pose of a station in the time steps since the last scan."""
 

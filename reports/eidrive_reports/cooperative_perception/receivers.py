@@ -47,6 +47,7 @@ ARMS: Mapping[str, Arm] = {
     "none, filtered": Arm("covariance_intersection", _FILTERED, cooperates=False),
     "average": Arm("average"),
     "covariance_intersection": Arm("covariance_intersection", _FILTERED),
+    "covariance_intersection, aligned": Arm("covariance_intersection", {**_FILTERED, "align_poses": True}),
     "early": Arm("early", {**_FILTERED, "max_age": ONE_SCAN}, points=True),
 }
 """Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only."""
