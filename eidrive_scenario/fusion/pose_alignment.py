@@ -43,16 +43,23 @@ from eidrive_scenario.v2x.messages.message import StationState
 OBJECT_DENSITY = 0.02
 """Density of objects that only one of two stations reports [1/m²]: one in 15 m of a lane of 3.5 m."""
 VIEW_DEVIATION = 0.25
-"""Standard deviation per axis that is added to the offset of two boxes of one object [m]. Stations see different sides
-of it, and complete the others. The detector `lidar` states covariances without this: its boxes of one object are 0.38 m
-apart (median), where they let expect 0.22 m; with this addition the squared errors of poses are 1.2 times their covariance
-(median), and else 3.5 times."""
+"""Standard deviation per axis that is added to the offset of two boxes of one object [m].
+
+Stations see different sides of an object, and complete the others. The covariances that the detector `lidar` states do
+not contain this: its boxes of one object are 0.38 m apart where 0.22 m are expected (medians, scenarios 3 to 5). The
+squared errors of corrected poses are then 1.2 times their covariance (median), and 3.5 times without this addition.
+"""
 MIN_PROBABILITY = 0.95
 """Minimum probability of the hypothesis by which a pose is corrected."""
+MAX_EVIDENCE = 3
+"""Number of pairs to which the likelihood of more pairs is tempered. Stations see different parts of a row of equal
+cars: each car without a partner says little against a hypothesis, or both parts would be moved onto each other."""
 MAX_SEEDS = 100
 """Maximum number of pairs with which hypotheses begin."""
 MAX_HYPOTHESES = 4
 """Maximum number of hypotheses that are compared; more have a small probability."""
+NEGLIGIBLE = 8.0
+"""Difference of the logarithms of odds from which a hypothesis is not compared."""
 _GATE = AssociationGate.of(0.99, 0.0).chi_square
 _HEADING_GATE = 3.0
 """Maximum difference of two axes [standard deviations]; boxes of a few points may lie across their object."""
@@ -104,7 +111,7 @@ def align(own: Table, other: Table, state: StationState) -> PoseAlignment:
     """
     prior = np.zeros((3, 3)) if state.pose_covariance is None else state.pose_covariance
     best = None
-    if prior.any() and len(own) and len(other):
+    if len(own) and len(other) and prior.any() and np.isfinite(prior).all():
         own = own.copy()
         predict_tracks(own, np.full(len(own), other["time"][0]))
         best = _likeliest(_Problem.of(own, other, state.x, state.y, prior))
@@ -287,9 +294,11 @@ def _likeliest(problem: _Problem) -> _Hypothesis | None:
     if not len(problem.rows):
         return None
     seeds = np.unique(np.linspace(0, len(problem.rows) - 1, MAX_SEEDS).astype(int))
-    errors, covariances, scores = _seeded(problem, seeds)
+    errors, covariances, scores, tempered = _seeded(problem, seeds)
     found: list[_Hypothesis] = []
     for seed in np.argsort(-scores, kind="stable").tolist():
+        if tempered[seed] < tempered.max() - NEGLIGIBLE:
+            continue
         pair = seeds[seed : seed + 1]
         if any(_fits(problem, pair, hypothesis.error, hypothesis.covariance)[0] for hypothesis in found):
             continue
@@ -306,10 +315,11 @@ def _likeliest(problem: _Problem) -> _Hypothesis | None:
     return found[0] if probability >= MIN_PROBABILITY else None
 
 
-def _seeded(problem: _Problem, seeds: Integers) -> tuple[Array, Array, Array]:
+def _seeded(problem: _Problem, seeds: Integers) -> tuple[Array, Array, Array, Array]:
     """Return the pose errors (S, 3) that single pairs show, their covariances (S, 3, 3), and their log odds (S,).
 
-    The log odds add those of the best pair of each other object of the sender.
+    The log odds add those of the best pair of each other object of the sender. The last result adds the best of them
+    only, up to MAX_EVIDENCE pairs.
     """
     jacobian = _jacobian(problem.lever)
     own = jacobian[seeds]
@@ -334,7 +344,8 @@ def _seeded(problem: _Problem, seeds: Integers) -> tuple[Array, Array, Array]:
     best = np.maximum(np.maximum.reduceat(odds, starts, axis=1), 0.0)
     object_of = np.searchsorted(starts, seeds, "right") - 1
     best[np.arange(len(seeds)), object_of] = gains
-    return errors, covariances, best.sum(axis=1)
+    tempered = np.sort(best, axis=1)[:, -MAX_EVIDENCE:].sum(axis=1)
+    return errors, covariances, best.sum(axis=1), tempered
 
 
 def _refine(problem: _Problem, error: Array, covariance: Array) -> _Hypothesis | None:
@@ -357,6 +368,16 @@ def _refine(problem: _Problem, error: Array, covariance: Array) -> _Hypothesis |
         pairs = chosen
         error, covariance, log_odds = estimate_error(problem, pairs)
     assert pairs is not None
+    # An inconsistent pair attracts the estimate that it is compared with: the others alone are the better measure. The
+    # residual of a pair in the estimate has the covariance C - J P Jᵀ, which gives the same distance.
+    while len(pairs) > 2:
+        offset, jacobian = _moved(problem, pairs, error)
+        rest = problem.covariance[pairs] - jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
+        distance = _squared(offset, rest)[0]
+        if distance.max() <= _GATE:
+            break
+        pairs = np.delete(pairs, np.argmax(distance))
+        error, covariance, log_odds = estimate_error(problem, pairs)
     return _Hypothesis(error, covariance, pairs, log_odds)
 
 
@@ -387,9 +408,11 @@ def estimate_error(problem: _Problem, pairs: Integers) -> tuple[Array, Array, fl
             break
     offset, _ = _moved(problem, pairs, error)
     turn = problem.turn[pairs] - error[2]
-    odds = _log_odds(offset, problem.covariance[pairs]).sum()
-    penalty = scaled @ scaled + turn_weight @ (turn * turn) + np.linalg.slogdet(hessian)[1]
-    return error, root @ np.linalg.inv(hessian) @ root.T, float(odds - 0.5 * penalty)
+    share = min(1.0, MAX_EVIDENCE / len(pairs))
+    data = _log_odds(offset, problem.covariance[pairs]).sum() - 0.5 * turn_weight @ (turn * turn)
+    volume = np.linalg.slogdet(np.eye(3) + share * (hessian - np.eye(3)))[1]
+    odds = share * data - 0.5 * (scaled @ scaled + volume)
+    return error, root @ np.linalg.inv(hessian) @ root.T, float(odds)
 
 
 _CONSTANT = -math.log(2.0 * math.pi * OBJECT_DENSITY)
