@@ -10,3 +10,5 @@ from eidrive_scenario.fusion.intermediate import IntermediateFusion as Intermedi
 from eidrive_scenario.fusion.intermediate import IntermediateFusionSettings as IntermediateFusionSettings
 from eidrive_scenario.fusion.method import FusionMethod as FusionMethod
 from eidrive_scenario.fusion.method import Report as Report
+from eidrive_scenario.fusion.pose_alignment import PoseAlignment as PoseAlignment
+from eidrive_scenario.fusion.pose_alignment import align_pose as align_pose

@@ -114,7 +114,7 @@ def align(own: Table, other: Table, state: StationState) -> PoseAlignment:
     if len(own) and len(other) and prior.any() and np.isfinite(prior).all():
         own = own.copy()
         predict_tracks(own, np.full(len(own), other["time"][0]))
-        best = _likeliest(_Problem.of(own, other, state.x, state.y, prior))
+        best = _likeliest(_Candidates.of(own, other, state.x, state.y, prior))
     if best is None:
         return PoseAlignment((state.x, state.y, state.yaw), np.zeros(3), prior, 0)
     x, y, yaw = best.error.tolist()
@@ -229,7 +229,7 @@ class PoseAligner:
         self._history.add_report(aligned)
 
 
-class _Problem(NamedTuple):
+class _Candidates(NamedTuple):
     """Candidate pairs (K,) of objects of two stations, and the prior of the pose error.
 
     rows, columns   object of the sender, in order, and of the receiver
@@ -251,7 +251,7 @@ class _Problem(NamedTuple):
     root: Array
 
     @classmethod
-    def of(cls, own: Table, other: Table, x: float, y: float, prior: Array) -> _Problem:
+    def of(cls, own: Table, other: Table, x: float, y: float, prior: Array) -> _Candidates:
         """Return the pairs within the gate of all covariances, on one level and of one group of classes."""
         values, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -289,20 +289,20 @@ class _Hypothesis(NamedTuple):
     log_odds: float
 
 
-def _likeliest(problem: _Problem) -> _Hypothesis | None:
+def _likeliest(candidates: _Candidates) -> _Hypothesis | None:
     """Return the likeliest hypothesis, or None if it is not probable enough."""
-    if not len(problem.rows):
+    if not len(candidates.rows):
         return None
-    seeds = np.unique(np.linspace(0, len(problem.rows) - 1, MAX_SEEDS).astype(int))
-    errors, covariances, scores, tempered = _seeded(problem, seeds)
+    seeds = np.unique(np.linspace(0, len(candidates.rows) - 1, MAX_SEEDS).astype(int))
+    errors, covariances, scores, tempered = _seeded(candidates, seeds)
     found: list[_Hypothesis] = []
     for seed in np.argsort(-scores, kind="stable").tolist():
         if tempered[seed] < tempered.max() - NEGLIGIBLE:
             continue
         pair = seeds[seed : seed + 1]
-        if any(_fits(problem, pair, hypothesis.error, hypothesis.covariance)[0] for hypothesis in found):
+        if any(_fits(candidates, pair, hypothesis.error, hypothesis.covariance)[0] for hypothesis in found):
             continue
-        hypothesis = _refine(problem, errors[seed], covariances[seed])
+        hypothesis = _refine(candidates, errors[seed], covariances[seed])
         if hypothesis is not None and not any(_are_same(hypothesis, other) for other in found):
             found.append(hypothesis)
         if len(found) == MAX_HYPOTHESES:
@@ -315,32 +315,32 @@ def _likeliest(problem: _Problem) -> _Hypothesis | None:
     return found[0] if probability >= MIN_PROBABILITY else None
 
 
-def _seeded(problem: _Problem, seeds: Integers) -> tuple[Array, Array, Array, Array]:
+def _seeded(candidates: _Candidates, seeds: Integers) -> tuple[Array, Array, Array, Array]:
     """Return the pose errors (S, 3) that single pairs show, their covariances (S, 3, 3), and their log odds (S,).
 
     The log odds add those of the best pair of each other object of the sender. The last result adds the best of them
     only, up to MAX_EVIDENCE pairs.
     """
-    jacobian = _jacobian(problem.lever)
+    jacobian = _jacobian(candidates.lever)
     own = jacobian[seeds]
-    cross = problem.prior @ np.swapaxes(own, 1, 2)
-    innovation = problem.covariance[seeds] + own @ cross
+    cross = candidates.prior @ np.swapaxes(own, 1, 2)
+    innovation = candidates.covariance[seeds] + own @ cross
     gain = cross @ np.linalg.inv(innovation)
-    errors = (gain @ problem.offset[seeds, :, None])[:, :, 0]
-    covariances = problem.prior - gain @ np.swapaxes(cross, 1, 2)
-    gains = _log_odds(problem.offset[seeds], innovation)
+    errors = (gain @ candidates.offset[seeds, :, None])[:, :, 0]
+    covariances = candidates.prior - gain @ np.swapaxes(cross, 1, 2)
+    gains = _log_odds(candidates.offset[seeds], innovation)
     # The covariance J P Jᵀ by its entries, as the pairs of all seeds with all others are many.
     p = covariances[:, :, :, None]
     a, b = jacobian[:, 0, 2], jacobian[:, 1, 2]
-    xx = problem.covariance[:, 0, 0] + p[:, 0, 0] + a * (2.0 * p[:, 0, 2] + a * p[:, 2, 2])
-    xy = problem.covariance[:, 0, 1] + p[:, 0, 1] + a * p[:, 1, 2] + b * (p[:, 0, 2] + a * p[:, 2, 2])
-    yy = problem.covariance[:, 1, 1] + p[:, 1, 1] + b * (2.0 * p[:, 1, 2] + b * p[:, 2, 2])
-    x = problem.offset[:, 0] - errors[:, :1] - a * errors[:, 2:]
-    y = problem.offset[:, 1] - errors[:, 1:2] - b * errors[:, 2:]
+    xx = candidates.covariance[:, 0, 0] + p[:, 0, 0] + a * (2.0 * p[:, 0, 2] + a * p[:, 2, 2])
+    xy = candidates.covariance[:, 0, 1] + p[:, 0, 1] + a * p[:, 1, 2] + b * (p[:, 0, 2] + a * p[:, 2, 2])
+    yy = candidates.covariance[:, 1, 1] + p[:, 1, 1] + b * (2.0 * p[:, 1, 2] + b * p[:, 2, 2])
+    x = candidates.offset[:, 0] - errors[:, :1] - a * errors[:, 2:]
+    y = candidates.offset[:, 1] - errors[:, 1:2] - b * errors[:, 2:]
     determinant = xx * yy - xy * xy
     distance = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
     odds = np.where(distance <= _GATE, -0.5 * (distance + np.log(determinant)) + _CONSTANT, 0.0)
-    starts = np.flatnonzero(np.diff(problem.rows, prepend=-1))
+    starts = np.flatnonzero(np.diff(candidates.rows, prepend=-1))
     best = np.maximum(np.maximum.reduceat(odds, starts, axis=1), 0.0)
     object_of = np.searchsorted(starts, seeds, "right") - 1
     best[np.arange(len(seeds)), object_of] = gains
@@ -348,17 +348,17 @@ def _seeded(problem: _Problem, seeds: Integers) -> tuple[Array, Array, Array, Ar
     return errors, covariances, best.sum(axis=1), tempered
 
 
-def _refine(problem: _Problem, error: Array, covariance: Array) -> _Hypothesis | None:
+def _refine(candidates: _Candidates, error: Array, covariance: Array) -> _Hypothesis | None:
     """Return the hypothesis that begins with an error (3,) and its covariance (3, 3): pairs are assigned, and the error
     is estimated, until both are constant. None without a pair."""
     pairs: Integers | None = None
     log_odds = 0.0
     for _ in range(_MAX_ITERATIONS):
-        candidates = np.flatnonzero(_fits(problem, np.arange(len(problem.rows)), error, covariance))
-        offset, jacobian = _moved(problem, candidates, error)
-        odds = _log_odds(offset, problem.covariance[candidates] + jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))
-        rows, columns = problem.rows[candidates].tolist(), problem.columns[candidates].tolist()
-        number = dict(zip(zip(rows, columns, strict=True), candidates.tolist(), strict=True))
+        inside = np.flatnonzero(_fits(candidates, np.arange(len(candidates.rows)), error, covariance))
+        offset, jacobian = _moved(candidates, inside, error)
+        odds = _log_odds(offset, candidates.covariance[inside] + jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))
+        rows, columns = candidates.rows[inside].tolist(), candidates.columns[inside].tolist()
+        number = dict(zip(zip(rows, columns, strict=True), inside.tolist(), strict=True))
         assigned = assign(rows, columns, (-odds).tolist())
         chosen = np.array(sorted(number[pair] for pair in assigned), dtype=np.int64)
         if not len(chosen):
@@ -366,39 +366,42 @@ def _refine(problem: _Problem, error: Array, covariance: Array) -> _Hypothesis |
         if pairs is not None and np.array_equal(chosen, pairs):
             break
         pairs = chosen
-        error, covariance, log_odds = estimate_error(problem, pairs)
+        error, covariance, log_odds = estimate_error(candidates, pairs)
     assert pairs is not None
     # An inconsistent pair attracts the estimate that it is compared with: the others alone are the better measure. The
-    # residual of a pair in the estimate has the covariance C - J P Jᵀ, which gives the same distance.
+    # residual of a pair in the estimate has the covariance C - J P Jᵀ, which gives the same distance. The worse half of
+    # these pairs is removed at a time.
     while len(pairs) > 2:
-        offset, jacobian = _moved(problem, pairs, error)
-        rest = problem.covariance[pairs] - jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
+        offset, jacobian = _moved(candidates, pairs, error)
+        rest = candidates.covariance[pairs] - jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
         distance = _squared(offset, rest)[0]
-        if distance.max() <= _GATE:
+        count = np.count_nonzero(distance > _GATE)
+        if not count:
             break
-        pairs = np.delete(pairs, np.argmax(distance))
-        error, covariance, log_odds = estimate_error(problem, pairs)
+        pairs = np.sort(pairs[np.argsort(distance, kind="stable")[: len(pairs) - (count + 1) // 2]])
+        error, covariance, log_odds = estimate_error(candidates, pairs)
     return _Hypothesis(error, covariance, pairs, log_odds)
 
 
-def estimate_error(problem: _Problem, pairs: Integers) -> tuple[Array, Array, float]:
+def estimate_error(candidates: _Candidates, pairs: Integers) -> tuple[Array, Array, float]:
     """Return the most probable pose error (3,), its covariance (3, 3), and the logarithm of the odds of these pairs.
 
     Gauss-Newton method over u, of which the error L u has the covariance L Lᵀ of the prior. The covariance is L H⁻¹ Lᵀ
     with the Hessian H, and the odds are those of Laplace's approximation, exact for a linear h.
     """
-    root, weight = problem.root, np.linalg.inv(problem.covariance[pairs])
+    root, weight = candidates.root, np.linalg.inv(candidates.covariance[pairs])
     turn_weight = np.where(
-        np.abs(problem.turn[pairs]) <= _HEADING_GATE * np.sqrt(problem.turn_variance[pairs] + problem.prior[2, 2]),
-        1.0 / problem.turn_variance[pairs],
+        np.abs(candidates.turn[pairs])
+        <= _HEADING_GATE * np.sqrt(candidates.turn_variance[pairs] + candidates.prior[2, 2]),
+        1.0 / candidates.turn_variance[pairs],
         0.0,
     )
     scaled, error = np.zeros(3), np.zeros(3)
     for _ in range(_MAX_ITERATIONS):
-        offset, jacobian = _moved(problem, pairs, error)
+        offset, jacobian = _moved(candidates, pairs, error)
         sensitivity = jacobian @ root
         weighted = np.swapaxes(sensitivity, 1, 2) @ weight
-        turn = problem.turn[pairs] - error[2]
+        turn = candidates.turn[pairs] - error[2]
         hessian = np.eye(3) + (weighted @ sensitivity).sum(axis=0) + turn_weight.sum() * np.outer(root[2], root[2])
         slope = (weighted @ offset[:, :, None])[:, :, 0].sum(axis=0) + (turn_weight @ turn) * root[2] - scaled
         step = np.linalg.solve(hessian, slope)
@@ -406,10 +409,10 @@ def estimate_error(problem: _Problem, pairs: Integers) -> tuple[Array, Array, fl
         error = root @ scaled
         if np.abs(step).max() < _CONVERGED:
             break
-    offset, _ = _moved(problem, pairs, error)
-    turn = problem.turn[pairs] - error[2]
+    offset, _ = _moved(candidates, pairs, error)
+    turn = candidates.turn[pairs] - error[2]
     share = min(1.0, MAX_EVIDENCE / len(pairs))
-    data = _log_odds(offset, problem.covariance[pairs]).sum() - 0.5 * turn_weight @ (turn * turn)
+    data = _log_odds(offset, candidates.covariance[pairs]).sum() - 0.5 * turn_weight @ (turn * turn)
     volume = np.linalg.slogdet(np.eye(3) + share * (hessian - np.eye(3)))[1]
     odds = share * data - 0.5 * (scaled @ scaled + volume)
     return error, root @ np.linalg.inv(hessian) @ root.T, float(odds)
@@ -437,18 +440,18 @@ def _jacobian(lever: Array) -> Array:
     return pose_jacobian(lever, 0.0, 0.0)
 
 
-def _moved(problem: _Problem, pairs: Integers, error: Array) -> tuple[Array, Array]:
+def _moved(candidates: _Candidates, pairs: Integers, error: Array) -> tuple[Array, Array]:
     """Return the offsets (K, 2) of pairs after the correction of an error (3,), and their derivatives (K, 2, 3)."""
-    lever = problem.lever[pairs]
+    lever = candidates.lever[pairs]
     cos, sin = math.cos(error[2]), math.sin(error[2])
     turned = lever @ np.array([[cos, -sin], [sin, cos]])
-    return problem.offset[pairs] + turned - lever - error[:2], _jacobian(turned)
+    return candidates.offset[pairs] + turned - lever - error[:2], _jacobian(turned)
 
 
-def _fits(problem: _Problem, pairs: Integers, error: Array, covariance: Array) -> Array:
+def _fits(candidates: _Candidates, pairs: Integers, error: Array, covariance: Array) -> Array:
     """Return whether each pair is within the gate for this error (3,) with its covariance (3, 3)."""
-    offset, jacobian = _moved(problem, pairs, error)
-    spread = problem.covariance[pairs] + jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
+    offset, jacobian = _moved(candidates, pairs, error)
+    spread = candidates.covariance[pairs] + jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
     return np.asarray(_squared(offset, spread)[0] <= _GATE)
 
 

@@ -91,6 +91,7 @@ PUBLISHED = {
     "none": [0.4, 0.4],
     "average": [0.6, 0.1, 0.05],
     "covariance_intersection": [0.65, 0.3, 0.2],
+    "covariance_intersection, aligned": [0.65, 0.5, 0.3],
     "early": [0.7, 0.3, 0.2],
 }
 """Curves with the shapes of the literature."""
@@ -110,6 +111,7 @@ def test_all_shapes_hold_for_curves_of_the_literature() -> None:
         ({"none": [0.4, 0.39]}, 1.5, "no fusion is flat over all axes"),
         ({}, 0.5, "AP 0.7 falls before AP 0.5"),
         ({"covariance_intersection": [0.6, 0.05, 0.0]}, 1.5, "compensated latency is at least as good"),
+        ({"covariance_intersection, aligned": [0.65, 0.2, 0.2]}, 1.5, "aligned poses are at least as good"),
         ({"early": [0.5, 0.3, 0.2]}, 1.5, "no fusion < late (average) < early"),
         ({"average": [0.6, 0.6, 0.59]}, 1.5, "of whole messages is not mild"),
     ],

@@ -50,7 +50,8 @@ ARMS: Mapping[str, Arm] = {
     "covariance_intersection, aligned": Arm("covariance_intersection", {**_FILTERED, "align_poses": True}),
     "early": Arm("early", {**_FILTERED, "max_age": ONE_SCAN}, points=True),
 }
-"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only."""
+"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only; `aligned`
+corrects the poses of senders by shared objects."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ AXES: Mapping[str, tuple[str, Mapping[str, float], tuple[float, ...]]] = {
     "loss": ("loss", {}, (0.0, 0.3, 0.6, 0.9)),
 }
 """Axes of the curves: varied field, other fields, and values. The value 0 is the condition without faults."""
-COMPARED = ("none", "average", "covariance_intersection", "early")
+COMPARED = ("none", "average", "covariance_intersection", "covariance_intersection, aligned", "early")
 """Arms of the curves."""
 SCANS_PER_MESSAGE = (1, 2, 5)
 CELLS = (0.2,)

@@ -158,6 +158,7 @@ ARM_COLORS = {
     "none": "#6b7280",
     "average": "#c2410c",
     "covariance_intersection": "#0b6e99",
+    "covariance_intersection, aligned": "#7c3aed",
     "early": "#15803d",
 }
 """Color of each arm."""

@@ -34,6 +34,7 @@ def shapes(curves: Sequence[Row], volumes: Sequence[Row]) -> tuple[Row, ...]:
         _strict_falls_first,
         _loss_of_messages,
         _compensated,
+        _aligned,
         _order,
     ]
     found = [row for check in checks for row in check(held)]
@@ -123,6 +124,20 @@ def _compensated(curves: _Curves) -> list[Row]:
     least = min(gains.values())
     text = f"difference {least:+.3f} to {max(gains.values()):+.3f}"
     return [_row("compensated latency is at least as good as uncompensated", least >= -TOLERANCE, text)]
+
+
+def _aligned(curves: _Curves) -> list[Row]:
+    """Shared objects show the pose error of a sender; without an error its pose stays as it is."""
+    late = "covariance_intersection"
+    gains = [
+        curves[f"{late}, aligned", axis, overlap][value] - precision
+        for axis in ("pose error", "pose drift")
+        for overlap in (0.5, 0.7)
+        for value, precision in curves[late, axis, overlap].items()
+    ]
+    least = min(gains)
+    text = f"difference {least:+.3f} to {max(gains):+.3f}"
+    return [_row("aligned poses are at least as good as those with errors", least >= -TOLERANCE, text)]
 
 
 def _order(curves: _Curves) -> list[Row]:

@@ -16,7 +16,7 @@ from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersecti
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pose_alignment import (
     PoseAlignment,
-    _Problem,
+    _Candidates,
     align_pose,
     aligned_report,
     estimate_error,
@@ -42,18 +42,18 @@ def state_of(
 def displaced(places: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Return places (N, 2) as the sender reports them with this error of its pose."""
     cos, sin = math.cos(error[2]), math.sin(error[2])
-    return (places - SENDER) @ np.array([[cos, sin], [-sin, cos]]) + SENDER + error[:2]
+    return np.asarray((places - SENDER) @ np.array([[cos, sin], [-sin, cos]]) + SENDER + error[:2])
 
 
-def scattered(count: int, *names: object) -> np.ndarray:
+def scattered(count: int, *names: str | int) -> np.ndarray:
     """Return positions (N, 2) of cars in an area of 80 m x 80 m."""
     return generator(5, "layout", *names).uniform(-40.0, 40.0, (count, 2))
 
 
-def pairs_of(places: np.ndarray, measured: np.ndarray, deviation: float, prior: np.ndarray) -> _Problem:
+def pairs_of(places: np.ndarray, measured: np.ndarray, deviation: float, prior: np.ndarray) -> _Candidates:
     """Return the known pairs of objects, measured by the sender, without headings."""
     count = len(places)
-    return _Problem(
+    return _Candidates(
         np.arange(count),
         np.arange(count),
         measured - SENDER,
@@ -358,7 +358,9 @@ def test_aligned_fusion_follows_errors_of_both_poses(correlated: bool, report: M
                 for objects, error, count in (((places,), errors[0], 8), ((places, hidden), errors[1], 10))
             )
             change = np.zeros((3, 3)) if correlated else 2.0 * prior
-            own = replace(report("A", time, seen, state=StationState(time, *SENDER, 0.0, 0.0, 0.0)), pose_change=change)
+            own = replace(
+                report("A", time, seen, state=StationState(time, 10.0, 5.0, 0.0, 0.0, 0.0)), pose_change=change
+            )
             sent = report("B", time, others, state=state_of(errors[1], relative, time))
             truth = displaced(hidden, errors[0])
             for aligns, method in methods.items():
