@@ -56,8 +56,8 @@ MAX_EVIDENCE = 3
 cars: each car without a partner says little against a hypothesis, or both parts would be moved onto each other."""
 MAX_SEEDS = 100
 """Maximum number of pairs with which hypotheses begin."""
-MAX_HYPOTHESES = 4
-"""Maximum number of hypotheses that are compared; more have a small probability."""
+MAX_HYPOTHESES = 6
+"""Maximum number of hypotheses that are refined and compared; more have a small probability."""
 NEGLIGIBLE = 8.0
 """Difference of the logarithms of odds from which a hypothesis is not compared."""
 _GATE = AssociationGate.of(0.99, 0.0).chi_square
@@ -296,16 +296,18 @@ def _likeliest(candidates: _Candidates) -> _Hypothesis | None:
     seeds = np.unique(np.linspace(0, len(candidates.rows) - 1, MAX_SEEDS).astype(int))
     errors, covariances, scores, tempered = _seeded(candidates, seeds)
     found: list[_Hypothesis] = []
+    refined = 0
     for seed in np.argsort(-scores, kind="stable").tolist():
-        if tempered[seed] < tempered.max() - NEGLIGIBLE:
-            continue
         pair = seeds[seed : seed + 1]
-        if any(_fits(candidates, pair, hypothesis.error, hypothesis.covariance)[0] for hypothesis in found):
+        if tempered[seed] < tempered.max() - NEGLIGIBLE or any(
+            _fits(candidates, pair, other.error, other.covariance)[0] for other in found
+        ):
             continue
         hypothesis = _refine(candidates, errors[seed], covariances[seed])
         if hypothesis is not None and not any(_are_same(hypothesis, other) for other in found):
             found.append(hypothesis)
-        if len(found) == MAX_HYPOTHESES:
+        refined += 1
+        if refined == MAX_HYPOTHESES:
             break
     found.sort(key=lambda hypothesis: -hypothesis.log_odds)
     if not found:
