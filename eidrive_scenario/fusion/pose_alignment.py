@@ -64,6 +64,8 @@ _GATE = AssociationGate.of(0.99, 0.0).chi_square
 _HEADING_GATE = 3.0
 """Maximum difference of two axes [standard deviations]; boxes of a few points may lie across their object."""
 _MAX_ITERATIONS = 10
+_MAX_COORDINATE = 1e7
+"""Maximum coordinate and deviation of what is aligned [m], which rounding would affect beyond."""
 _CONVERGED = 1e-9
 """Change of the error below which it is not computed again [standard deviations of the prior]."""
 _VULNERABLE = np.array([name in VULNERABLE for name in CLASSES])
@@ -111,10 +113,12 @@ def align(own: Table, other: Table, state: StationState) -> PoseAlignment:
     """
     prior = np.zeros((3, 3)) if state.pose_covariance is None else state.pose_covariance
     best = None
-    if len(own) and len(other) and prior.any() and np.isfinite(prior).all():
-        own = own.copy()
-        predict_tracks(own, np.full(len(own), other["time"][0]))
-        best = _likeliest(_Candidates.of(own, other, state.x, state.y, prior))
+    values = np.array([state.x, state.y, *np.sqrt(np.abs(prior)).ravel()])
+    if prior.any() and (np.abs(values) <= _MAX_COORDINATE).all():
+        own, other = (table[(np.abs(table["mean"]) <= _MAX_COORDINATE).all(axis=1)] for table in (own, other))
+        if len(own) and len(other):
+            predict_tracks(own, np.full(len(own), other["time"][0]))
+            best = _likeliest(_Candidates.of(own, other, state.x, state.y, prior))
     if best is None:
         return PoseAlignment((state.x, state.y, state.yaw), np.zeros(3), prior, 0)
     x, y, yaw = best.error.tolist()
@@ -255,6 +259,7 @@ class _Candidates(NamedTuple):
         """Return the pairs within the gate of all covariances, on one level and of one group of classes."""
         values, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
+        prior = root @ root.T
         jacobian = pose_jacobian(other["mean"][:, :2], x, y) @ root
         view = VIEW_DEVIATION**2 * np.eye(2)
         spread = other["covariance"][:, None, :2, :2] + own["covariance"][:, :2, :2] + own["pose"] + view

@@ -278,13 +278,41 @@ def test_many_objects_are_aligned(report: Make) -> None:
     assert alignment.error == pytest.approx(ERROR, abs=0.01)
 
 
-def test_state_that_is_not_finite_leaves_the_pose(report: Make) -> None:
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"pose_covariance": np.full((3, 3), np.nan)},
+        {"pose_covariance": 1e300 * np.eye(3)},
+        {"x": math.nan},
+        {"x": 1e12},
+    ],
+)
+def test_state_without_meaning_leaves_the_pose(changes: dict[str, object], report: Make) -> None:
     places = scattered(4)
-    for state in (
-        replace(state_of(ERROR), pose_covariance=np.full((3, 3), np.nan)),
-        replace(state_of(ERROR), x=math.nan),
-    ):
-        assert not align_cars(report, places, places, state).is_corrected
+    assert not align_cars(report, places, places, replace(state_of(ERROR), **changes)).is_corrected
+
+
+def test_correction_turns_with_the_world(report: Make) -> None:
+    """The same layout, turned by 2 rad and moved by kilometers, has the same correction in turned coordinates."""
+    places = scattered(8)
+    yaws = np.linspace(-3.0, 3.0, 8)
+    rotation, shift = np.array([[math.cos(2.0), -math.sin(2.0)], [math.sin(2.0), math.cos(2.0)]]), np.array([1e4, -3e4])
+    state = state_of(ERROR)
+    x, y = rotation @ (state.x, state.y) + shift
+    turned = replace(state, x=float(x), y=float(y), yaw=state.yaw + 2.0)
+    others = displaced(places, ERROR)
+    errors = [
+        align_pose(
+            report("own", 0.0, own, yaw=wrap_angle(yaws + turn)).detections,
+            report("B", 0.0, seen, yaw=wrap_angle(yaws + ERROR[2] + turn), state=sent),
+        ).error
+        for own, seen, sent, turn in (
+            (places, others, state, 0.0),
+            (places @ rotation.T + shift, others @ rotation.T + shift, turned, 2.0),
+        )
+    ]
+    assert errors[1][:2] @ rotation == pytest.approx(errors[0][:2], abs=1e-9)
+    assert errors[1][2] == pytest.approx(errors[0][2], abs=1e-9)
 
 
 def test_report_without_state_is_an_error(report: Make) -> None:
