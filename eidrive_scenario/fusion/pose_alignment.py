@@ -10,13 +10,15 @@ stations with an exact pose: its error e = (x, y, yaw) relative to the receiver 
 over the pairs of objects z of the sender and x of the receiver, with the covariance P that the sender states (plus that
 of the receiver, see `relative_state`). By this prior two objects do not worsen the yaw, and an exact pose stays as it
 is. Which objects are the same is not known: pairs are assigned within gates of all covariances for several hypotheses
-of e, and an error is only corrected if its hypothesis is more probable than all others together, among them that no
-object is common. So a row of cars in equal distances is not shifted by one car.
+of e, and an error is only corrected if its hypothesis is much more probable than all others, among them that no object
+is common. So a row of cars in equal distances is not shifted by one car.
 
 Fusion of boxes uses `PoseAligner`. Fusion of feature maps uses the corrected pose of a sender:
 
     alignment = align_pose(own, report)   # own detections, and the report of the sender as the fusion method gets it
     x, y, yaw = alignment.pose            # of the sender at `report.state.time`, relative to the assumed own pose
+
+For a map with another pose, give the report a state with the pose of the map and the covariance of the sender.
 """
 
 from __future__ import annotations
