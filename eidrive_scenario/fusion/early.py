@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from pydantic import PositiveFloat
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.extensions.settings import Settings
@@ -67,7 +68,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
             points = payload.points()
             self._received[sender] = payload.time, points[~points_in_box(points, body)]
 
-    def merge_readings(self, readings: Readings) -> Readings:
+    def merge_readings(self, readings: Readings, alone: Detections | None = None) -> Readings:
         """Return the readings with the received points added to those of the first lidar."""
         oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
         self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from msgspec.structs import replace
 from pydantic import Field, PositiveFloat
 
 from eidrive_scenario.base.arrays import Array, Bools, Floats
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import LatentCodec
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
@@ -23,6 +25,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
 )
 from eidrive_scenario.fusion.feature_warp import Grid, attend, place, warp
 from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.fusion.pose_alignment import align_pose
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.v2x.messages.feature_frames import Encoding, FeatureFrame, split, to_cells
@@ -96,6 +99,10 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         self._grid: Grid | None = None
         """Grid of the last map of this station."""
         self._received: dict[str, _ReceivedMap] = {}
+        self._alone: Detections | None = None
+        """Newest objects in the own features."""
+        self._reports: dict[str, Report] = {}
+        """Newest report of each station."""
         self._boxes: dict[str, dict[int, _MovingBox]] = {}
         """Newest moving boxes of each station, by object."""
         super().__init__(self.intermediate)
@@ -176,6 +183,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
     def add_report(self, report: Report) -> None:
         """Store the moving boxes of a report, and process its boxes whose features have not arrived."""
         detections, station = report.detections, report.station
+        self._reports[station] = report
         held = self._boxes.setdefault(station, {})
         oldest = detections.time - self.settings.max_age
         boxes = {} if report.complete else {number: box for number, box in held.items() if box.time >= oldest}
@@ -200,8 +208,9 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         covered[covered] = arrived.present[tuple(cells[covered].T)]
         return covered
 
-    def merge_readings(self, readings: Readings) -> Readings:
+    def merge_readings(self, readings: Readings, alone: Detections | None = None) -> Readings:
         """Return the readings with fused features; without lidars if there are no new features."""
+        self._alone = self._alone if alone is None else alone
         features = readings.features
         if features is None:
             return replace(readings, lidars={})
@@ -221,15 +230,30 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 for box in boxes
             ]).reshape(-1, 7)  # fmt: skip
             latent, present[row] = warp(
-                held.latent, held.present, self._pose(sender, held), self._grid, moving, features.time - held.time
+                held.latent,
+                held.present,
+                held.grid,
+                self._grid_for(sender, self._grid),
+                moving,
+                features.time - held.time,
             )
             place(self._codec.expand(np.ascontiguousarray(latent[present[row]].T)), present[row], received[row])
         fused = self.fuse_maps(features.features, received, present)
         return replace(readings, features=replace(features, features=fused))
 
-    def _pose(self, sender: str, held: _ReceivedMap) -> Grid:
-        """Return the grid of a sender at the pose that it has stated."""
-        return held.grid
+    def _grid_for(self, sender: str, grid: Grid) -> Grid:
+        """Return the own grid relative to the pose that a sender states, from which objects of both may differ."""
+        report = self._reports.get(sender)
+        if not self.settings.align_poses or self._alone is None or report is None or report.state is None:
+            return grid
+        alignment, state = align_pose(self._alone, report), report.state
+        x, y, _ = alignment.pose
+        turn = float(alignment.error[2])
+        dx, dy = grid.x - x, grid.y - y
+        cos, sin = math.cos(turn), math.sin(turn)
+        return dataclasses.replace(
+            grid, x=state.x + cos * dx - sin * dy, y=state.y + sin * dx + cos * dy, yaw=grid.yaw + turn
+        )
 
 
 class MaxFusion(IntermediateFusion):

@@ -77,8 +77,11 @@ class FusionMethod(ABC):
     def add_payload(self, sender: str, payload: Payload, body: Array) -> None:  # noqa: B027 - optional
         """Store received sensor data that are not too old, without those on the ego body (7,) at their time."""
 
-    def merge_readings(self, readings: Readings) -> Readings:
-        """Return the readings of a station with the received sensor data that are not too old."""
+    def merge_readings(self, readings: Readings, alone: Detections | None = None) -> Readings:
+        """Return the readings of a station with the received sensor data that are not too old.
+
+        alone  new objects in the sensor data of the station alone; None if there are none
+        """
         return readings
 
     @abstractmethod

@@ -182,7 +182,7 @@ class SensorDataSharing:
             return alone
         if pose is not None:
             self._joint.set_pose(pose)
-        return self._joint.perceive(self._fusion.merge_readings(readings))
+        return self._joint.perceive(self._fusion.merge_readings(readings, alone))
 
 
 SENDER_REPORT_SUFFIX = " itself"

@@ -164,6 +164,23 @@ def test_poses_as_stated_and_as_assumed_place_the_features() -> None:
     assert near(fused(shifted), (23.2, 4.0))
 
 
+def test_shared_boxes_correct_the_pose_of_the_sender() -> None:
+    """The sender is 1.6 m off and states that. Four objects that both see show it; the fifth is seen by it alone."""
+    common = [(20.0, 4.0), (12.0, -9.0), (-15.0, -8.0), (25.0, 16.0)]
+    off = (THERE[0] + 1.6, THERE[1], THERE[2])
+    covariance = np.diag([0.64, 0.64, math.radians(0.4) ** 2])
+    points = [(x + 1.6, y) for x, y in [*common, (30.0, -4.0)]]
+    messages = sent(MASTS[0], 0.0, *points, at=off, fusion="where2comm")
+    stated = [replace(each, state=replace(each.state, pose_covariance=covariance)) for each in messages]
+    for align_poses, place in ((False, 31.6), (True, 30.0)):
+        ego = agent(EGO, fusion_settings={"align_poses": align_poses})
+        ego.act(readings(0.05, HERE, *common), received(stated[:1], 0.05), 0.05, None)
+        step = ego.act(readings(0.1, HERE, *common), received(stated[1:], 0.1), 0.1, None)
+        found = step.fused.boxes[:, :2]
+        alone = found[np.hypot(found[:, 0] - place, found[:, 1] + 4.0) < 3.0]
+        assert abs(alone.mean(axis=0)[0] - place) < 0.6, align_poses
+
+
 def test_lost_frame_costs_its_cells_only() -> None:
     """Objects of two frames: whichever arrives is detected."""
     points = [(12.0 + 5.0 * n, 4.0) for n in range(18)]
