@@ -171,7 +171,7 @@ class SceneMaker:
                             vx, vy, half,
                         ))  # fmt: skip
                         break
-            else:  # no room: a mast anywhere
+            else:  # all tried positions are occupied: a mast anywhere
                 angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(8.0, 50.0)
                 x, y = far * math.cos(angle), far * math.sin(angle)
                 stations.append((-1, x, y, 6.0, float(angle), 0.0, 0.0, math.pi))

@@ -1,6 +1,6 @@
 """Training of the network `pillars` on a GPU: first single stations, then fusion of three stations.
 
-Each batch is cast anew, so that no scene occurs twice.
+Each batch is cast from other scenes, so that none occurs twice.
 """
 
 from __future__ import annotations
