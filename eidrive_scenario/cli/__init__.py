@@ -35,6 +35,7 @@ FUNCTIONS = {
     "view": "show:view",
     "judge": "recordings:judge",
     "export": "recordings:export",
+    "dataset": "dataset:dataset",
     "report": "show:report",
     "sweep": "sweep:sweep",
     "results": "results:results",
@@ -43,7 +44,7 @@ FUNCTIONS = {
     "init": "init:init",
 }
 """Module of this package and function of each command, in the order of the help."""
-_SHORT = frozenset({"run", "check", "sweep"})
+_SHORT = frozenset({"run", "check", "sweep", "dataset"})
 """Commands with options that only `--help-all` describes."""
 
 

@@ -208,7 +208,7 @@ def view(
         str | None, typer.Option(help="Station of pictures and films.", show_default="the first that drives")
     ] = None,
 ) -> None:
-    """Write one or two recorded runs as an HTML replay, or the top view of one as pictures.
+    """Write recorded runs as an HTML replay, or the top view of one as pictures.
 
     Example: eidrive view reports/scenario_1 --browser
     """

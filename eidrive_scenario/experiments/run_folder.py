@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -26,9 +26,14 @@ def folder_name(settings: ResolvedSettings) -> str:
     """Return the name of a run folder: scenario, channel, run of a distribution, seed, and hash of all settings."""
     run = [] if settings.run is None else [f"run{settings.run}"]
     parts = [settings.scenario.rsplit("/", 1)[-1], settings.channel, *run, f"seed{settings.seed}"]
+    return readable_name(parts, settings.short_digest)
+
+
+def readable_name(parts: Sequence[str], digest: str) -> str:
+    """Return the name of a folder: readable parts, shortened, and the digest that distinguishes it."""
     readable = re.sub(r"[^\w.+=-]+", "_", "-".join(parts)).strip("._-")
     readable = readable.encode(errors="replace")[:_READABLE].decode(errors="ignore").rstrip("._-") or "run"
-    return f"{readable}-{settings.short_digest}"
+    return f"{readable}-{digest}"
 
 
 class RunFolder:

@@ -108,9 +108,12 @@ def _option(form: Form, help: str, default: Any = None, **declared: Any) -> Any:
 
 
 _PLACE: tuple[type, ...] = (str, os.PathLike)
+_RARE: Mapping[str, Any] = {"rare": True}
 _RUN: Mapping[str, Mapping[str, Any]] = {"run": {}}
 _RUN_AND_SWEEP: Mapping[str, Mapping[str, Any]] = {"run": {}, "sweep": {}}
-_ALL: Mapping[str, Mapping[str, Any]] = {"run": {}, "check": {}, "sweep": {}}
+_RUN_AND_DATASET: Mapping[str, Mapping[str, Any]] = {"run": {}, "dataset": _RARE}
+_RUNNING: Mapping[str, Mapping[str, Any]] = {"run": {}, "sweep": {}, "dataset": {}}
+_ALL: Mapping[str, Mapping[str, Any]] = {"run": {}, "check": {}, "sweep": {}, "dataset": {}}
 """Commands that have an option, each with what differs there."""
 
 
@@ -144,7 +147,11 @@ class RunSettings:
     channel: str | Path | Mapping[str, Any] | None = _option(
         Text((*_PLACE, Mapping), "the name, the file or the mapping of a channel profile", (".yaml", ".yml")),
         "Channel profile: name, file or YAML; none: no cooperation.",
-        commands={"run": {}, "sweep": {"help": "Channel profile of all runs."}},
+        commands={
+            "run": {},
+            "sweep": {"help": "Channel profile of all runs."},
+            "dataset": {"help": "Channel profile of all runs."},
+        },
         detail="channel_profile",
         pytest=PytestForm(
             metavar="A,B",
@@ -155,7 +162,7 @@ class RunSettings:
     detector: str | None = _option(
         Text((str,), "the name of a detector"),
         "Detector of all stations.",
-        commands=_RUN,
+        commands=_RUN_AND_DATASET,
         detail="stations",
         in_row=True,
         pytest=PytestForm(metavar="NAME", help="detector of all stations (default: the file's own)", is_named=True),
@@ -163,7 +170,7 @@ class RunSettings:
     fusion: str | None = _option(
         Text((str,), "the name of a fusion method"),
         "Fusion method of all stations.",
-        commands=_RUN,
+        commands=_RUN_AND_DATASET,
         detail="stations",
         in_row=True,
         pytest=PytestForm(
@@ -173,7 +180,7 @@ class RunSettings:
     planner: str | None = _option(
         Text((str,), "the name of a planner"),
         "Planner of all driven stations.",
-        commands={"run": {}, "check": {}},
+        commands={"run": {}, "check": {}, "dataset": _RARE},
         detail="stations",
         in_row=True,
         pytest=PytestForm(
@@ -183,7 +190,7 @@ class RunSettings:
     weather: str | Path | None = _option(
         Text(_PLACE, "the name or the file of a weather preset", None),
         "Weather preset: name or file.",
-        commands=_RUN,
+        commands={"run": {}, "dataset": {}},
         detail="weather_profile",
         in_row=True,
         unset="of the scenario",
@@ -193,7 +200,7 @@ class RunSettings:
         Senders(),
         "Senders whose messages are used.",
         metavar="A,B|none",
-        commands=_RUN,
+        commands=_RUN_AND_DATASET,
         detail="stations",
         pytest=None,
     )
@@ -201,7 +208,11 @@ class RunSettings:
         Assignments("a mapping of names to values"),
         "Parameter of the scenario; repeatable.",
         flag="--param",
-        commands={"run": {}, "sweep": {"help": "Parameter of all runs; repeatable."}},
+        commands={
+            "run": {},
+            "sweep": {"help": "Parameter of all runs; repeatable."},
+            "dataset": {"help": "Parameter of all runs; repeatable."},
+        },
         pytest=None,
     )
     user_values: Mapping[str, str] = _option(
@@ -209,7 +220,7 @@ class RunSettings:
         "Value for UserDefinedValueConditions; repeatable.",
         flag="--user-value",
         rare=True,
-        commands=_RUN_AND_SWEEP,
+        commands=_RUNNING,
         pytest=None,
     )
     controllers: Mapping[str, str] = _option(
@@ -217,14 +228,18 @@ class RunSettings:
         "Model V, such as alks, of controller K of another tool; repeatable.",
         flag="--controller",
         rare=True,
-        commands=_RUN_AND_SWEEP,
+        commands=_RUNNING,
         pytest=None,
     )
     drive: Mapping[str, Any] | Iterable[str] | None = _option(
         Stacks(),
         "Give entity NAME a driving stack with the properties STACK (YAML or file).",
         metavar="NAME[=STACK]",
-        commands={**_ALL, "sweep": {"help": "Give entity NAME a driving stack, as in `eidrive run`.", "rare": True}},
+        commands={
+            **_ALL,
+            "sweep": {"help": "Give entity NAME a driving stack, as in `eidrive run`.", "rare": True},
+            "dataset": {"help": "Give entity NAME a driving stack, as in `eidrive run`."},
+        },
         pytest=PytestForm(
             help="give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable"
         ),
@@ -234,7 +249,7 @@ class RunSettings:
         "Further criteria: '{collision: {of: Ego}}'; repeatable.",
         flag="--criterion",
         metavar="YAML|FILE",
-        commands={**_ALL, "sweep": {"help": "Add criteria; repeatable.", "rare": True}},
+        commands={"run": {}, "check": {}, "sweep": {"help": "Add criteria; repeatable.", "rare": True}},
         pytest=PytestForm(
             "criterion",
             help="add criteria to those of each scenario, such as '{collision: {of: Ego}}', or those of a file; "
@@ -247,7 +262,7 @@ class RunSettings:
         "Maximum simulated time in seconds.",
         120.0,
         rare=True,
-        commands=_RUN_AND_SWEEP,
+        commands=_RUNNING,
         pytest=PytestForm(
             metavar="SECONDS", help="maximum simulated time of each run; an error if reached (default: 120)"
         ),

@@ -44,11 +44,13 @@ in the volume of a pulse if there are few (0.2 liters with less than a thousand 
 
 
 class Returns(NamedTuple):
-    """Return of each ray: whether there is one (M,), its distance [m], and its intensity in [0, 1]."""
+    """Return of each ray: whether there is one (M,), its distance [m], its intensity in [0, 1], and whether it comes from
+    the air."""
 
     found: NDArray[np.bool_]
     distance: Array
     intensity: Array
+    airborne: NDArray[np.bool_]
 
 
 def extinction(weather: Weather) -> float:
@@ -90,6 +92,7 @@ def returns(
     found = hard >= least
     where = np.where(np.isfinite(distance), distance, 0.0)
     intensity = brightness * through * np.exp(-attenuation * where)
+    false = np.zeros(len(distance), dtype=bool)
     air = weather.extinction - weather.fog_extinction * (weather.visual_range > 10_000.0)
     if air > 0.0:
         ranges, soft = _air(round(fade, 9), round(BACKSCATTER * air / CONTRAST, 12))
@@ -103,7 +106,7 @@ def returns(
         found |= false
         where = np.where(false, place, where)
         intensity = np.where(false, np.minimum(peak * math.pi * place * place, 1.0), intensity)
-    return Returns(found, where, np.clip(intensity, 0.0, 1.0))
+    return Returns(found, where, np.clip(intensity, 0.0, 1.0), false)
 
 
 @lru_cache(maxsize=32)
@@ -174,6 +177,7 @@ class Lidar(Sensor):
             pose,
             ring.astype(np.int32),
             self._azimuths(columns)[column],
+            np.where(back.airborne[kept], NOTHING, rows[kept]).astype(np.int32),
         )
 
     def _hits(self, columns: Integers, pose: Array, scene: Scene, view: WorldView, row: int) -> FanHits:

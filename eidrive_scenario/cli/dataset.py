@@ -1,0 +1,115 @@
+"""Command `eidrive dataset`: datasets for learning from runs, and scenarios from recorded datasets."""
+
+from __future__ import annotations
+
+from collections import Counter
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from eidrive_scenario.cli.options import HelpAll, parse_seeds, takes_run_options
+from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.supervision import interrupt_once
+from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError
+from eidrive_scenario.run_options import RunSettings
+
+if TYPE_CHECKING:
+    from eidrive_scenario.export.opv2v.dataset import ExportedRun
+
+
+class DatasetFormat(StrEnum):
+    """Formats of datasets."""
+
+    opv2v = "opv2v"
+
+
+@takes_run_options("dataset", at="out", before={"allow_torchscript": "help_all"})
+def dataset(
+    settings: RunSettings,
+    scenarios: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[SCENARIO]...", help=".xosc files or library names; all runs of a distribution."),
+    ] = None,
+    format: Annotated[DatasetFormat, typer.Option(help="Format of the dataset.")] = DatasetFormat.opv2v,
+    seeds: Annotated[
+        str | None, typer.Option(metavar="A-B|A,B", help="Seeds of each scenario.", show_default="1")
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUES",
+            help="Vary a setting or parameter, such as weather=sunny,storm or channel=ideal,congested; repeatable.",
+        ),
+    ] = None,
+    sensors: Annotated[
+        str | None,
+        typer.Option(
+            metavar="YAML|FILE",
+            help="Lidar and cameras of all stations.",
+            show_default="64 channels, own cameras",
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the dataset or of the scenarios.")] = Path("dataset"),
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processes.", show_default="number of cores")
+    ] = None,
+    from_folder: Annotated[
+        Path | None,
+        typer.Option("--import", metavar="DIR", help="Write a scenario per recording of an OPV2V or DAIR-V2X folder."),
+    ] = None,
+    help_all: HelpAll = False,
+) -> None:
+    """Write runs as a dataset for learning, or recorded datasets as scenarios.
+
+    Example: eidrive dataset coop/scenario_1 coop/scenario_2 --seeds 1-10 --vary weather=sunny,storm --out opv2v
+
+    Complete runs are kept, so that the same command continues a killed one.
+    """
+    if from_folder is not None:
+        if scenarios:
+            raise SettingError(Diagnostic("--import and scenarios exclude each other", "give one of them"))
+        _import(from_folder, out)
+        return
+    if not scenarios:
+        raise SettingError(Diagnostic("no scenario is given", "give an .xosc file, a library name, or --import DIR"))
+    from eidrive_scenario.cli.console import console
+    from eidrive_scenario.experiments.sweeps.axes import parse_axes
+    from eidrive_scenario.export.opv2v.dataset import export_dataset, plan_dataset, read_sensors
+
+    planned = plan_dataset(
+        scenarios,
+        out,
+        settings,
+        axes=parse_axes(vary or []),
+        seeds=[1] if seeds is None else parse_seeds("--seeds", seeds),
+        sensors=None if sensors is None else read_sensors(sensors),
+    )
+    bar = console(stderr=True)
+    with interrupt_once():
+        runs = export_dataset(planned, workers=jobs, console=bar if bar.is_terminal else None, finished=_print)
+    failed = sum(bool(run.error) and not run.is_excluded for run in runs)
+    frames = sum(run.frames for run in runs)
+    warned = Counter(warning for run in runs for warning in run.warnings)
+    print_warnings(f"{warning} ({count} of {len(runs)} runs)" for warning, count in warned.items())
+    kept = f", {len(planned) - len(runs)} already complete" if len(runs) < len(planned) else ""
+    echo(f"{len(runs)} runs, {frames} frames{kept}; {out}")
+    raise typer.Exit(ABORTED if failed else PASSED)
+
+
+def _print(run: ExportedRun) -> None:
+    """Print the outcome of a run."""
+    if run.error:
+        echo(f"{run.name}: {'excluded' if run.is_excluded else 'failed'}: {run.error}", err=True)
+        return
+    echo(f"{run.name}: {run.frames} frames of {run.stations} stations")
+
+
+def _import(folder: Path, out: Path) -> None:
+    """Write a scenario per recording of a folder."""
+    from eidrive_scenario.export.dataset_import import import_recordings
+
+    for path, warnings in import_recordings(folder, out):
+        echo(str(path))
+        print_warnings(f"{path.name}: {warning}" for warning in warnings)

@@ -1,0 +1,105 @@
+"""Text of one frame of a station: poses, cameras and true objects as YAML in block style, numbers in fixed notation.
+
+PyYAML reads numbers such as 1e-05 as text, and writing by it would take longer than a scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from eidrive_scenario.export.opv2v.poses import DECIMALS
+
+Pose = Sequence[float]
+"""x, y, z [m], roll, yaw, pitch [degrees]."""
+
+
+@dataclass(frozen=True)
+class ObjectEntry:
+    """True object.
+
+    location  point below the center of its box, at the height of the base of the box [m]
+    angle     roll, yaw, pitch [degrees]
+    extent    half length, width, height [m]
+    speed     [km/h]
+    category  class of this project
+    """
+
+    location: Sequence[float]
+    angle: Sequence[float]
+    extent: Sequence[float]
+    speed: float
+    category: str
+
+
+@dataclass(frozen=True)
+class CameraEntry:
+    """Camera: pose, matrix (4, 4) from the lidar to the camera in left-handed axes, and (3, 3) of the lens [px]."""
+
+    cords: Pose
+    extrinsic: Sequence[Sequence[float]]
+    intrinsic: Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class StationFrame:
+    """What a station knows and what is true around it.
+
+    speed      of the station [km/h]
+    extent     half length, width, height of its own box [m]
+    pose       of the point below the center of its box; `estimate` is the pose that it assumes
+    vehicles   true vehicles that its lidar hits, by id;  pedestrians  the same of pedestrians
+    """
+
+    lidar_pose: Pose
+    pose: Pose
+    estimate: Pose
+    speed: float
+    extent: Sequence[float]
+    cameras: Sequence[CameraEntry]
+    vehicles: Mapping[int, ObjectEntry]
+    pedestrians: Mapping[int, ObjectEntry]
+
+    def text(self) -> str:
+        """Return the YAML of the frame. `ego_extent`, `pedestrians` and `obj_type` are additions to OPV2V."""
+        lines: list[str] = []
+        for number, camera in enumerate(self.cameras):
+            lines += [f"camera{number}:", f"  cords: {_list(camera.cords)}"]
+            for name, matrix in (("extrinsic", camera.extrinsic), ("intrinsic", camera.intrinsic)):
+                lines += [f"  {name}:", *(f"  - {_list(row)}" for row in matrix)]
+        lines += [
+            f"ego_extent: {_list(self.extent)}",
+            f"ego_speed: {_number(self.speed)}",
+            f"lidar_pose: {_list(self.lidar_pose)}",
+            "plan_trajectory: []",
+            f"predicted_ego_pos: {_list(self.estimate)}",
+            f"true_ego_pos: {_list(self.pose)}",
+        ]
+        for name, objects in (("pedestrians", self.pedestrians), ("vehicles", self.vehicles)):
+            lines += _objects(name, objects)
+        return "\n".join(lines) + "\n"
+
+
+def _objects(name: str, objects: Mapping[int, ObjectEntry]) -> list[str]:
+    lines = [f"{name}:" if objects else f"{name}: {{}}"]
+    for number, entry in sorted(objects.items()):
+        lines += [
+            f"  {number}:",
+            f"    angle: {_list(entry.angle)}",
+            f"    center: {_list([0.0, 0.0, entry.extent[2]])}",
+            f"    extent: {_list(entry.extent)}",
+            f"    location: {_list(entry.location)}",
+            f"    obj_type: {entry.category}",
+            f"    speed: {_number(entry.speed)}",
+        ]
+    return lines
+
+
+def _list(values: Sequence[float]) -> str:
+    return f"[{', '.join(map(_number, values))}]"
+
+
+def _number(value: float) -> str:
+    """Return a number in fixed notation with at least one decimal."""
+    text = f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0")
+    return f"{text}0" if text.endswith(".") else text

@@ -1,0 +1,1 @@
+"""Recordings of traffic in datasets of others, as scenarios that replay them."""

@@ -1,0 +1,206 @@
+"""OpenSCENARIO file that replays a recorded scene: timed trajectories, and stations with the recorded lidars."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from lxml import etree
+
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.export.geometry import angles
+from eidrive_scenario.export.traffic_recording.bodies import body_of
+from eidrive_scenario.export.traffic_recording.scene import MobileStation, RoadsideStation, Track, TrafficScene
+from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER
+from eidrive_scenario.files.yaml_text import flow_yaml
+
+STEP = 0.05
+"""Default time step of a run [s]: an actor that an action adds is present one step later."""
+STANDSTILL = 1e-3
+"""Maximum motion of a road user that stands during its whole track [m]."""
+MAST_BASE = 0.5
+"""Minimum height of the mast of a roadside unit [m]."""
+
+
+@dataclass(frozen=True)
+class _Actor:
+    """Entity of the scenario: its element, and the poses (N, 4, 4) of its reference point."""
+
+    name: str
+    body: etree._Element
+    times: Array
+    poses: Array
+
+    @property
+    def stands(self) -> bool:
+        """Whether the actor stays where it is."""
+        moved = np.abs(self.poses - self.poses[0]).max() if len(self.poses) > 1 else 0.0
+        return bool(moved < STANDSTILL)
+
+
+def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
+    """Return the XML of a scene.
+
+    lidar  settings of the lidar of all stations, without its mount
+    """
+    root = etree.Element("OpenSCENARIO")
+    root.append(etree.Comment(f" Recording {scene.source}: no road, all road users follow recorded trajectories. "))
+    description = f"{scene.name}: recorded traffic"
+    _add(
+        root,
+        "FileHeader",
+        revMajor="1",
+        revMinor="2",
+        date="2026-01-01T00:00:00",
+        author="eidrive",
+        description=description,
+    )
+    locations = _add(root, "CatalogLocations")
+    _add(_add(locations, "MiscObjectCatalog"), "Directory", path=f"{LIBRARY_FOLDER}/{CATALOGS}")
+    _add(root, "RoadNetwork")
+    entities = _add(root, "Entities")
+    storyboard = _add(root, "Storyboard")
+    start = _add(_add(storyboard, "Init"), "Actions")
+    act = _add(_add(storyboard, "Story", name="Recording"), "Act", name="Replay")
+    stations = {station.name: station for station in scene.mobile}
+    for track in scene.tracks:
+        actor = _actor(track)
+        entity = _add(entities, "ScenarioObject", name=actor.name)
+        entity.append(actor.body)
+        station = stations.get(track.name)
+        if station is not None:
+            _add_stack(entity, track.name, _mount(station, track), lidar)
+        _add_motion(start, act, actor, scene.end, is_station=station is not None)
+    for unit in scene.roadside:
+        _add_mast(entities, start, unit, lidar)
+    if len(act):
+        act.append(_trigger("StartTrigger", "Beginning", 0.0))
+    else:
+        storyboard.remove(act.getparent())
+    storyboard.append(_trigger("StopTrigger", "End", scene.end - STEP / 5.0))
+    etree.indent(root, "  ")
+    text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return text + b"\n"
+
+
+def _add(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
+    return etree.SubElement(parent, tag, attributes)
+
+
+def _actor(track: Track) -> _Actor:
+    body = body_of(track.category, track.size)
+    poses = track.poses.copy()
+    poses[:, :3, 3] -= track.poses[:, :3, :3] @ np.array(body.center)
+    return _Actor(track.name, body.element, track.times, poses)
+
+
+def _mount(station: MobileStation, track: Track) -> dict[str, float]:
+    """Return the mount of the lidar of a vehicle in the frame of its reference point [m, degrees]."""
+    yaw, pitch, _ = angles(station.lidar[:3, :3])
+    x, y, z = station.lidar[:3, 3] + body_of(track.category, track.size).center
+    return _rounded_mount(x, y, z, yaw, pitch)
+
+
+def _rounded_mount(x: float, y: float, z: float, yaw: float, pitch: float) -> dict[str, float]:
+    values = {"x": x, "y": y, "z": z, "yaw": math.degrees(yaw), "pitch": math.degrees(pitch)}
+    return {name: round(float(value), 6) + 0.0 for name, value in values.items()}
+
+
+def _add_stack(entity: etree._Element, name: str, mount: dict[str, float], lidar: dict[str, object]) -> None:
+    """Add the controller of a station that detects by its lidar, sends and receives."""
+    controller = _add(_add(entity, "ObjectController"), "Controller", name=f"{name}Stack")
+    properties = _add(controller, "Properties")
+    sensors = {"lidar": {**lidar, "mount": mount}, "truth": {"range": 120.0, "rate": 10.0}}
+    values = {
+        "module": "eidrive",
+        "planner": "none",
+        "detector": "lidar",
+        "cooperates_with": "all",
+        "sensors": flow_yaml(sensors, setting="sensors"),
+    }
+    for key, value in values.items():
+        _add(properties, "Property", name=key, value=value)
+
+
+def _add_motion(start: etree._Element, act: etree._Element, actor: _Actor, end: float, *, is_station: bool) -> None:
+    """Add the actions that let an actor enter, follow its trajectory, and leave."""
+    first, last = float(actor.times[0]), float(actor.times[-1])
+    enters, leaves = first > STEP / 2.0, last < end - STEP / 2.0
+    trajectory = None if actor.stands else _follow(actor)
+    private = None
+    if not enters or is_station:
+        private = _add(start, "Private", entityRef=actor.name)
+    if private is not None and not enters:
+        _position(_add(_add(_add(private, "PrivateAction"), "TeleportAction"), "Position"), actor.poses[0])
+    if is_station and private is not None:  # scripted, while its stack perceives and communicates
+        action = _add(_add(private, "PrivateAction"), "ControllerAction")
+        _add(action, "ActivateControllerAction", lateral="false", longitudinal="false")
+    if private is not None and not enters and trajectory is not None:
+        private.append(trajectory)
+    if not enters and not leaves:
+        return
+    group = _add(act, "ManeuverGroup", name=actor.name, maximumExecutionCount="1")
+    _add(_add(group, "Actors", selectTriggeringEntities="false"), "EntityRef", entityRef=actor.name)
+    maneuver = _add(group, "Maneuver", name=actor.name)
+    if enters:
+        event = _add(maneuver, "Event", name=f"{actor.name}Enters", priority="parallel")
+        position = _add(_entity_action(event, actor.name, "Add"), "AddEntityAction")
+        _position(_add(position, "Position"), actor.poses[0])
+        if trajectory is not None:
+            _add(event, "Action", name=f"{actor.name}Moves").append(trajectory)
+        event.append(_trigger("StartTrigger", f"{actor.name}IsDue", first - 1.2 * STEP))
+    if leaves:
+        event = _add(maneuver, "Event", name=f"{actor.name}Leaves", priority="parallel")
+        _add(_entity_action(event, actor.name, "Delete"), "DeleteEntityAction")
+        event.append(_trigger("StartTrigger", f"{actor.name}IsOver", last - 0.2 * STEP))
+
+
+def _entity_action(event: etree._Element, name: str, verb: str) -> etree._Element:
+    action = _add(event, "Action", name=f"{verb}{name}")
+    return _add(_add(action, "GlobalAction"), "EntityAction", entityRef=name)
+
+
+def _follow(actor: _Actor) -> etree._Element:
+    private = etree.Element("PrivateAction")
+    follow = _add(_add(private, "RoutingAction"), "FollowTrajectoryAction")
+    reference = _add(follow, "TrajectoryRef")
+    trajectory = _add(reference, "Trajectory", name=f"{actor.name}Way", closed="false")
+    line = _add(_add(trajectory, "Shape"), "Polyline")
+    for time, pose in zip(actor.times.tolist(), actor.poses, strict=True):
+        _position(_add(_add(line, "Vertex", time=f"{time:.6f}"), "Position"), pose)
+    timing = _add(follow, "TimeReference")
+    _add(timing, "Timing", domainAbsoluteRelative="absolute", offset="0", scale="1")
+    _add(follow, "TrajectoryFollowingMode", followingMode="position")
+    return private
+
+
+def _position(parent: etree._Element, pose: Array) -> None:
+    yaw, pitch, roll = angles(pose[:3, :3])
+    values = dict(zip("xyzhpr", (*pose[:3, 3].tolist(), yaw, pitch, roll), strict=True))
+    _add(parent, "WorldPosition", **{key: f"{round(value, 9) + 0.0:.9f}" for key, value in values.items()})
+
+
+def _add_mast(entities: etree._Element, start: etree._Element, unit: RoadsideStation, lidar: dict[str, object]) -> None:
+    """Add the mast of a roadside unit, with its lidar on the top."""
+    yaw, pitch, _ = angles(unit.lidar[:3, :3])
+    x, y, height = unit.lidar[:3, 3].tolist()
+    entity = _add(entities, "ScenarioObject", name=unit.name)
+    reference = _add(entity, "CatalogReference", catalogName="misc_objects", entryName="rsu")
+    mast = max(height, MAST_BASE)
+    assignments = _add(reference, "ParameterAssignments")
+    _add(assignments, "ParameterAssignment", parameterRef="Height", value=repr(mast))
+    _add_stack(entity, unit.name, _rounded_mount(0.0, 0.0, height, 0.0, pitch), lidar)
+    pose = np.eye(4)
+    pose[:3, :3] = [[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
+    pose[:2, 3] = x, y
+    private = _add(start, "Private", entityRef=unit.name)
+    _position(_add(_add(_add(private, "PrivateAction"), "TeleportAction"), "Position"), pose)
+
+
+def _trigger(tag: str, name: str, time: float) -> etree._Element:
+    trigger = etree.Element(tag)
+    condition = _add(_add(trigger, "ConditionGroup"), "Condition", name=name, delay="0", conditionEdge="none")
+    value = f"{max(time, 0.0):.6f}"
+    _add(_add(condition, "ByValueCondition"), "SimulationTimeCondition", rule="greaterOrEqual", value=value)
+    return trigger

@@ -1,0 +1,94 @@
+"""Recorded scene: tracks of road users, and the stations that recorded them, in the world of this project."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from eidrive_scenario.base.arrays import Array
+
+
+@dataclass(frozen=True)
+class Track:
+    """Road user.
+
+    category  class of this project; "" if the recording states none
+    size      length, width, height of the box [m]
+    times     (N,) rising [s]
+    poses     (N, 4, 4) of the center of the box
+    """
+
+    name: str
+    category: str
+    size: tuple[float, float, float]
+    times: Array
+    poses: Array
+
+    @property
+    def base_heights(self) -> Array:
+        """Heights of the base of the box (N,) [m]."""
+        heights: Array = self.poses[:, 2, 3] - self.size[2] / 2.0
+        return heights
+
+
+@dataclass(frozen=True)
+class MobileStation:
+    """Vehicle with a lidar: the name of its track, and the pose (4, 4) of the lidar relative to the center of its box."""
+
+    name: str
+    lidar: Array
+
+
+@dataclass(frozen=True)
+class RoadsideStation:
+    """Roadside unit: its name, and the pose (4, 4) of its lidar in the world."""
+
+    name: str
+    lidar: Array
+
+
+@dataclass
+class TrafficScene:
+    """Scene of a recording.
+
+    source   folder of the recording
+    end      time of the last frame [s]; the first one has the time 0
+    """
+
+    name: str
+    source: str
+    end: float
+    tracks: list[Track]
+    mobile: list[MobileStation]
+    roadside: list[RoadsideStation]
+    warnings: list[str] = field(default_factory=list)
+
+
+GROUND_TOLERANCE = 0.5
+"""Distance of the ground from the height 0 up to which heights are kept [m]."""
+
+
+def at_ground(scene: TrafficScene) -> TrafficScene:
+    """Return a scene whose lowest road user stands at the height 0, that of the ground of a scenario without roads.
+
+    A slope remains: road users on it are above the ground, and a warning states it.
+    """
+    bases = np.concatenate([track.base_heights for track in scene.tracks]) if scene.tracks else np.zeros(1)
+    ground, top = float(bases.min()), float(bases.max())
+    warnings = list(scene.warnings)
+    tracks, roadside = scene.tracks, scene.roadside
+    if abs(ground) > GROUND_TOLERANCE:
+        warnings.append(f"all heights are reduced by {ground:.3f} m: the ground without roads is at the height 0")
+        tracks = [Track(one.name, one.category, one.size, one.times, _lowered(one.poses, ground)) for one in tracks]
+        roadside = [RoadsideStation(one.name, _lowered(one.lidar, ground)) for one in roadside]
+        top -= ground
+    if top > GROUND_TOLERANCE:
+        warnings.append(f"the ground is a plane without roads: road users are up to {top:.2f} m above it")
+    return TrafficScene(scene.name, scene.source, scene.end, tracks, scene.mobile, roadside, warnings)
+
+
+def _lowered(poses: Array, height: float) -> Array:
+    lowered: Array = poses.copy()
+    lowered[..., 2, 3] -= height
+    return lowered
