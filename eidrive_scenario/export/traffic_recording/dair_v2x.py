@@ -1,7 +1,7 @@
 """Reading of cooperative recordings of DAIR-V2X-C (https://github.com/AIR-THU/DAIR-V2X, data/README.md) as scenes.
 
 The world of DAIR-V2X is right-handed, in meters and radians, and its boxes are given by their corners in it. The labels
-have no identities: those of successive frames are associated here. Labels with a `track_id`, as those of V2X-Seq, are not.
+have no identities: those of successive frames are associated here, unless they have a `track_id` as those of V2X-Seq.
 """
 
 from __future__ import annotations

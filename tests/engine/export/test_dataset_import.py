@@ -1,0 +1,357 @@
+"""Scenarios from recorded datasets: replayed poses against the recordings, and damaged folders."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from command_fixtures import Eidrive, eidrive
+
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import box_corners, rotation_matrix
+from eidrive_scenario.checks.scenario_checks import check_scenario
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.export.dataset_import import import_recordings
+from eidrive_scenario.export.opv2v.dataset import export_dataset, plan_dataset, read_sensors
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.sensing.readings import LidarReading
+from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+from eidrive_scenario.world.view import WorldView
+
+__all__ = ["eidrive"]
+SMALL = "{lidar: {channels: 8, points_per_second: 16000, rotation: 10, range: 80}}"
+
+
+@dataclass
+class Views:
+    """Collector of the views of a run by tick."""
+
+    views: dict[int, WorldView] = field(default_factory=dict)
+
+    def observe(self, frame: Frame) -> None:
+        self.views[frame.view.tick] = frame.view
+
+    def close(self) -> None: ...
+
+
+def replay(path: Path, **settings: Any) -> dict[int, WorldView]:
+    """Return the views of a replay with a small lidar at the recorded mount."""
+    text = path.read_text().replace("channels: 64", "channels: 8").replace("1300000", "16000")
+    path.write_text(text)
+    views = Views()
+    run_file(path, settings=RunSettings(no_criteria=True, **settings), observers=[views])
+    return views.views
+
+
+def center_of(view: WorldView, name: str) -> Array:
+    row = view.row(name)
+    turn = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+    center: Array = view.position[row] + turn @ view.offset[row]
+    return center
+
+
+@pytest.mark.parametrize(
+    ("scenario", "time"),
+    [("coop/scenario_1", 3.0), ("corner_cases/pedestrian_parked_cars", 2.0), ("corner_cases/emergency_vehicle", 2.0)],
+)
+def test_replayed_scene_is_within_a_centimeter_of_its_source(scenario: str, time: float, tmp_path: Path) -> None:
+    """Each listed road user of each frame of the export has its box in the replay, in the world of its source."""
+    jobs = plan_dataset([scenario], tmp_path / "opv2v", RunSettings(time_limit=time), sensors=read_sensors(SMALL))
+    export_dataset(jobs, workers=1)
+    (path,) = (written for written, _ in import_recordings(tmp_path / "opv2v", tmp_path / "replay"))
+    assert check_scenario(path).errors == ()
+    source = Views()
+    run_file(scenario, settings=RunSettings(time_limit=time), observers=[source])
+    views = replay(path)
+    stations = json.loads((jobs[0].path / "manifest.json").read_text())["stations"]
+    for name, number in stations.items():
+        if number >= 0:
+            for tick in range(0, round(time / 0.05) + 1, 2):
+                moved = center_of(views[tick], f"Station{number}") - center_of(source.views[tick], name)
+                assert np.linalg.norm(moved) < 0.01
+    listed = 0
+    for file in jobs[0].path.glob("*/*.yaml"):
+        view = views[int(file.stem)]
+        content = yaml.safe_load(file.read_text())
+        for number, entry in (content["vehicles"] | content["pedestrians"]).items():
+            name = f"Station{number}" if number in stations.values() else f"Vehicle{number}"
+            expected = np.add(entry["location"], entry["center"]) * (1.0, -1.0, 1.0)
+            assert np.linalg.norm(center_of(view, name) - expected) < 0.01
+            assert view.yaw[view.row(name)] == pytest.approx(-math.radians(entry["angle"][1]), abs=1e-6)
+            np.testing.assert_allclose(view.size[view.row(name)], 2.0 * np.array(entry["extent"]), atol=1e-8)
+            assert view.categories[view.row(name)] == entry["obj_type"]
+            listed += 1
+    assert listed > 20
+
+
+def test_replayed_stations_measure_at_recorded_poses_and_send_over_a_channel(tmp_path: Path) -> None:
+    jobs = plan_dataset(["coop/scenario_1"], tmp_path / "a", RunSettings(time_limit=1.0), sensors=read_sensors(SMALL))
+    export_dataset(jobs, workers=1)
+    (path,) = (written for written, _ in import_recordings(jobs[0].path, tmp_path / "b"))
+    text = path.read_text().replace("channels: 64", "channels: 8").replace("1300000", "16000")
+    path.write_text(text)
+    with Simulation(path, settings=RunSettings(channel="80211p_urban")) as simulation:
+        received = 0
+        for _ in range(21):
+            frame, _ = simulation.tick()
+            received += sum(len(step.inbox) for step in frame.steps.values())
+            for station, name in ((1001, "Station1001"), (-1, "RoadsideUnit1")):
+                file = jobs[0].path / str(station) / f"{frame.view.tick:06d}.yaml"
+                readings = simulation.stack.readings[name]
+                if file.exists() and readings.lidars:
+                    expected = yaml.safe_load(file.read_text())["lidar_pose"]
+                    lidar: LidarReading = readings.lidars["lidar"]
+                    np.testing.assert_allclose(lidar.pose[:3, 3] * (1, -1, 1), expected[:3], atol=1e-4)
+                    yaw = math.atan2(lidar.pose[1, 0], lidar.pose[0, 0])
+                    assert math.cos(yaw + math.radians(expected[4])) == pytest.approx(1.0, abs=1e-9)
+    assert received > 10
+
+
+def write_frame(folder: Path, station: int, number: int, content: object) -> Path:
+    path = folder / str(station) / f"{number:06d}.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content if isinstance(content, str) else yaml.safe_dump(content))
+    return path
+
+
+def vehicle(x: float, y: float, yaw: float = 0.0, **others: Any) -> dict[str, Any]:
+    """Return an object as a file of CARLA has it."""
+    entry = {"location": [x, y, 0.1], "center": [0.0, 0.0, 0.7], "angle": [0.0, yaw, 0.0], "extent": [2.4, 1.0, 0.75]}
+    return {**entry, "speed": 10.0, **others}
+
+
+def frame(x: float, **vehicles: Any) -> dict[str, Any]:
+    objects = {int(name[1:]): one for name, one in vehicles.items()}
+    return {"lidar_pose": [x, 5.0, 1.9, 0.0, 90.0, 0.0], "true_ego_pos": [x, 5.0, 0.1, 0.0, 90.0, 0.0], "vehicles": objects}
+
+
+def imported(folder: Path, out: Path) -> tuple[Path, list[str]]:
+    (found,) = import_recordings(folder, out)
+    return found
+
+
+def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: Path) -> None:
+    """Frame numbers begin at 68; vehicle 7 is recorded from 0.1 s to 0.3 s and drives 1 m in each tenth."""
+    for row in range(6):
+        seen = {"v7": vehicle(20.0 + row, -4.0, 180.0)} if 1 <= row <= 3 else {}
+        write_frame(tmp_path / "in", 214, 68 + 2 * row, frame(0.0, **seen))
+    path, warnings = imported(tmp_path / "in", tmp_path / "out")
+    assert path == tmp_path / "out" / "in.xosc"
+    assert warnings == ["station 214 has the size 4.9 x 2.06 x 1.5 m: no file states it"]
+    views = replay(path)
+    for tick in range(0, 11, 2):
+        assert ("Vehicle7" in views[tick].rows) is (2 <= tick <= 6)
+        assert center_of(views[tick], "Station214") == pytest.approx((0.0, -5.0, 0.85), abs=1e-6)
+        assert views[tick].yaw[views[tick].row("Station214")] == pytest.approx(-math.pi / 2)
+    for tick in (2, 3, 4, 5, 6):
+        assert center_of(views[tick], "Vehicle7") == pytest.approx((20.0 + tick / 2, 4.0, 0.8), abs=1e-6)
+    assert max(views) == 10
+
+
+def test_heights_of_a_recording_are_those_above_its_lowest_road_user(tmp_path: Path) -> None:
+    for number in (0, 2):
+        low, high = vehicle(30.0, 0.0, location=[30.0, 0.0, 200.0]), vehicle(60.0, 0.0, location=[60.0, 0.0, 203.0])
+        content = frame(0.0, v1=low, v2=high) | {"lidar_pose": [0, 0, 202.0, 0, 0, 0], "true_ego_pos": [0, 0, 200.0, 0, 0, 0]}
+        write_frame(tmp_path / "hill", 5, number, content)
+    path, warnings = imported(tmp_path / "hill", tmp_path)
+    assert any("all heights are reduced by 199.950 m" in warning for warning in warnings)
+    assert any("road users are up to 3.00 m above it" in warning for warning in warnings)
+    view = replay(path)[0]
+    assert center_of(view, "Vehicle1")[2] == pytest.approx(0.75)
+    assert center_of(view, "Vehicle2")[2] == pytest.approx(3.75)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{}", r"lidar_pose is missing"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 0]\n", r"vehicles is missing"),
+        ("lidar_pose: [0, 0, 0]\nvehicles: {}\n", r"000000\.yaml:1: lidar_pose is \[0, 0, 0\] \(expected 6 numbers\)"),
+        ("lidar_pose: [0, 0, 0, 0, 0, .nan]\nvehicles: {}\n", r"yaml:1: lidar_pose has a number that is out of range"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 1e300]\nvehicles: {}\n", r"yaml:1: lidar_pose"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n- 1\n", r"yaml:2: vehicles is \[1\] \(expected a mapping"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  a: {}\n", r"yaml:3: vehicles\.a is no object with an integer"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  1:\n    angle: 3\n", r"yaml:3: vehicles\.1\.extent is missing"),
+        (
+            "lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  1:\n    extent: [1, 0, 1]\n",
+            r"yaml:4: vehicles\.1\.extent is not positive",
+        ),
+        ("lidar_pose: &a [0, 0, 0, 0, 0, 0]\nvehicles: *a\n", r"yaml:1: not valid YAML: anchors and aliases"),
+        ("lidar_pose: !!python/object/apply:os.system [exit]\n", r"yaml:1: not valid YAML: tags are not supported"),
+        ("lidar_pose: [" + "[" * 100 + "]" * 100 + "]\n", r"nested too deeply"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 0]\n" + "# filler\n" * 100_000, r"larger than|more than \d+ characters"),
+        ("[1]", r"no mapping of keys"),
+        ("\x00\x01", r"not valid YAML"),
+    ],
+)
+def test_damaged_frame_is_an_error_with_file_and_line(content: str, message: str, tmp_path: Path) -> None:
+    write_frame(tmp_path / "scene", 1, 0, content)
+    with pytest.raises(SettingError, match=message):
+        list(import_recordings(tmp_path, tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_frame_that_is_no_regular_file_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "scene" / "1").mkdir(parents=True)
+    os.mkfifo(tmp_path / "scene" / "1" / "000000.yaml")
+    with pytest.raises(SettingError, match="leads to a pipe"):
+        list(import_recordings(tmp_path, tmp_path / "out"))
+
+
+def test_folder_without_recording_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
+    for folder, message in ((tmp_path, "the folder contains no recording"), (tmp_path / "missing", "cannot read")):
+        result = eidrive("dataset", "--import", folder, "--out", tmp_path / "out")
+        assert result.exit_code == 2
+        assert message in result.stderr
+
+
+def test_command_imports_each_scenario_folder(eidrive: Eidrive, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        write_frame(tmp_path / "in" / name, 1, 0, frame(0.0))
+        write_frame(tmp_path / "in" / name, 1, 2, frame(0.5))
+    (tmp_path / "in" / "manifest.json").write_text("{}")
+    result = eidrive("dataset", "--import", tmp_path / "in", "--out", tmp_path / "out")
+    assert result.exit_code == 0
+    assert result.stdout == f"{tmp_path / 'out' / 'first.xosc'}\n{tmp_path / 'out' / 'second.xosc'}\n"
+    assert "first.xosc: station 1 has the size" in result.stderr
+    assert load_scenario(tmp_path / "out" / "first.xosc").entities.keys() == {"Station1"}
+
+
+OTHER = "cooperative/label_world/{}.json"
+
+
+def write_json(path: Path, content: object) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content))
+
+
+def transform(yaw: float, x: float, y: float, z: float) -> dict[str, Any]:
+    return {"rotation": rotation_matrix(yaw).tolist(), "translation": [[x], [y], [z]]}
+
+
+def dair(folder: Path, frames: int = 6) -> Path:
+    """Write a recording: the vehicle drives 1 m per frame along y, one car drives 0.8 m per frame against it.
+
+    The world has its ground at 20 m. The roadside unit is at (110, 230) with a correction of (0.5, -0.25).
+    """
+    index, side, unit = [], [], []
+    for row in range(frames):
+        vehicle_id, unit_id = f"{100 + row:06d}", f"{300 + row:06d}"
+        index.append(
+            {
+                "vehicle_pointcloud_path": f"vehicle-side/velodyne/{vehicle_id}.pcd",
+                "infrastructure_pointcloud_path": f"infrastructure-side/velodyne/{unit_id}.pcd",
+                "cooperative_label_path": OTHER.format(vehicle_id),
+                "system_error_offset": {"delta_x": 0.5, "delta_y": -0.25},
+            }
+        )
+        stamp = str(1_626_155_123_456_789 + 100_000 * row)
+        side.append(
+            {"pointcloud_path": f"velodyne/{vehicle_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"}
+        )
+        unit.append({"pointcloud_path": f"velodyne/{unit_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"})
+        calibration = folder / "vehicle-side" / "calib"
+        write_json(calibration / f"lidar_to_novatel/{vehicle_id}.json", {"transform": transform(0.0, 0.5, 0.0, 1.6)})
+        write_json(
+            calibration / f"novatel_to_world/{vehicle_id}.json", transform(math.pi / 2, 100.0, 200.0 + row, 20.3)
+        )
+        write_json(
+            folder / f"infrastructure-side/calib/virtuallidar_to_world/{unit_id}.json",
+            transform(0.3, 110.0, 230.0, 25.0),
+        )
+        boxes = np.array(
+            [
+                [100.0, 200.2 + row, 20.8, 4.6, 1.9, 1.6, math.pi / 2],
+                [97.0, 240.0 - 0.8 * row, 20.75, 4.2, 1.8, 1.5, -math.pi / 2],
+                [97.0, 250.0, 21.5, 9.0, 2.5, 3.0, -math.pi / 2],
+            ]
+        )
+        kinds = ["Car", "car", "Truck"]
+        order = [2, 1, 0, 3, 6, 5, 4, 7]  # from the front in a circle, bottom and top
+        corners = box_corners(boxes)[:, _front_first(order)]
+        labels = [
+            {"type": kind, "world_8_points": one.tolist()}
+            for kind, one in list(zip(kinds, corners, strict=True))[:: (-1) ** row]
+        ]
+        write_json(folder / OTHER.format(vehicle_id), [*labels, {"type": "Trafficcone", "world_8_points": []}])
+    write_json(folder / "cooperative/data_info.json", index)
+    write_json(folder / "vehicle-side/data_info.json", side)
+    write_json(folder / "infrastructure-side/data_info.json", unit)
+    return folder
+
+
+def _front_first(order: list[int]) -> list[int]:
+    """Return an order of corners that begins at the front: corners of a unit box with the heading 0 decide."""
+    unit = box_corners(np.array([[0.0, 0.0, 0.0, 2.0, 1.0, 1.0, 0.0]]))[0]
+    bottom = sorted(range(8), key=lambda row: (unit[row, 2], -unit[row, 0], unit[row, 1] * np.sign(unit[row, 0])))
+    assert len(order) == 8
+    return bottom
+
+
+def test_recording_of_dair_v2x_is_replayed_with_associated_labels(tmp_path: Path) -> None:
+    path, warnings = imported(dair(tmp_path / "cooperative-vehicle-infrastructure"), tmp_path / "out")
+    assert path.name == "sequence_12.xosc"
+    assert warnings == ["all heights are reduced by 20.000 m: the ground without roads is at the height 0"]
+    views = replay(path)
+    assert views[0].names == ("Station1", "Vehicle1", "Vehicle2", "RoadsideUnit1")
+    by_category = {views[0].categories[views[0].row(name)]: name for name in ("Vehicle1", "Vehicle2")}
+    assert by_category.keys() == {"car", "truck"}
+    for tick in range(0, 11, 2):
+        row = tick / 2
+        view = views[tick]
+        assert center_of(view, "Station1") == pytest.approx((100.0, 200.2 + row, 0.8), abs=1e-6)
+        assert center_of(view, by_category["car"]) == pytest.approx((97.0, 240.0 - 0.8 * row, 0.75), abs=1e-6)
+        assert center_of(view, by_category["truck"]) == pytest.approx((97.0, 250.0, 1.5), abs=1e-6)
+        assert view.yaw[view.row(by_category["car"])] == pytest.approx(-math.pi / 2)
+        np.testing.assert_allclose(view.size[view.row("Station1")], (4.6, 1.9, 1.6), atol=1e-9)
+        mast = view.row("RoadsideUnit1")
+        assert view.position[mast] == pytest.approx((110.5, 229.75, 0.0))
+        assert view.size[mast, 2] == pytest.approx(5.0)
+    text = path.read_text()
+    assert "mount: {x: " in text
+    assert "z: 1.9, yaw: 0.0, pitch: 0.0}" in text  # 20.3 + 1.6 - 20 above the ground
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("cooperative/data_info.json", "[]", "the index has no frame"),
+        ("cooperative/data_info.json", "{", r"data_info\.json: cannot read"),
+        ("cooperative/data_info.json", "[{}]", r"\[0\]\.vehicle_pointcloud_path is missing"),
+        ("vehicle-side/data_info.json", "[]", r"frame '000100' is not in vehicle-side"),
+        (
+            "vehicle-side/data_info.json",
+            '[{"pointcloud_path": "000100.pcd", "pointcloud_timestamp": "now"}]',
+            r"pointcloud_timestamp is 'now'",
+        ),
+        ("vehicle-side/calib/novatel_to_world/000100.json", "{}", r"000100\.json: rotation is missing"),
+        (
+            "vehicle-side/calib/novatel_to_world/000100.json",
+            '{"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]}',
+            "rotation is no rotation matrix",
+        ),
+        (OTHER.format("000100"), '[{"type": "Car", "world_8_points": [[1, 2]]}]', r"\[0\]\.world_8_points is"),
+        (OTHER.format("000100"), '[{"type": "Car", "world_8_points": [' + "[0, 0, 0]," * 7 + "[0, 0, 0]]}]", "no corners"),
+        (OTHER.format("000100"), "[" * 500 + "]" * 500, "nested"),
+    ],
+)
+def test_damaged_recording_of_dair_v2x_is_an_error(file: str, content: str, message: str, tmp_path: Path) -> None:
+    folder = dair(tmp_path / "in", frames=1)
+    (folder / file).write_text(content)
+    with pytest.raises(SettingError, match=message):
+        list(import_recordings(folder, tmp_path / "out"))
+
+
+def test_missing_calibration_is_an_error_with_its_path(tmp_path: Path) -> None:
+    folder = dair(tmp_path / "in", frames=1)
+    (folder / "infrastructure-side/calib/virtuallidar_to_world/000300.json").unlink()
+    with pytest.raises(SettingError, match=r"virtuallidar_to_world/000300\.json: cannot read: No such file"):
+        list(import_recordings(folder, tmp_path / "out"))
