@@ -43,10 +43,10 @@ class CameraEntry:
 
 @dataclass(frozen=True)
 class StationFrame:
-    """What a station knows and what is true around it.
+    """State of a station, and true objects around it.
 
     speed      of the station [km/h]
-    extent     half length, width, height of its own box [m]
+    extent     half length, width, height of its box [m]
     pose       of the point below the center of its box; `estimate` is the pose that it assumes
     vehicles   true vehicles that its lidar hits, by id;  pedestrians  the same of pedestrians
     """

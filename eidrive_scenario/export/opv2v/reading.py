@@ -162,7 +162,7 @@ def read_scene(folder: Path) -> TrafficScene:
         for number in lidars
         if number < 0
     ]
-    return TrafficScene(folder.name, folder.name, seconds(last), tracks, mobile, roadside, warnings)
+    return TrafficScene(folder.name, seconds(last), tracks, mobile, roadside, warnings)
 
 
 def _read_objects(file: _FrameFile, key: str, frame: int, objects: dict[int, _Samples]) -> None:
@@ -182,7 +182,7 @@ def _add_stations(
     own: Mapping[int, Mapping[int, Array]],
     extents: Mapping[int, tuple[float, float, float]],
 ) -> list[str]:
-    """Add the poses of the vehicles with a lidar, which no file of their own lists, and return warnings."""
+    """Add the poses of the vehicles with a lidar, which their files do not list, and return warnings."""
     warnings = []
     for station, poses in lidars.items():
         if station < 0:

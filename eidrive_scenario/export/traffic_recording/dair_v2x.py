@@ -134,7 +134,7 @@ class _OpenTrack:
         self.times.append(time)
         self.labels.append(label)
 
-    def predicted(self, time: float) -> Array:
+    def predict(self, time: float) -> Array:
         """Return the position (2,) at a time at constant velocity."""
         last: Array = self.labels[-1].pose[:2, 3]
         if len(self.labels) < 2:
@@ -211,7 +211,7 @@ def _scene(folder: Path, name: str, frames: list[_Frame]) -> TrafficScene:
     mobile = MobileStation(VEHICLE_NAME, np.linalg.inv(tracks[0].poses[0]) @ lidars[0])
     assert unit is not None
     warnings = [] if any(own) else [f"no label contains the lidar of the vehicle: its size is assumed {VEHICLE_SIZE}"]
-    return TrafficScene(name, folder.name, times[-1], tracks, [mobile], [RoadsideStation(UNIT_NAME, unit)], warnings)
+    return TrafficScene(name, times[-1], tracks, [mobile], [RoadsideStation(UNIT_NAME, unit)], warnings)
 
 
 def _vehicle_lidar(folder: Path, number: str) -> Array:
@@ -289,7 +289,7 @@ def _continue(tracks: list[_OpenTrack], labels: list[_Label], time: float) -> li
     for category in dict.fromkeys(label.category for label in free):
         same = [track for track in tracks if track.category == category and not track.identity]
         found = [label for label in free if label.category == category]
-        predicted = np.array([track.predicted(time) for track in same]).reshape(-1, 2)
+        predicted = np.array([track.predict(time) for track in same]).reshape(-1, 2)
         pairs = associate(predicted, np.array([label.pose[:2, 3] for label in found]), GATE)
         for row, column in pairs:
             same[row].add(time, found[column])

@@ -13,6 +13,7 @@ from eidrive_scenario.export.geometry import angles
 from eidrive_scenario.export.traffic_recording.bodies import body_of
 from eidrive_scenario.export.traffic_recording.scene import MobileStation, RoadsideStation, Track, TrafficScene
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER
+from eidrive_scenario.files.encodable import encodable, printable
 from eidrive_scenario.files.yaml_text import flow_yaml
 
 STEP = 0.05
@@ -45,8 +46,7 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
     lidar  settings of the lidar of all stations, without its mount
     """
     root = etree.Element("OpenSCENARIO")
-    root.append(etree.Comment(f" Recording {scene.source}: no road, all road users follow recorded trajectories. "))
-    description = f"{scene.name}: recorded traffic"
+    description = f"recording {printable(encodable(scene.name))}: all road users follow their recorded trajectories"
     _add(
         root,
         "FileHeader",

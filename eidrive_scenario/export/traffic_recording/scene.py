@@ -34,7 +34,7 @@ class Track:
 
 @dataclass(frozen=True)
 class MobileStation:
-    """Vehicle with a lidar: the name of its track, and the pose (4, 4) of the lidar relative to the center of its box."""
+    """Vehicle with a lidar: name of its track, and pose (4, 4) of the lidar relative to the center of its box."""
 
     name: str
     lidar: Array
@@ -50,14 +50,9 @@ class RoadsideStation:
 
 @dataclass
 class TrafficScene:
-    """Scene of a recording.
-
-    source   folder of the recording
-    end      time of the last frame [s]; the first one has the time 0
-    """
+    """Scene of a recording; `end` is the time of the last frame [s], the first one has the time 0."""
 
     name: str
-    source: str
     end: float
     tracks: list[Track]
     mobile: list[MobileStation]
@@ -85,7 +80,7 @@ def at_ground(scene: TrafficScene) -> TrafficScene:
         top -= ground
     if top > GROUND_TOLERANCE:
         warnings.append(f"the ground is a plane without roads: road users are up to {top:.2f} m above it")
-    return TrafficScene(scene.name, scene.source, scene.end, tracks, scene.mobile, roadside, warnings)
+    return TrafficScene(scene.name, scene.end, tracks, scene.mobile, roadside, warnings)
 
 
 def _lowered(poses: Array, height: float) -> Array:

@@ -130,7 +130,11 @@ def vehicle(x: float, y: float, yaw: float = 0.0, **others: Any) -> dict[str, An
 
 def frame(x: float, **vehicles: Any) -> dict[str, Any]:
     objects = {int(name[1:]): one for name, one in vehicles.items()}
-    return {"lidar_pose": [x, 5.0, 1.9, 0.0, 90.0, 0.0], "true_ego_pos": [x, 5.0, 0.1, 0.0, 90.0, 0.0], "vehicles": objects}
+    return {
+        "lidar_pose": [x, 5.0, 1.9, 0.0, 90.0, 0.0],
+        "true_ego_pos": [x, 5.0, 0.1, 0.0, 90.0, 0.0],
+        "vehicles": objects,
+    }
 
 
 def imported(folder: Path, out: Path) -> tuple[Path, list[str]]:
@@ -159,7 +163,10 @@ def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: P
 def test_heights_of_a_recording_are_those_above_its_lowest_road_user(tmp_path: Path) -> None:
     for number in (0, 2):
         low, high = vehicle(30.0, 0.0, location=[30.0, 0.0, 200.0]), vehicle(60.0, 0.0, location=[60.0, 0.0, 203.0])
-        content = frame(0.0, v1=low, v2=high) | {"lidar_pose": [0, 0, 202.0, 0, 0, 0], "true_ego_pos": [0, 0, 200.0, 0, 0, 0]}
+        content = frame(0.0, v1=low, v2=high) | {
+            "lidar_pose": [0, 0, 202.0, 0, 0, 0],
+            "true_ego_pos": [0, 0, 200.0, 0, 0, 0],
+        }
         write_frame(tmp_path / "hill", 5, number, content)
     path, warnings = imported(tmp_path / "hill", tmp_path)
     assert any("all heights are reduced by 199.950 m" in warning for warning in warnings)
@@ -225,7 +232,12 @@ def test_command_imports_each_scenario_folder(eidrive: Eidrive, tmp_path: Path) 
     assert load_scenario(tmp_path / "out" / "first.xosc").entities.keys() == {"Station1"}
 
 
-OTHER = "cooperative/label_world/{}.json"
+LABELS = "cooperative/label_world/{}.json"
+UNIT_CORNERS = box_corners(np.array([[0.0, 0.0, 0.0, 2.0, 1.0, 1.0, 0.0]]))[0]
+CORNERS_IN_CIRCLES = sorted(
+    range(8), key=lambda row: (UNIT_CORNERS[row, 2], -UNIT_CORNERS[row, 0], UNIT_CORNERS[row, 1] * UNIT_CORNERS[row, 0])
+)
+"""Corners of a box in the order of DAIR-V2X: bottom, then top, each in a circle that begins at the front."""
 
 
 def write_json(path: Path, content: object) -> None:
@@ -249,14 +261,12 @@ def dair(folder: Path, frames: int = 6) -> Path:
             {
                 "vehicle_pointcloud_path": f"vehicle-side/velodyne/{vehicle_id}.pcd",
                 "infrastructure_pointcloud_path": f"infrastructure-side/velodyne/{unit_id}.pcd",
-                "cooperative_label_path": OTHER.format(vehicle_id),
+                "cooperative_label_path": LABELS.format(vehicle_id),
                 "system_error_offset": {"delta_x": 0.5, "delta_y": -0.25},
             }
         )
         stamp = str(1_626_155_123_456_789 + 100_000 * row)
-        side.append(
-            {"pointcloud_path": f"velodyne/{vehicle_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"}
-        )
+        side.append({"pointcloud_path": f"velodyne/{vehicle_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"})
         unit.append({"pointcloud_path": f"velodyne/{unit_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"})
         calibration = folder / "vehicle-side" / "calib"
         write_json(calibration / f"lidar_to_novatel/{vehicle_id}.json", {"transform": transform(0.0, 0.5, 0.0, 1.6)})
@@ -275,25 +285,16 @@ def dair(folder: Path, frames: int = 6) -> Path:
             ]
         )
         kinds = ["Car", "car", "Truck"]
-        order = [2, 1, 0, 3, 6, 5, 4, 7]  # from the front in a circle, bottom and top
-        corners = box_corners(boxes)[:, _front_first(order)]
+        corners = box_corners(boxes)[:, CORNERS_IN_CIRCLES]
         labels = [
             {"type": kind, "world_8_points": one.tolist()}
             for kind, one in list(zip(kinds, corners, strict=True))[:: (-1) ** row]
         ]
-        write_json(folder / OTHER.format(vehicle_id), [*labels, {"type": "Trafficcone", "world_8_points": []}])
+        write_json(folder / LABELS.format(vehicle_id), [*labels, {"type": "Trafficcone", "world_8_points": []}])
     write_json(folder / "cooperative/data_info.json", index)
     write_json(folder / "vehicle-side/data_info.json", side)
     write_json(folder / "infrastructure-side/data_info.json", unit)
     return folder
-
-
-def _front_first(order: list[int]) -> list[int]:
-    """Return an order of corners that begins at the front: corners of a unit box with the heading 0 decide."""
-    unit = box_corners(np.array([[0.0, 0.0, 0.0, 2.0, 1.0, 1.0, 0.0]]))[0]
-    bottom = sorted(range(8), key=lambda row: (unit[row, 2], -unit[row, 0], unit[row, 1] * np.sign(unit[row, 0])))
-    assert len(order) == 8
-    return bottom
 
 
 def test_recording_of_dair_v2x_is_replayed_with_associated_labels(tmp_path: Path) -> None:
@@ -338,9 +339,13 @@ def test_recording_of_dair_v2x_is_replayed_with_associated_labels(tmp_path: Path
             '{"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]}',
             "rotation is no rotation matrix",
         ),
-        (OTHER.format("000100"), '[{"type": "Car", "world_8_points": [[1, 2]]}]', r"\[0\]\.world_8_points is"),
-        (OTHER.format("000100"), '[{"type": "Car", "world_8_points": [' + "[0, 0, 0]," * 7 + "[0, 0, 0]]}]", "no corners"),
-        (OTHER.format("000100"), "[" * 500 + "]" * 500, "nested"),
+        (LABELS.format("000100"), '[{"type": "Car", "world_8_points": [[1, 2]]}]', r"\[0\]\.world_8_points is"),
+        (
+            LABELS.format("000100"),
+            '[{"type": "Car", "world_8_points": [' + "[0, 0, 0]," * 7 + "[0, 0, 0]]}]",
+            "no corners",
+        ),
+        (LABELS.format("000100"), "[" * 500 + "]" * 500, "nested"),
     ],
 )
 def test_damaged_recording_of_dair_v2x_is_an_error(file: str, content: str, message: str, tmp_path: Path) -> None:
