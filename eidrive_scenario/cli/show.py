@@ -135,7 +135,7 @@ def tree(
     scenario: Annotated[str, typer.Argument(help="An .xosc file, or a library name.")],
     svg: Annotated[Path | None, typer.Option(metavar="FILE", help="SVG file for a diagram instead of text.")] = None,
 ) -> None:
-    """Print the storyboard of a scenario as a tree with its triggers, or draw it as a diagram.
+    """Print the storyboard of a scenario as a tree with triggers, or draw it as a diagram.
 
     Example: eidrive tree coop/scenario_1 --svg storyboard.svg
     """
@@ -208,7 +208,7 @@ def view(
         str | None, typer.Option(help="Station of pictures and films.", show_default="the first that drives")
     ] = None,
 ) -> None:
-    """Write recorded runs as an HTML replay, or the top view of one as pictures.
+    """Write one or two recorded runs as an HTML replay, or the top view of one as pictures.
 
     Example: eidrive view reports/scenario_1 --browser
     """

@@ -44,8 +44,7 @@ in the volume of a pulse if there are few (0.2 liters with less than a thousand 
 
 
 class Returns(NamedTuple):
-    """Return of each ray: whether there is one (M,), its distance [m], its intensity in [0, 1], and whether it comes from
-    the air."""
+    """Return of each ray (M,): whether there is one, its distance [m] and intensity in [0, 1], and whether air scatters it."""
 
     found: NDArray[np.bool_]
     distance: Array

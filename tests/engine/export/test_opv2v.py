@@ -159,7 +159,7 @@ def test_station_lists_the_vehicles_with_a_point_except_itself(scene: Exported) 
 
 def _grown(box: Array) -> Array:
     """Return a box (7,) that contains mirrors and lamps."""
-    grown: Array = box + (0.0, 0.0, 0.0, 0.16, 0.16, 0.0, 0.0)
+    grown: Array = box + np.array([0.0, 0.0, 0.0, 0.16, 0.16, 0.0, 0.0])
     return grown
 
 

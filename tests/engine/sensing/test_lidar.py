@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.sensing.bodies import REFLECTIVITY
 from eidrive_scenario.sensing.lidar import ASPHALT, BACKSCATTER, CONTRAST, Lidar, extinction, returns
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
+from eidrive_scenario.world.view import GROUND, NOTHING
 from eidrive_scenario.world.weather import Weather
 
 EXACT: dict[str, Any] = {"range_noise": 0.0, "attenuation": 0.0}
@@ -42,6 +44,22 @@ def test_range_to_wall_is_exact_in_every_ring_and_column(boxes: Any) -> None:
     np.testing.assert_allclose(np.arcsin(found.points[:, 2] / distance), elevation, atol=1e-9)
     # Columns of 5 degrees: within the range of 60 m, rays hit the wall up to acos(20.5 / 60) = 70.03 degrees.
     assert sorted(set(np.rint(np.degrees(found.azimuth[found.ring == 4])))) == list(range(-70, 75, 5))
+
+
+def test_points_name_the_actor_the_ground_or_the_air(boxes: Any) -> None:
+    """A box 20 m ahead is row 1. Fog of 60 m returns points of the air, which are nearer than any surface."""
+    scene = boxes.scene(ego_and(boxes, Other=(20.0, 0.0, 0.0)))
+    scene.ground = True
+    found = measure(boxes, scene, channels=32, points_per_second=200_000, **EXACT)
+    world = found.points + found.pose[:3, 3]
+    assert set(found.rows.tolist()) == {GROUND, 1}
+    assert np.abs(world[found.rows == GROUND, 2]).max() < 1e-9
+    assert points_in_box(world[found.rows == 1], scene.view.boxes[1] + np.array([0, 0, 0, 1, 1, 1, 0]) * 1e-6).all()
+    scene.weather = FOG
+    air = measure(boxes, scene, channels=32, points_per_second=200_000, **EXACT)
+    assert set(air.rows.tolist()) == {NOTHING, GROUND, 1}
+    assert np.abs((air.points + air.pose[:3, 3])[air.rows == GROUND, 2]).max() < 1e-9
+    assert np.linalg.norm(air.points[air.rows == NOTHING], axis=1).max() < 20.0
 
 
 def test_rings_have_elevations_of_settings(boxes: Any) -> None:
