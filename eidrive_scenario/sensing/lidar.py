@@ -44,7 +44,7 @@ in the volume of a pulse if there are few (0.2 liters with less than a thousand 
 
 
 class Returns(NamedTuple):
-    """Return of each ray (M,): whether there is one, its distance [m] and intensity in [0, 1], and whether air scatters it."""
+    """Returns of rays (M,): whether there is one, distance [m], intensity in [0, 1], and whether it is of the air."""
 
     found: NDArray[np.bool_]
     distance: Array

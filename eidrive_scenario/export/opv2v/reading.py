@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -78,9 +78,9 @@ class _FrameFile:
     def numbers(self, owner: Mapping[Any, Any], key: str, count: int, within: str = "") -> tuple[float, ...]:
         """Return a list of numbers."""
         path = f"{within}.{key}" if within else key
-        value = owner.get(key)
         if key not in owner:
             self.fail(within, f"{path} is missing")
+        value: Any = owner[key]
         is_list = isinstance(value, list) and len(value) == count
         if not is_list or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in value):
             self.fail(path, f"{path} is {quoted(value, 100)} (expected {count} numbers)")
@@ -151,7 +151,7 @@ def read_scene(folder: Path) -> TrafficScene:
     def seconds(number: int) -> float:
         return (number - first) * FRAME_STEP
 
-    tracks = [_track(_name(number, lidars), samples, seconds_of=seconds) for number, samples in sorted(objects.items())]
+    tracks = [_track(_name(number, lidars), samples, seconds) for number, samples in sorted(objects.items())]
     mobile = [
         MobileStation(_name(number, lidars), _relative(objects[number], lidars[number]))
         for number in lidars
@@ -211,7 +211,7 @@ def _name(number: int, stations: Mapping[int, object]) -> str:
     return f"Station{number}" if number in stations else f"Vehicle{number}"
 
 
-def _track(name: str, samples: _Samples, *, seconds_of: Any) -> Track:
+def _track(name: str, samples: _Samples, seconds_of: Callable[[int], float]) -> Track:
     numbers = sorted(samples.poses)
     times = np.array([seconds_of(number) for number in numbers])
     return Track(name, samples.category, samples.size, times, np.stack([samples.poses[number] for number in numbers]))

@@ -102,13 +102,14 @@ class _JsonFile:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Pair of frames of one sequence: number in the file names, time [s], and the entry of the index."""
+    """Pair of frames of one sequence at a time [s]: the names of its files, and the correction (2,) of the unit [m]."""
 
     sequence: str
     time: float
     vehicle: str
     unit: str
-    entry: Mapping[str, Any]
+    label: str
+    offset: Array
 
 
 @dataclass(frozen=True)
@@ -168,6 +169,7 @@ def _frames(folder: Path) -> Iterator[_Frame]:
         at = f"[{row}]."
         vehicle = PurePosixPath(index.value(entry, "vehicle_pointcloud_path", (str,), at)).stem
         unit = PurePosixPath(index.value(entry, "infrastructure_pointcloud_path", (str,), at)).stem
+        label = PurePosixPath(index.value(entry, "cooperative_label_path", (str,), at)).stem
         if vehicle not in by_id:
             index.fail(f"{at}vehicle_pointcloud_path: frame {quoted(vehicle)} is not in {VEHICLE}/data_info.json")
         about = by_id[vehicle]
@@ -179,7 +181,16 @@ def _frames(folder: Path) -> Iterator[_Frame]:
         if not math.isfinite(microseconds):
             side.fail(f"pointcloud_timestamp is {quoted(stamp, 100)} (expected microseconds)")
         sequence = "".join(one if one.isalnum() else "_" for one in str(about.get("batch_id", "")))[:40]
-        yield _Frame(sequence, microseconds * 1e-6, vehicle, unit, entry)
+        yield _Frame(sequence, microseconds * 1e-6, vehicle, unit, label, _offset(index, entry, at))
+
+
+def _offset(index: _JsonFile, entry: Mapping[str, Any], at: str) -> Array:
+    """Return the correction (2,) of the position of the roadside unit [m]; 0 if the index states none."""
+    offset = entry.get("system_error_offset") or {}
+    if not isinstance(offset, dict):
+        index.fail(f"{at}system_error_offset is {quoted(offset, 100)}")
+    values = {"offset": [offset.get("delta_x", 0.0), offset.get("delta_y", 0.0)]}
+    return index.array(values, "offset", (2,), f"{at}system_error_")
 
 
 def _scene(folder: Path, name: str, frames: list[_Frame]) -> TrafficScene:
@@ -227,20 +238,12 @@ def _unit_lidar(folder: Path, frame: _Frame) -> Array:
     """Return the pose (4, 4) of the lidar of the roadside unit, with the stated correction of its position."""
     file = _JsonFile(folder / INFRASTRUCTURE / "calib" / "virtuallidar_to_world" / f"{frame.unit}.json")
     pose = file.pose(file.data)
-    offset = frame.entry.get("system_error_offset")
-    if isinstance(offset, dict):
-        for axis, key in enumerate(("delta_x", "delta_y")):
-            value = offset.get(key)
-            if isinstance(value, int | float) and abs(value) <= MAX_NUMBER:
-                pose[axis, 3] += value
+    pose[:2, 3] += frame.offset
     return pose
 
 
 def _labels(folder: Path, frame: _Frame) -> list[_Label]:
-    index = _JsonFile.__new__(_JsonFile)
-    index.path = folder / INDEX
-    named = PurePosixPath(index.value(frame.entry, "cooperative_label_path", (str,))).stem
-    file = _JsonFile(folder / "cooperative" / "label_world" / f"{named}.json")
+    file = _JsonFile(folder / "cooperative" / "label_world" / f"{frame.label}.json")
     labels = []
     for row, entry in enumerate(file.entries()):
         at = f"[{row}]."

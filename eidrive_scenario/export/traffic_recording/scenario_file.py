@@ -62,7 +62,8 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
     entities = _add(root, "Entities")
     storyboard = _add(root, "Storyboard")
     start = _add(_add(storyboard, "Init"), "Actions")
-    act = _add(_add(storyboard, "Story", name="Recording"), "Act", name="Replay")
+    story = etree.Element("Story", name="Recording")
+    act = _add(story, "Act", name="Replay")
     stations = {station.name: station for station in scene.mobile}
     for track in scene.tracks:
         actor = _actor(track)
@@ -76,8 +77,7 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
         _add_mast(entities, start, unit, lidar)
     if len(act):
         act.append(_trigger("StartTrigger", "Beginning", 0.0))
-    else:
-        storyboard.remove(act.getparent())
+        storyboard.append(story)
     storyboard.append(_trigger("StopTrigger", "End", scene.end - STEP / 5.0))
     etree.indent(root, "  ")
     text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")

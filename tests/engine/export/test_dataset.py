@@ -118,7 +118,7 @@ def test_command_prints_runs_and_warnings_once(eidrive: Eidrive, tmp_path: Path)
 
 def test_failed_runs_are_reported_and_the_others_exported(eidrive: Eidrive, tmp_path: Path) -> None:
     station = Path(__file__).parents[2] / "data" / "passing_by.xosc"
-    words = ["--sensors", LIDAR, "--time-limit", "0.1", "--jobs", "1", "--out", tmp_path]
+    words: list[str | Path] = ["--sensors", LIDAR, "--time-limit", "0.1", "--jobs", "1", "--out", tmp_path]
     result = eidrive("dataset", station, "coop/scenario_1", *words)
     assert result.exit_code == 3
     assert "failed: " in result.stderr
