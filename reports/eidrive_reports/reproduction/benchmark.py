@@ -41,7 +41,7 @@ NAME = "benchmark"
 """Name of the part."""
 RANKS, CELLS = "benchmark_ranks", "benchmark_cells"
 """Names of the tables: methods by channel, and all cells."""
-DETECTORS = ("lidar",)
+DETECTORS = ("pillars",)
 """Detectors without an option: what a vehicle can have, and what early fusion needs."""
 CELL_FOLDER = "reports/cell"
 """Folder of the results of the command of a cell, so that it replaces no other results."""

@@ -15,10 +15,10 @@ from eidrive_scenario.api.v2x import load_profile
 
 NO_COOPERATION = "none"
 """Name of the method, and of the channel, without messages."""
-METHODS = (NO_COOPERATION, "average", "covariance_intersection", "early")
+METHODS = (NO_COOPERATION, "average", "covariance_intersection", "early", "max", "attention", "where2comm")
 """Methods without an option."""
-NEEDED = {"early": "lidar"}
-"""Detector that a method needs. Other methods are run with each detector of `--detectors`."""
+SUITABLE = {"early": ("lidar", "pillars"), **dict.fromkeys(("max", "attention", "where2comm"), ("pillars",))}
+"""Detectors that a method can use. Other methods are run with each detector of `--detectors`."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Method:
 def methods_of(texts: Sequence[str], detectors: Sequence[str]) -> tuple[Method, ...]:
     """Return the methods of texts `FUSION` or `FUSION:DETECTOR`, each once.
 
-    A text without a detector stands for the one that the method needs, or for each of `detectors`.
+    A text without a detector stands for each of `detectors` that the method can use, or for the first that it can use.
     Raise SettingError for the name of an unknown method or detector.
     """
     methods: dict[Method, None] = {}
@@ -54,8 +54,9 @@ def methods_of(texts: Sequence[str], detectors: Sequence[str]) -> tuple[Method, 
         if ":" in text and detector not in registry("detectors"):
             unknown = registry("detectors").unknown(detector)
             raise SettingError(Diagnostic(f"--fusion: {unknown.message}", unknown.hint))
-        needed = [detector] if detector else [NEEDED[fusion]] if fusion in NEEDED else detectors
-        methods |= dict.fromkeys(Method(fusion, name) for name in needed)
+        suitable = SUITABLE.get(fusion, detectors)
+        used = [detector] if detector else [name for name in detectors if name in suitable] or suitable[:1]
+        methods |= dict.fromkeys(Method(fusion, name) for name in used)
     return tuple(methods)
 
 
