@@ -124,7 +124,7 @@ def test_texts_select_methods_channels_and_scenarios_once() -> None:
 def test_settings_of_all_cells_without_options_are_valid() -> None:
     part = benchmark.benchmark_part(())
     cases = part.cases(())
-    assert len(cases) == len(SCENARIOS) * (1 + 3 * len(CHANNELS))
+    assert len(cases) == len(SCENARIOS) * (1 + 6 * len(CHANNELS))
     for name in CHANNELS:
         RadioProfile.model_validate(channel_of(name).profile)
     assert settings_of(SCENARIO, Method("none", "lidar"), SILENT).channel == "none"
