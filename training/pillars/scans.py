@@ -222,8 +222,8 @@ def cast(meshes: Meshes, bodies: torch.Tensor, counts: torch.Tensor, heads: Head
     brightness = torch.where(rows == GROUND, ASPHALT * brightness, brightness)
     fade = heads.fade[:, None]
     through = torch.exp(-2.0 * fade * distance.clamp(max=1e4))
-    found = brightness * through / distance.square().clamp(min=1e-6) >= 0.1 / TEN_PERCENT_RANGE**2
-    found &= (distance < heads.reach[:, None]) & ~own & (azimuth.abs() <= heads.half_field[:, None] + 1e-6)
+    returned = brightness * through / distance.square().clamp(min=1e-6) >= 0.1 / TEN_PERCENT_RANGE**2
+    returned &= (distance < heads.reach[:, None]) & ~own & (azimuth.abs() <= heads.half_field[:, None] + 1e-6)
     intensity = (brightness * through * torch.exp(-ATTENUATION * distance.clamp(max=1e4))).clamp(0.0, 1.0)
     length = distance + RANGE_NOISE * torch.randn(shape, device=device)
     air = torch.rand(shape, device=device) < 0.6 * fade  # a few percent of the rays in dense fog
@@ -233,4 +233,4 @@ def cast(meshes: Meshes, bodies: torch.Tensor, counts: torch.Tensor, heads: Head
     rows = torch.where(air, NOTHING, rows)
     flat = torch.cos(elevation)
     directions = torch.stack([flat * torch.cos(azimuth), flat * torch.sin(azimuth), torch.sin(elevation)], dim=2)
-    return Scans(directions * length[..., None], found | (air & ~own), intensity, rows)
+    return Scans(directions * length[..., None], returned | (air & ~own), intensity, rows)

@@ -210,7 +210,7 @@ def average_precision(entries: list[tuple[float, bool]], objects: int) -> float:
 def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, batches: int = 12) -> dict[str, float]:
     """Return the average precision by distance of centers below 1 m, on scenes that training does not see."""
     maker = SceneMaker(Assets.load(arguments.assets))
-    found: dict[str, list[tuple[float, bool]]] = {}
+    detections: dict[str, list[tuple[float, bool]]] = {}
     objects: dict[str, int] = {}
     for number in range(batches):
         batch = sampler.batch(maker.batch((TEST_SEED, number), arguments.scenes))
@@ -244,8 +244,8 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
                     best = int(near.argmin())
                     hit = bool(near[best] < 1.0)
                     open_rows[best] &= not hit
-                    found.setdefault(name, []).append((float(scores[row, rank]), hit))
-    return {name: round(average_precision(found.get(name, []), objects[name]), 4) for name in objects}
+                    detections.setdefault(name, []).append((float(scores[row, rank]), hit))
+    return {name: round(average_precision(detections.get(name, []), objects[name]), 4) for name in objects}
 
 
 @torch.no_grad()

@@ -52,12 +52,12 @@ class RunMessages:
                 yield self._message(time, "WARNING", name, describe_expired(step.inbox[row].message))
         for name, plan in self._decisions.new(frame):
             yield self._message(time, "INFO" if plan.braking is None else "WARNING", name, plan.reason)
-        due = [one for one in self._violations if (one.first_violation or 0.0) <= time + TIME_TOLERANCE]
+        due = [verdict for verdict in self._violations if (verdict.first_violation or 0.0) <= time + TIME_TOLERANCE]
         for verdict in due:
             level = "INFO" if verdict.passed else "ERROR"
             lines = (f"{verdict.name}: violated; {verdict.reason}", *verdict.violation_state)
             yield self._message(time, level, "criterion", "\n".join(lines))
-        self._violations = [one for one in self._violations if one not in due]
+        self._violations = [verdict for verdict in self._violations if verdict not in due]
 
     def of_links(self, events: Sequence[LinkEvent], time: float) -> Iterator[Any]:
         """Yield the outcomes of messages between stations."""

@@ -125,7 +125,7 @@ def _values(point: Point) -> Iterator[str]:
 
 
 def _plain(sensors: Sensors | None) -> dict[str, Any] | None:
-    return None if sensors is None else {name: one.model_dump(mode="json") for name, one in sensors.items()}
+    return None if sensors is None else {name: sensor.model_dump(mode="json") for name, sensor in sensors.items()}
 
 
 def export_dataset(

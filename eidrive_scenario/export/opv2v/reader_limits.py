@@ -52,25 +52,25 @@ class ReaderLimits:
 
     def warnings(self) -> list[str]:
         """Return the limits that are exceeded."""
-        found = []
+        messages = []
         if len(self._nearest) > MAX_STATIONS:
-            found.append(f"OpenCOOD uses {MAX_STATIONS} of {len(self._nearest)} stations (train_params.max_cav)")
+            messages.append(f"OpenCOOD uses {MAX_STATIONS} of {len(self._nearest)} stations (train_params.max_cav)")
         for name, distance in self._nearest.items():
             if distance > COMMUNICATION_RANGE:
-                found.append(
+                messages.append(
                     f"OpenCOOD never uses station {name!r}: its lidar is at least {distance:.0f} m from that of "
                     f"{self._ego!r} (COM_RANGE {COMMUNICATION_RANGE:g} m)"
                 )
         low, high = TRUTH_RANGE[:, 2]
         for name, objects in self._too_high.items():
             kind = "the truth" if name == self._ego else "the truth of late fusion"
-            found.append(
+            messages.append(
                 f"OpenCOOD omits {', '.join(map(repr, objects))} from {kind} of some frames: the box leaves "
                 f"z = {low:g} to {high:g} m of the lidar of {name!r}"
             )
         if self._most_objects > MAX_OBJECTS:
-            found.append(f"OpenCOOD fails: a frame has {self._most_objects} true objects (postprocess.max_num)")
-        return found
+            messages.append(f"OpenCOOD fails: a frame has {self._most_objects} true objects (postprocess.max_num)")
+        return messages
 
 
 def _is_too_high(pose: Array, corners: Array) -> bool:

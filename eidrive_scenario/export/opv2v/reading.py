@@ -43,14 +43,14 @@ def scenario_folders(folder: Path) -> list[Path]:
 
 def _stations(folder: Path) -> list[Path]:
     """Return the folders of the stations of a scenario, ordered by id."""
-    found = [path for path in folder.iterdir() if path.is_dir() and _STATION.fullmatch(path.name) and _frames(path)]
-    return sorted(found, key=lambda path: int(path.name))
+    stations = [path for path in folder.iterdir() if path.is_dir() and _STATION.fullmatch(path.name) and _frames(path)]
+    return sorted(stations, key=lambda path: int(path.name))
 
 
 def _frames(station: Path) -> dict[int, Path]:
     """Return the files of the frames of a station by number."""
-    named = [(found, path) for path in station.iterdir() if (found := _FRAME.fullmatch(path.name))]
-    return {int(found[1]): path for found, path in sorted(named, key=lambda one: int(one[0][1]))}
+    numbered = {int(match[1]): path for path in station.iterdir() if (match := _FRAME.fullmatch(path.name))}
+    return dict(sorted(numbered.items()))
 
 
 class _FrameFile:
@@ -82,11 +82,11 @@ class _FrameFile:
             self.fail(within, f"{path} is missing")
         value: Any = owner[key]
         is_list = isinstance(value, list) and len(value) == count
-        if not is_list or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in value):
+        if not is_list or not all(isinstance(number, int | float) and not isinstance(number, bool) for number in value):
             self.fail(path, f"{path} is {quoted(value, 100)} (expected {count} numbers)")
-        if not all(math.isfinite(one) and abs(one) <= MAX_NUMBER for one in value):
+        if not all(math.isfinite(number) and abs(number) <= MAX_NUMBER for number in value):
             self.fail(path, f"{path} has a number that is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})")
-        return tuple(float(one) for one in value)
+        return tuple(float(number) for number in value)
 
     def size(self, owner: Mapping[Any, Any], key: str, within: str = "") -> tuple[float, float, float]:
         """Return length, width and height from half of them."""

@@ -142,7 +142,9 @@ class Opv2vWriter:
             return {name: settings.model_copy(update={"rate": None}) for name, settings in self._sensors.items()}
         own = station_sensors(self._stack.settings[station])
         cameras = {
-            name: one.model_copy(update={"rate": None}) for name, one in own.items() if isinstance(one, CameraSettings)
+            name: sensor.model_copy(update={"rate": None})
+            for name, sensor in own.items()
+            if isinstance(sensor, CameraSettings)
         }
         return {LIDAR if LIDAR not in cameras else f"{LIDAR} of the dataset": OPV2V_LIDAR, **cameras}
 

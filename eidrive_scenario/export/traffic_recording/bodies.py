@@ -26,15 +26,15 @@ class Body:
 @cache
 def _entries() -> tuple[tuple[etree._Element, tuple[float, float, float]], ...]:
     """Return the vehicles and pedestrians of the library with their sizes [m]."""
-    found = []
+    bodies = []
     for name in ("vehicles", "pedestrians"):
         root = etree.parse(library_path() / CATALOGS / f"{name}{SCENARIO_SUFFIX}").getroot()
         for element in root.iter("Vehicle", "Pedestrian"):
             box = element.find("BoundingBox/Dimensions")
             assert box is not None
             length, width, height = (float(box.get(key, "0")) for key in ("length", "width", "height"))
-            found.append((element, (length, width, height)))
-    return tuple(found)
+            bodies.append((element, (length, width, height)))
+    return tuple(bodies)
 
 
 def body_of(category: str, size: tuple[float, float, float]) -> Body:

@@ -83,12 +83,12 @@ class _JsonFile:
         """Return a list of numbers, which may be nested, as an array."""
         value = self.value(owner, key, (list,), path)
         try:
-            found = np.array(value, dtype=float).reshape(shape)
+            numbers = np.array(value, dtype=float).reshape(shape)
         except (TypeError, ValueError):
             self.fail(f"{path}{key} is {quoted(value, 100)} (expected {math.prod(shape)} numbers)")
-        if not (np.abs(found) <= MAX_NUMBER).all():
+        if not (np.abs(numbers) <= MAX_NUMBER).all():
             self.fail(f"{path}{key} has a number that is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})")
-        return found
+        return numbers
 
     def pose(self, owner: Any, path: str = "") -> Array:
         """Return the pose (4, 4) of a rotation and a translation."""
@@ -156,7 +156,7 @@ def read_scenes(folder: Path) -> Iterator[TrafficScene]:
     for frame in _frames(folder):
         sequences.setdefault(frame.sequence, []).append(frame)
     for name, frames in sorted(sequences.items()):
-        yield _scene(folder, f"sequence_{name}" if name else folder.name, sorted(frames, key=lambda one: one.time))
+        yield _scene(folder, f"sequence_{name}" if name else folder.name, sorted(frames, key=lambda frame: frame.time))
 
 
 def _frames(folder: Path) -> Iterator[_Frame]:
@@ -180,7 +180,7 @@ def _frames(folder: Path) -> Iterator[_Frame]:
             microseconds = math.nan
         if not math.isfinite(microseconds):
             side.fail(f"pointcloud_timestamp is {quoted(stamp, 100)} (expected microseconds)")
-        sequence = "".join(one if one.isalnum() else "_" for one in str(about.get("batch_id", "")))[:40]
+        sequence = "".join(letter if letter.isalnum() else "_" for letter in str(about.get("batch_id", "")))[:40]
         yield _Frame(sequence, microseconds * 1e-6, vehicle, unit, label, _offset(index, entry, at))
 
 
@@ -212,10 +212,10 @@ def _scene(folder: Path, name: str, frames: list[_Frame]) -> TrafficScene:
         labels = _labels(folder, frame)
         inside = [label for label in labels if _contains(label, lidars[-1][:2, 3])]
         own.append(inside[0] if inside else None)
-        others = [label for label in labels if not any(label is one for one in inside[:1])]
+        others = [label for label in labels if not any(label is other for other in inside[:1])]
         ended = [track for track in open_tracks if time - track.times[-1] > MAX_GAP]
         done += ended
-        open_tracks = [track for track in open_tracks if not any(track is one for one in ended)]
+        open_tracks = [track for track in open_tracks if not any(track is other for other in ended)]
         open_tracks += _continue(open_tracks, others, time)
     tracks = [_station_track(times, lidars, own)]
     tracks += [_track(number, track) for number, track in enumerate([*done, *open_tracks], 1)]
@@ -291,14 +291,14 @@ def _continue(tracks: list[_OpenTrack], labels: list[_Label], time: float) -> li
             free.append(label)
     for category in dict.fromkeys(label.category for label in free):
         same = [track for track in tracks if track.category == category and not track.identity]
-        found = [label for label in free if label.category == category]
+        of_category = [label for label in free if label.category == category]
         predicted = np.array([track.predict(time) for track in same]).reshape(-1, 2)
-        pairs = associate(predicted, np.array([label.pose[:2, 3] for label in found]), GATE)
+        pairs = associate(predicted, np.array([label.pose[:2, 3] for label in of_category]), GATE)
         for row, column in pairs:
-            same[row].add(time, found[column])
+            same[row].add(time, of_category[column])
         continued = {column for _, column in pairs}
         started += [
-            _OpenTrack(category, "", [time], [label]) for row, label in enumerate(found) if row not in continued
+            _OpenTrack(category, "", [time], [label]) for row, label in enumerate(of_category) if row not in continued
         ]
     return started
 

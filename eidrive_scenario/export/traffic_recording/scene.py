@@ -75,8 +75,11 @@ def at_ground(scene: TrafficScene) -> TrafficScene:
     tracks, roadside = scene.tracks, scene.roadside
     if abs(ground) > GROUND_TOLERANCE:
         warnings.append(f"all heights are reduced by {ground:.3f} m: the ground without roads is at the height 0")
-        tracks = [Track(one.name, one.category, one.size, one.times, _lowered(one.poses, ground)) for one in tracks]
-        roadside = [RoadsideStation(one.name, _lowered(one.lidar, ground)) for one in roadside]
+        tracks = [
+            Track(track.name, track.category, track.size, track.times, _lowered(track.poses, ground))
+            for track in tracks
+        ]
+        roadside = [RoadsideStation(station.name, _lowered(station.lidar, ground)) for station in roadside]
         top -= ground
     if top > GROUND_TOLERANCE:
         warnings.append(f"the ground is a plane without roads: road users are up to {top:.2f} m above it")
