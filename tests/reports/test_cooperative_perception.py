@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from eidrive_reports.cooperative_perception.receivers import Condition, moved
+from eidrive_reports.cooperative_perception.receivers import Condition, moved, moved_map
 from eidrive_reports.cooperative_perception.scores import (
     RANGES,
     PerceptionRecord,
@@ -21,6 +21,8 @@ from lxml import etree
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.feature_map import FeatureMap
+from eidrive_scenario.fusion.feature_warp import Grid
 from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
@@ -52,15 +54,17 @@ def record(*frames: tuple[Detections, Truth]) -> PerceptionRecord:
     truths = [objects for _, objects in frames]
     places = np.concatenate([objects.place[objects.counted] for objects in truths])
     hit = np.concatenate([objects.place[objects.counted & objects.hit] for objects in truths])
+    hidden_places = np.concatenate([objects.place[objects.counted & objects.hidden] for objects in truths])
     tally = Tally(
         b"".join(scores.astype("<u2").tobytes() for scores, _, _ in samples),
         b"".join(codes.astype("<u2").tobytes() for _, codes, _ in samples),
-        tuple(int(count) for count in np.sum([hidden for _, _, hidden in samples], axis=0)),
+        tuple(map(tuple, np.sum([hidden for _, _, hidden in samples], axis=0).tolist())),
         0.5,
     )
-    counts, hits = (tuple(int(one) for one in np.bincount(group, minlength=len(RANGES))) for group in (places, hit))
-    hidden = sum(int(objects.hidden.sum()) for objects in truths)
-    return PerceptionRecord(len(frames), counts, hits, hidden, {NAME: tally})
+    counts, hits, unseen = (
+        tuple(int(one) for one in np.bincount(group, minlength=len(RANGES))) for group in (places, hit, hidden_places)
+    )
+    return PerceptionRecord(len(frames), counts, hits, unseen, {NAME: tally})
 
 
 def precision(*frames: tuple[Detections, Truth]) -> list[float]:
@@ -109,6 +113,18 @@ def test_objects_and_detections_beyond_the_last_range_are_ignored() -> None:
     pool = Pool([record((far, truth((10.0, 0.0, 0.0), (100.2, 0.0, 0.0))))], NAME)
     assert pool.precision(1).value == 1.0
     assert pool.precision(1).objects == 1
+
+
+def test_farther_range_classes_are_ignored() -> None:
+    """Within 50 m one of two objects is found, and the wrong detection there has the higher score."""
+    near, far = (10.0, 0.0, 0.0), (60.0, 0.0, 0.0)
+    found = detected([near, far, (0.0, 40.0, 0.0), (0.0, 70.0, 0.0)], [0.5, 0.6, 0.9, 0.95])
+    records = [record((found, truth(near, far, (20.0, 0.0, 0.0), hidden=True)))]
+    within = Pool(records, NAME, 2)
+    assert (within.precision(1).value, within.precision(1).objects) == (0.25, 2)
+    assert within.precision_of_hit_objects().value == 0.25
+    assert (within.hidden_recall(1).found, within.hidden_recall(1).objects) == (1, 2)
+    assert (Pool(records, NAME).hidden_recall(1).found, Pool(records, NAME).hidden_recall(1).objects) == (2, 3)
 
 
 def test_second_truth_contains_hit_objects_only() -> None:
@@ -180,6 +196,19 @@ def test_moved_detections_keep_their_place_relative_to_the_station() -> None:
     assert moved(there, after, before).boxes == pytest.approx(found.boxes)
 
 
+def test_moved_features_keep_their_objects_in_the_same_cells() -> None:
+    before = EgoState(0.0, np.array([2.0, 1.0, 0.0]), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+    after = EgoState(0.0, np.array([2.5, 0.5, 0.0]), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
+    none = np.zeros((1, 4, 4), np.float32)
+    features = FeatureMap(0.0, 2.4, 0.8, 0.0, 1.9, 0.0, 0.8, none, none, none[0])
+    objects = detected([(12.0, 3.0, 0.4)], [0.9])
+    there = moved_map(features, before, after)
+    first, second = (Grid(one.x, one.y, one.yaw, one.cell, (4, 4)) for one in (features, there))
+    places = second.to_places(moved(objects, before, after).boxes[:, :2])
+    assert places == pytest.approx(first.to_places(objects.boxes[:, :2]))
+    assert (there.x, there.y, there.yaw) != (features.x, features.y, features.yaw)
+
+
 def test_pose_error_lowers_the_precision_at_the_larger_overlap_first() -> None:
     """Fifty cars, all reported by a station with a pose error. Below a shift of 0.2 m all overlaps are above 0.7."""
     places = [(10.0 * number % 80, 5.0 * (number // 8), 0.3 * number) for number in range(50)]
@@ -233,8 +262,8 @@ def test_no_fusion_is_equal_under_all_faults(trial: PerceptionRecord) -> None:
 
 def test_messages_find_objects_hidden_to_the_ego(trial: PerceptionRecord) -> None:
     assert trial.frames == 1
-    assert trial.hidden > 0
-    found = {arm: trial.tallies[Condition(arm).name].hidden[0] for arm in ("none", "average", "early")}
+    assert sum(trial.hidden) > 0
+    found = {arm: sum(trial.tallies[Condition(arm).name].hidden[0]) for arm in ("none", "average", "early")}
     assert found["none"] == 0
     assert min(found["average"], found["early"]) > 0
 
@@ -245,3 +274,47 @@ def test_points_need_more_bytes_than_boxes_and_no_fusion_none(trial: PerceptionR
     assert volume["early"] > 10.0 * volume["average"] > 0.0
     lossy = trial.tallies[Condition("early", loss=0.5).name]
     assert lossy.megabytes_per_second == pytest.approx(volume["early"]), "lost messages are transmitted, too"
+
+
+@pytest.fixture(scope="module")
+def learned_trial() -> PerceptionRecord:
+    """Two frames of scenario 4 with detections and features of the network."""
+    arms = [Condition(arm) for arm in ("none", "covariance_intersection", "attention", "attention, codes")]
+    arms += [Condition("where2comm"), Condition("where2comm", loss=0.5)]
+    arms += [Condition("none, filtered"), Condition("attention", loss=1.0)]
+    arms += [Condition("none, filtered", deviation=0.4), Condition("attention", deviation=0.4, loss=1.0)]
+    settings = RunSettings(detector="pillars", time_limit=1.5)
+    return run_trial("coop/scenario_4", 1, settings, "Ego", arms)[1]
+
+
+def test_features_find_objects_hidden_to_the_ego(learned_trial: PerceptionRecord) -> None:
+    tallies = learned_trial.tallies
+    assert sum(tallies[Condition("none").name].hidden[0]) == 0
+    assert sum(tallies[Condition("attention").name].hidden[0]) > 0
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.4])
+def test_own_features_show_the_own_detections(learned_trial: PerceptionRecord, deviation: float) -> None:
+    """Without received messages, objects in the features of the ego are its own detections, also with a pose error."""
+    alone = learned_trial.tallies[Condition("none, filtered", deviation=deviation).name]
+    lost = learned_trial.tallies[Condition("attention", deviation=deviation, loss=1.0).name]
+    assert len(alone.scores) > 0
+    assert (lost.scores, lost.codes, lost.hidden) == (alone.scores, alone.codes, alone.hidden)
+
+
+def test_features_need_the_bytes_of_their_frames_beside_those_of_boxes(learned_trial: PerceptionRecord) -> None:
+    """Three senders, scans at 0, 0.1, ... 1.5 s. A map has 16,384 cells of 10 or 3 bytes and a header of 62 bytes per
+    frame of 133 or 446 cells; 1 % are 164 cells in two frames."""
+    tallies = learned_trial.tallies
+
+    def volume(arm: str, loss: float = 0.0) -> float:
+        return tallies[Condition(arm, loss=loss).name].megabytes_per_second
+
+    boxes = volume("covariance_intersection")
+    for arm, size in (
+        ("attention", 163_840 + 124 * 62),
+        ("attention, codes", 49_152 + 37 * 62),
+        ("where2comm", 1_640 + 2 * 62),
+    ):
+        assert volume(arm) - boxes == pytest.approx(3 * 16 * size / 1.5e6, rel=0.05)
+    assert volume("where2comm", loss=0.5) == pytest.approx(volume("where2comm")), "lost frames are transmitted, too"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from eidrive_reports.cooperative_perception.receivers import ARMS, AXES, COMPARED, all_conditions
+from eidrive_reports.cooperative_perception.receivers import ARMS, AXES, Study
 from eidrive_reports.cooperative_perception.scores import PerceptionRecord, Tally
-from eidrive_reports.reproduction import perception, pose_errors
+from eidrive_reports.reproduction import learned, perception, pose_errors
 from eidrive_reports.reproduction.episodes import Episode
 from eidrive_reports.reproduction.figures import draw
 from eidrive_reports.reproduction.layout import Row
@@ -24,16 +24,19 @@ CORRECT = 0b11_001_001_001
 def tally(found: int, size: float) -> Tally:
     """Return this number of correct detections, and hidden objects of which half are found."""
     scores, codes = np.full(found, 60_000, dtype="<u2"), np.full(found, CORRECT, dtype="<u2")
-    return Tally(scores.tobytes(), codes.tobytes(), (2, 2, 1), size)
+    return Tally(scores.tobytes(), codes.tobytes(), ((2, 0, 0), (2, 0, 0), (1, 0, 0)), size)
 
 
-def episodes() -> list[Episode]:
-    """Return two runs with ten objects: seven found with messages, four without."""
+def episodes(study: Study) -> list[Episode]:
+    """Return two runs with ten objects: eight found with features, seven with other messages, four without."""
     tallies = {
-        one.name: tally(7 if ARMS[one.arm].cooperates else 4, {"early": 0.5, "none": 0.0}.get(one.arm, 0.01))
-        for one in all_conditions()
+        one.name: tally(
+            8 if ARMS[one.arm].shares == "features" else 7 if ARMS[one.arm].cooperates else 4,
+            {"early": 0.5, "none": 0.0}.get(one.arm, 0.01),
+        )
+        for one in study.conditions
     }
-    measured = PerceptionRecord(5, (10, 0, 0), (9, 0, 0), 4, tallies)
+    measured = PerceptionRecord(5, (10, 0, 20), (9, 0, 0), (4, 0, 0), tallies)
     return [
         Episode(scene, "lidar", seed, "0" * 16, "", 8.0, 40.0, {}, perception=measured)
         for scene in perception.SCENES
@@ -43,11 +46,11 @@ def episodes() -> list[Episode]:
 
 @pytest.mark.statistical
 def test_report_states_precision_recall_and_volume(tmp_path: Path) -> None:
-    report = perception.report(episodes(), perception.DETECTORS)
+    report = perception.report(episodes(perception.STUDY), perception.DETECTORS)
     data = report.data()
     arms = {str(row["arm"]): row for row in data["perception_arms"]}
     assert {name: row["ap_50"] for name, row in arms.items()} == pytest.approx(
-        {name: 0.7 if arm.cooperates else 0.4 for name, arm in ARMS.items()}
+        {name: 7 / 30 if ARMS[name].cooperates else 4 / 30 for name in perception.STUDY.arms}
     )
     assert arms["none"]["ap_50_hit"] == pytest.approx(4 / 9)
     assert arms["none"]["ap_50_range_1"] is None, "no object in this range"
@@ -55,25 +58,55 @@ def test_report_states_precision_recall_and_volume(tmp_path: Path) -> None:
     text = report.markdown()
     assert "Points need 50 times the bytes of boxes (0.500 and 0.010 MB/s over all links)" in text
     assert "4 scenes of the library with 2 seeds each" in text
-    assert "40 frames with 80 objects. The lidar of any station hits 72 of them; 32 are hidden" in text
+    assert "40 frames with 240 objects. The lidar of any station hits 72 of them; 32 are hidden" in text
     path = draw("perception", report, tmp_path)
     assert path is not None
     assert path.stat().st_size > 10_000
 
 
-def test_conditions_are_part_of_the_digest() -> None:
-    conditions = all_conditions()
+def test_report_on_learned_fusion_states_gains_within_the_range_of_features(tmp_path: Path) -> None:
+    """Objects beyond 50 m do not count: 8 of 10 are found with features, and 7 with boxes."""
+    report = learned.report(episodes(learned.STUDY), learned.DETECTORS)
+    data = report.data()
+    arms = {str(row["arm"]): row["ap_70"] for row in data["learned_arms"]}
+    assert arms.keys() == ARMS.keys()
+    assert (arms["none"], arms["covariance_intersection"], arms["attention"]) == pytest.approx((0.4, 0.7, 0.8))
+    gains = data["learned_gains"]
+    assert {(row["over"], round(float(row["gain_70"] or 0.0), 9)) for row in gains} == {
+        ("covariance_intersection", 0.1),
+        ("average", 0.1),
+    }
+    assert all(row["low_70"] == pytest.approx(0.1) for row in gains), "equal runs have no spread"
+    text = report.markdown()
+    assert "The expected gain of +0.03 is reached by attention, where2comm." in text
+    assert "40 frames with 80 objects, of which the lidar of any station hits 72 and 32 are hidden" in text
+    path = draw("learned", report, tmp_path)
+    assert path is not None
+    assert path.stat().st_size > 10_000
+
+
+def test_learned_fusion_uses_scenes_and_faults_of_the_part_perception() -> None:
+    cases = learned.cases(learned.DETECTORS)
+    assert [case.scenario for case in cases] == list(perception.SCENES)
+    assert {case.settings.detector for case in cases} == {"pillars"}
+    assert set(learned.STUDY.axes) < set(perception.STUDY.axes)
+
+
+@pytest.mark.parametrize("study", [perception.STUDY, learned.STUDY], ids=lambda study: study.name)
+def test_conditions_are_part_of_the_digest(study: Study) -> None:
+    conditions = study.conditions
     settings = RunSettings(detector="lidar")
     digests = {job_digest("coop/scenario_4", settings, conditions=conditions[:count]) for count in (0, 1, 2)}
     assert len(digests) == 3
     assert len({one.name for one in conditions}) == len(conditions)
 
 
-def curves(arms: dict[str, list[float]], *, steeper: float) -> list[Row]:
+def curves(study: Study, arms: dict[str, list[float]], *, steeper: float) -> list[Row]:
     """Return curves that are equal on all axes; at 0.7 they lose `steeper` times as much as at 0.5."""
     rows: list[Row] = []
-    for axis, (_, _, values) in AXES.items():
-        for arm in COMPARED:
+    for axis in study.axes:
+        values = AXES[axis][2]
+        for arm in study.compared:
             course = np.interp(values, np.linspace(0.0, max(values), len(arms[arm])), arms[arm])
             for overlap, factor in ((0.3, 1.0), (0.5, 1.0), (0.7, steeper)):
                 for value, precision in zip(values, course.tolist(), strict=True):
@@ -82,10 +115,21 @@ def curves(arms: dict[str, list[float]], *, steeper: float) -> list[Row]:
     return rows
 
 
+def volume(arm: str, size: float, ap: float, share: float | None = None) -> Row:
+    encoding = None if share is None else "int8"
+    fields = {"cell": None, "share": share, "encoding": encoding, "megabytes_per_second": size, "ap_50": ap}
+    return {"arm": arm, **fields}
+
+
 VOLUMES: list[Row] = [
-    {"arm": arm, "cell": None, "megabytes_per_second": size, "ap_50": ap}
+    volume(arm, size, ap)
     for arm in ("average", "covariance_intersection", "early")
     for size, ap in ((1.0, 0.7), (0.5, 0.68), (0.2, 0.5))
+]
+MASKS: list[Row] = [
+    volume("attention", 1.7, 0.72, 1.0),
+    volume("where2comm, 5 %", 0.09, 0.71, 0.05),
+    volume("where2comm, 0.1 %", 0.01, 0.62, 0.001),
 ]
 PUBLISHED = {
     "none": [0.4, 0.4],
@@ -93,6 +137,8 @@ PUBLISHED = {
     "covariance_intersection": [0.65, 0.3, 0.2],
     "covariance_intersection, aligned": [0.65, 0.5, 0.3],
     "early": [0.7, 0.3, 0.2],
+    "attention": [0.72, 0.71, 0.7],
+    "where2comm": [0.71, 0.7, 0.69],
 }
 """Curves with the shapes of the literature."""
 
@@ -101,8 +147,9 @@ def holding(found: tuple[Row, ...]) -> list[bool]:
     return [row["holds"] == "yes" for row in found]
 
 
-def test_all_shapes_hold_for_curves_of_the_literature() -> None:
-    assert all(holding(shapes(curves(PUBLISHED, steeper=1.5), VOLUMES)))
+@pytest.mark.parametrize("study", [perception.STUDY, learned.STUDY], ids=lambda study: study.name)
+def test_all_shapes_hold_for_curves_of_the_literature(study: Study) -> None:
+    assert all(holding(shapes(study, curves(study, PUBLISHED, steeper=1.5), VOLUMES + MASKS)))
 
 
 @pytest.mark.parametrize(
@@ -114,11 +161,23 @@ def test_all_shapes_hold_for_curves_of_the_literature() -> None:
         ({"covariance_intersection, aligned": [0.65, 0.2, 0.2]}, 1.5, "aligned poses are at least as good"),
         ({"early": [0.5, 0.3, 0.2]}, 1.5, "no fusion < late (average) < early"),
         ({"average": [0.6, 0.6, 0.59]}, 1.5, "of whole messages is not mild"),
+        ({"attention": [0.72, 0.6, 0.5]}, 1.5, "of the frames of features is mild"),
+        ({"where2comm": [0.64, 0.64, 0.64]}, 1.5, "late (covariance_intersection) < intermediate"),
+        ({"attention": [0.64, 0.64, 0.64]}, 1.5, "intermediate is not below early"),
     ],
 )
 def test_shape_does_not_hold_for_other_curves(changes: dict[str, list[float]], steeper: float, broken: str) -> None:
-    found = shapes(curves({**PUBLISHED, **changes}, steeper=steeper), VOLUMES)
+    study = learned.STUDY
+    found = shapes(study, curves(study, {**PUBLISHED, **changes}, steeper=steeper), VOLUMES + MASKS)
     assert any(broken in str(row["shape"]) and row["holds"] == "no" for row in found)
+
+
+def test_shapes_over_the_share_of_the_cells() -> None:
+    """A loss of 0.06 at 5 % is no plateau; without a loss at 0.1 % the curve does not fall."""
+    study = learned.STUDY
+    masks = [volume("attention", 1.7, 0.72, 1.0), volume("a", 0.1, 0.66, 0.05), volume("b", 0.01, 0.66, 0.001)]
+    found = shapes(study, curves(study, PUBLISHED, steeper=1.5), VOLUMES + masks)
+    assert [row["holds"] for row in found if "of the cells" in str(row["shape"])] == ["no", "no"]
 
 
 def test_crossing_is_interpolated() -> None:

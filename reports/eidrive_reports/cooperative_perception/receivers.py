@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.api.common import ActorSpec, Array, wrap_angle
 from eidrive_scenario.api.driving import Agent, AgentSettings, Detections, EgoState, StackContext, build_agent
-from eidrive_scenario.api.perception import Detector, PoseNoise, Readings
+from eidrive_scenario.api.perception import Detector, FeatureMap, PoseNoise, Readings
 from eidrive_scenario.api.v2x import Message, build_channel, load_profile
 
 SCAN_RATE = 10.0
@@ -32,26 +32,40 @@ class Arm:
 
     fusion       fusion method; `settings` are its settings
     cooperates   whether it receives messages
-    points       whether messages contain points
+    shares       content of the messages in addition to boxes
     """
 
     fusion: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     cooperates: bool = True
-    points: bool = False
+    shares: Literal["points", "features"] | None = None
 
 
 _FILTERED = {"existence": LEAST_EXISTENCE}
+
+
+def _intermediate(fusion: str, share: float, encoding: str = "int8") -> Arm:
+    """Return an arm whose senders send a share of the cells of their features."""
+    return Arm(fusion, {**_FILTERED, "share": share, "encoding": encoding}, shares="features")
+
+
 ARMS: Mapping[str, Arm] = {
     "none": Arm("average", cooperates=False),
     "none, filtered": Arm("covariance_intersection", _FILTERED, cooperates=False),
     "average": Arm("average"),
     "covariance_intersection": Arm("covariance_intersection", _FILTERED),
-    "covariance_intersection, aligned": Arm("covariance_intersection", {**_FILTERED, "align_poses": True}),
-    "early": Arm("early", {**_FILTERED, "max_age": ONE_SCAN}, points=True),
+    "early": Arm("early", {**_FILTERED, "max_age": ONE_SCAN}, shares="points"),
+    "max": _intermediate("max", 1.0),
+    "attention": _intermediate("attention", 1.0),
+    "attention, codes": _intermediate("attention", 1.0, "codes"),
+    "where2comm, 10 %": _intermediate("where2comm", 0.1),
+    "where2comm, 5 %": _intermediate("where2comm", 0.05),
+    "where2comm": _intermediate("where2comm", 0.01),
+    "where2comm, codes": _intermediate("where2comm", 0.01, "codes"),
+    "where2comm, 0.1 %": _intermediate("where2comm", 0.001),
 }
-"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only; `aligned`
-corrects the poses of senders by shared objects."""
+"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only. Without a
+share in its name, `where2comm` sends 1 % of the cells and other intermediate fusion sends all."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +95,13 @@ class Condition:
         return "; ".join([self.arm, *parts, f"every {self.every}", f"cell {self.cell:g}"])
 
     @property
-    def senders(self) -> tuple[PoseNoise | None, float]:
-        """Settings of the senders: pose error and grid of points. Conditions with equal ones have the same messages."""
-        return self.pose_noise, self.cell
+    def senders(self) -> tuple[PoseNoise | None, str, tuple[tuple[str, Any], ...]]:
+        """Pose error, fusion method and its settings of the senders. Conditions with equal ones have the same messages,
+        of which those for boxes only lack the points."""
+        arm = ARMS[self.arm]
+        if arm.shares == "features":
+            return self.pose_noise, "attention", tuple((name, arm.settings[name]) for name in ("share", "encoding"))
+        return self.pose_noise, "early", (("cell", self.cell),)
 
     @property
     def pose_noise(self) -> PoseNoise | None:
@@ -107,11 +125,7 @@ AXES: Mapping[str, tuple[str, Mapping[str, float], tuple[float, ...]]] = {
     "loss": ("loss", {}, (0.0, 0.3, 0.6, 0.9)),
 }
 """Axes of the curves: varied field, other fields, and values. The value 0 is the condition without faults."""
-COMPARED = ("none", "average", "covariance_intersection", "covariance_intersection, aligned", "early")
-"""Arms of the curves."""
 SCANS_PER_MESSAGE = (1, 2, 5)
-CELLS = (0.2,)
-"""Grids of points in addition to that of the other conditions [m]."""
 
 
 def on_axis(arm: str, axis: str, value: float) -> Condition:
@@ -120,19 +134,35 @@ def on_axis(arm: str, axis: str, value: float) -> Condition:
     return Condition(arm, **{varied: value, **(others if value else {})})  # type: ignore[arg-type]
 
 
-def by_volume() -> list[Condition]:
-    """Return the conditions with fewer messages, or fewer points."""
-    sending = [arm for arm in COMPARED if ARMS[arm].cooperates]
-    found = [Condition(arm, every=every) for arm in sending for every in SCANS_PER_MESSAGE]
-    return found + [Condition(arm, cell=cell) for arm in sending if ARMS[arm].points for cell in CELLS]
+def fewer_messages(arms: Sequence[str]) -> list[Condition]:
+    """Return the conditions of arms with messages of every scan, and of fewer scans."""
+    return [Condition(arm, every=every) for arm in arms for every in SCANS_PER_MESSAGE]
 
 
-def all_conditions() -> tuple[Condition, ...]:
-    """Return all conditions, each once."""
-    curves = [
-        on_axis(arm, axis, value) for axis, (_, _, values) in AXES.items() for arm in COMPARED for value in values
-    ]
-    return tuple(dict.fromkeys([*(Condition(arm) for arm in ARMS), *curves, *by_volume()]))
+@dataclass(frozen=True)
+class Study:
+    """Conditions of one part of the reproduction.
+
+    name      of the part and of its tables
+    arms      arms without faults
+    compared  arms of the curves
+    axes      axes of the curves
+    volumes   conditions of the table of precision and volume, in addition to the first arm
+    reach     number of range classes whose objects and detections count, see RANGES of `scores`
+    """
+
+    name: str
+    arms: tuple[str, ...]
+    compared: tuple[str, ...]
+    axes: tuple[str, ...]
+    volumes: tuple[Condition, ...]
+    reach: int
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All conditions, each once."""
+        curves = [on_axis(arm, axis, value) for axis in self.axes for arm in self.compared for value in AXES[axis][2]]
+        return tuple(dict.fromkeys([*(Condition(arm) for arm in self.arms), *curves, *self.volumes]))
 
 
 WAIT = 0.001
@@ -151,20 +181,54 @@ def moved(found: Detections, before: EgoState, after: EgoState) -> Detections:
     return replace(found, boxes=boxes, velocity=found.velocity @ rotation.T, covariance=covariance)
 
 
+def moved_map(features: FeatureMap, before: EgoState, after: EgoState) -> FeatureMap:
+    """Return features of a station at pose `before` as it sends them from pose `after`: the grid moves as boxes do."""
+    turn = after.yaw - before.yaw
+    dx, dy = features.x - before.position[0], features.y - before.position[1]
+    return replace(
+        features,
+        x=float(np.cos(turn) * dx - np.sin(turn) * dy + after.position[0]),
+        y=float(np.sin(turn) * dx + np.cos(turn) * dy + after.position[1]),
+        yaw=features.yaw + turn,
+    )
+
+
 class KnownDetections(Detector):
-    """Detections of a station that were computed for its true pose. All receivers of a run share them."""
+    """Detections and features of a station that were computed for its true pose. All receivers of a run share them.
+
+    The detector of the station detects objects in fused features.
+    """
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
+    provides_features: ClassVar[bool] = True
 
-    def __init__(self) -> None:
+    def __init__(self, detector: Detector) -> None:
         self.found = Detections(0.0)
+        self.features: FeatureMap | None = None
         self.pose: EgoState | None = None
+        self._detector = detector
+
+    @property
+    def codec(self) -> Any:
+        """Codec of the detector of the station."""
+        return self._detector.codec
+
+    def update(self, found: Detections, pose: EgoState) -> None:
+        """Store the detections of the station and its last features, at its true pose."""
+        self.found, self.features, self.pose = found, self._detector.feature_map, pose
 
     def detect(self, readings: Readings) -> Detections:
-        """Return the known detections, relative to the pose of the readings."""
+        """Return the objects in fused features, or the known detections relative to the pose of the readings."""
+        if readings.features is not None:
+            return self._detector.detect(readings)
         assert self.pose is not None
-        same = self.pose.yaw == readings.ego.yaw and (self.pose.position == readings.ego.position).all()
-        return self.found if same else moved(self.found, self.pose, readings.ego)
+        before, after = self.pose, readings.ego
+        self.feature_map = self.features
+        if before.yaw == after.yaw and (before.position == after.position).all():
+            return self.found
+        if self.features is not None:
+            self.feature_map = moved_map(self.features, before, after)
+        return moved(self.found, before, after)
 
 
 class Crew:
@@ -184,10 +248,10 @@ class Crew:
         accepted = self._settings[self.ego].cooperates_with
         return sorted(name for name in self.specs if name != self.ego and (accepted is None or name in accepted))
 
-    def add(self, spec: ActorSpec) -> None:
-        """Add a station that enters the world."""
+    def add(self, spec: ActorSpec, detector: Detector) -> None:
+        """Add a station that enters the world, with its detector."""
         self.specs[spec.name] = spec
-        self.known[spec.name] = KnownDetections()
+        self.known[spec.name] = KnownDetections(detector)
 
     def agent(self, name: str, **changes: object) -> Agent:
         """Return an agent of a station that does not drive, with other settings."""
@@ -197,14 +261,16 @@ class Crew:
 
 
 class Senders:
-    """Agents of all senders with one pose error and one grid of points."""
+    """Agents of all senders with one pose error, fusion method and its settings. They do not receive messages."""
 
-    def __init__(self, crew: Crew, pose_noise: PoseNoise | None, cell: float) -> None:
-        shared = {"fusion": "early", "fusion_settings": {"cell": cell}, "cooperates_with": ()}
-        self._agents = {name: crew.agent(name, pose_noise=pose_noise, **shared) for name in crew.senders}
+    def __init__(
+        self, crew: Crew, pose_noise: PoseNoise | None, fusion: str, settings: Sequence[tuple[str, Any]]
+    ) -> None:
+        changes = {"fusion": fusion, "fusion_settings": dict(settings), "cooperates_with": ()}
+        self._agents = {name: crew.agent(name, pose_noise=pose_noise, **changes) for name in crew.senders}
 
     def messages(self, readings: Mapping[str, Readings], now: float) -> list[Message]:
-        """Return the messages of a scan, with boxes and points."""
+        """Return the messages of a scan, with boxes, and with points or features."""
         return [
             message
             for name, agent in self._agents.items()
@@ -230,18 +296,18 @@ class Receiver:
         self._channel = channel
         self._scans = 0
 
-    def scan(self, readings: Readings, messages: Sequence[Message], *, sampled: bool) -> Detections:
+    def scan(self, readings: Readings, messages: Sequence[Message], *, merged: bool) -> Detections:
         """Transmit the messages of a scan, and return the objects of the ego relative to its true pose.
 
-        sampled  whether the result is used; otherwise points of the ego are not merged with others
+        merged  whether points of the ego are merged with others and objects detected in them
         """
         now = readings.time
         if self._arm.cooperates and (self._scans + self._every // 2) % self._every == 0:
-            sent = messages if self._arm.points else [_without_points(message) for message in messages]
+            sent = messages if self._arm.shares else [_without_points(message) for message in messages]
             self._channel.transmit([(message, [self._ego]) for message in sent], now)
         self._scans += 1
         inbox = self._channel.deliver(self._ego, now + WAIT)
-        used = readings if sampled or not self._arm.points else replace(readings, lidars={})
+        used = readings if merged or self._arm.shares != "points" else replace(readings, lidars={})
         step = self._agent.act(used, inbox, now, None)
         return step.fused if step.estimate is None else moved(step.fused, step.estimate, readings.ego)
 

@@ -27,8 +27,8 @@ _MARGIN = 0.1
 _HIT_OVERLAP = 1
 """Index of the overlap for the second truth: bodies that any lidar hits."""
 
-_SECOND = 3 * len(OVERLAPS)
-"""Bit of the second truth in a code."""
+_SECOND = len(OVERLAPS)
+"""Place of the second truth in a code, after the overlaps."""
 
 Codes = NDArray[np.uint16]
 
@@ -59,26 +59,26 @@ class Tally(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     scores    scores as 16-bit integers, best first within each frame, frames in order
     codes     16 bits per detection, see `sample_codes`
-    hidden    number of found hidden objects, by overlap
+    hidden    number of found hidden objects, by overlap and range
     megabytes_per_second  sent over all links
     """
 
     scores: bytes
     codes: bytes
-    hidden: tuple[int, ...]
+    hidden: tuple[tuple[int, ...], ...]
     megabytes_per_second: float
 
 
 class PerceptionRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Measurement of one run: numbers of frames and objects, and the detections by condition.
 
-    objects  true objects by range; hit: by range, those that a lidar of any station hits; hidden: to the ego only
+    objects  true objects by range; hit: those that a lidar of any station hits; hidden: to the ego only
     """
 
     frames: int
     objects: tuple[int, ...]
     hit: tuple[int, ...]
-    hidden: int
+    hidden: tuple[int, ...]
     tallies: dict[str, Tally]
 
 
@@ -115,27 +115,28 @@ def _hits(boxes: Array, points: Array) -> Bools:
 
 
 def sample_codes(found: Detections, truth: Truth, center: Array) -> tuple[Codes, Codes, Integers]:
-    """Return scores and codes (N,) of detections in the true world frame, and the found hidden objects by overlap.
+    """Return scores and codes (N,) of detections in the true world frame, and the found hidden objects by overlap and
+    range.
 
-    Code: for each overlap 1 bit for a correct detection and 2 bits for the range class, of the object of a correct
-    detection or else of the detection itself; then 1 bit for correct and 1 bit for counted with the second truth. A
-    detection beyond the last range, or of an object there, has the class len(RANGES) and does not count.
+    Code: for each overlap, and then for the second truth, 1 bit for a correct detection and 2 bits for the range class,
+    of the object of a correct detection or else of the detection itself. A detection beyond the last range, or of an
+    object that does not count, has the class len(RANGES) and does not count.
     """
     shares, confidence = iou_bev(found.boxes, truth.boxes), found.confidence
     order = matching_order(shares, confidence)
     own_place = range_class(found.boxes, center)[order]
     codes: Codes = np.zeros(len(found), dtype=np.uint16)
-    hidden = np.zeros(len(OVERLAPS), dtype=np.int64)
-    for number, least in enumerate(OVERLAPS):
-        matches = match_by_share(shares, confidence, ~truth.counted, least)
+    hidden = np.zeros((len(OVERLAPS), len(RANGES)), dtype=np.int64)
+    variants = [(least, truth.counted) for least in OVERLAPS]
+    variants.append((OVERLAPS[_HIT_OVERLAP], truth.counted & truth.hit))
+    for number, (least, counted) in enumerate(variants):
+        matches = match_by_share(shares, confidence, ~counted, least)
         rows = matches.taken[matches.correct]
         place = np.where(matches.counted, own_place, len(RANGES))
         place[matches.correct] = truth.place[rows]
         codes |= _shifted(matches.correct, 3 * number) | _shifted(place, 3 * number + 1)
-        hidden[number] = np.count_nonzero(truth.hidden[rows])
-    second = match_by_share(shares, confidence, ~(truth.counted & truth.hit), OVERLAPS[_HIT_OVERLAP])
-    counted = second.counted & (second.correct | (own_place < len(RANGES)))
-    codes |= _shifted(second.correct, _SECOND) | _shifted(counted, _SECOND + 1)
+        if number < len(OVERLAPS):
+            hidden[number] = np.bincount(truth.place[rows[truth.hidden[rows]]], minlength=len(RANGES))
     scores = np.rint(FULL_SCORE * np.clip(confidence[order], 0.0, 1.0)).astype(np.uint16)
     return scores, codes, hidden
 
@@ -172,10 +173,11 @@ class HiddenRecall:
 
 
 class Pool:
-    """Detections of one condition in all runs, frames in order."""
+    """Detections of one condition in all runs, frames in order; those of the first `reach` range classes count."""
 
-    def __init__(self, records: Sequence[PerceptionRecord], condition: str) -> None:
+    def __init__(self, records: Sequence[PerceptionRecord], condition: str, reach: int = len(RANGES)) -> None:
         self._records = records
+        self._reach = reach
         tallies = [record.tallies[condition] for record in records]
         self._tallies = tallies
         codes = [np.frombuffer(tally.codes, dtype="<u2") for tally in tallies]
@@ -190,17 +192,20 @@ class Pool:
 
     def precision(self, overlap: int, place: int | None = None) -> Precision:
         """Return the average precision at an overlap of OVERLAPS, in one range class or in all."""
-        places = self._codes >> (3 * overlap + 1) & 3
-        kept = places < len(RANGES) if place is None else places == place
-        objects = [_total(record.objects, place) for record in self._records]
-        return self._precision(self._codes >> (3 * overlap) & 1 == 1, kept, objects)
+        return self._precision(overlap, place, [self._total(record.objects, place) for record in self._records])
 
     def precision_of_hit_objects(self) -> Precision:
         """Return the average precision at the overlap 0.5 for objects that a lidar of any station hits."""
-        kept = self._codes >> (_SECOND + 1) & 1 == 1
-        return self._precision(self._codes >> _SECOND & 1 == 1, kept, [sum(record.hit) for record in self._records])
+        return self._precision(_SECOND, None, [self._total(record.hit) for record in self._records])
 
-    def _precision(self, correct: Bools, kept: Bools, objects: Sequence[int]) -> Precision:
+    def _total(self, counts: Sequence[int], place: int | None = None) -> int:
+        return sum(counts[: self._reach]) if place is None else counts[place]
+
+    def _precision(self, variant: int, place: int | None, objects: Sequence[int]) -> Precision:
+        """Return the average precision by the bits of a variant of the truth in the codes."""
+        correct = self._codes >> (3 * variant) & 1 == 1
+        places = self._codes >> (3 * variant + 1) & 3
+        kept = places < self._reach if place is None else places == place
         local = area_in_order(correct[kept], sum(objects))
         order = np.flatnonzero(kept)
         order = order[np.argsort(-self._scores[order], kind="stable")]
@@ -215,9 +220,9 @@ class Pool:
     def hidden_recall(self, overlap: int) -> HiddenRecall:
         """Return the recall of hidden objects at an overlap of OVERLAPS; NaN without such objects."""
         pairs = [
-            (tally.hidden[overlap] if tally.hidden else 0, record.hidden)
+            (self._total(tally.hidden[overlap]) if tally.hidden else 0, self._total(record.hidden))
             for tally, record in zip(self._tallies, self._records, strict=True)
-            if record.hidden
+            if self._total(record.hidden)
         ]
         found, total = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
         if not total:
@@ -249,7 +254,3 @@ def _limits(value: float, left_out: Sequence[float]) -> tuple[float, float]:
 
 def _share(logit: float) -> float:
     return 0.5 + 0.5 * math.tanh(0.5 * logit)
-
-
-def _total(counts: Sequence[int], place: int | None) -> int:
-    return sum(counts) if place is None else counts[place]

@@ -7,7 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from lxml import etree
 
-from eidrive_reports.cooperative_perception.receivers import SCAN_RATE, Condition, Crew, Receiver, Senders, world_points
+from eidrive_reports.cooperative_perception.receivers import (
+    LEAST_EXISTENCE,
+    SCAN_RATE,
+    Condition,
+    Crew,
+    Receiver,
+    Senders,
+    world_points,
+)
 from eidrive_reports.cooperative_perception.scores import (
     RANGES,
     Codes,
@@ -27,12 +35,18 @@ FIRST_SAMPLE = 1.0
 """Time of the first measured frame [s]: messages with the largest latency have arrived."""
 SAMPLE_INTERVAL = 0.5
 """Time between measured frames [s]."""
+EARLIER_SCAN = 0.2
+"""Time before a measured frame of the other scan that a detector uses in addition [s]."""
 PROPERTIES = {
-    "detector": "lidar",
     "tracker": "none",
     "sensors": f"{{lidar: {{rate: {SCAN_RATE:g}, rotation: {SCAN_RATE:g}, range: 100}}}}",
 }
 """Properties of all stations: detections of single scans, as the field measures them."""
+DETECTOR_PROPERTIES: Mapping[str, Mapping[str, str]] = {
+    "lidar": {},
+    "pillars": {"detector_settings": f"{{confidence: {LEAST_EXISTENCE:g}}}"},
+}
+"""Further properties by detector: unlikely objects are part of the curve."""
 
 
 class Measurement:
@@ -53,6 +67,7 @@ class Measurement:
             self._senders = {one.senders: Senders(self.crew, *one.senders) for one in self._conditions}
             self._receivers = {one.name: Receiver(self.crew, one) for one in self._conditions}
         sampled = now > FIRST_SAMPLE - TIME_TOLERANCE and _is_multiple(now, SAMPLE_INTERVAL)
+        merged = sampled or _is_multiple(now + EARLIER_SCAN, SAMPLE_INTERVAL)
         ego = self.crew.ego
         truth = None
         if sampled:
@@ -61,7 +76,7 @@ class Measurement:
         center = view.boxes[view.row(ego), :2]
         messages = {key: senders.messages(readings, now) for key, senders in self._senders.items()}
         for one in self._conditions:
-            found = self._receivers[one.name].scan(readings[ego], messages[one.senders], sampled=sampled)
+            found = self._receivers[one.name].scan(readings[ego], messages[one.senders], merged=merged)
             if truth is not None:
                 self._samples[one.name].append(sample_codes(found, truth, center))
 
@@ -69,12 +84,12 @@ class Measurement:
         """Return the measurement of the run up to now."""
         places = [truth.place[truth.counted] for truth in self._truths]
         hit = [truth.place[truth.counted & truth.hit] for truth in self._truths]
-        hidden = sum(int((truth.hidden & truth.counted).sum()) for truth in self._truths)
+        hidden = [truth.place[truth.counted & truth.hidden] for truth in self._truths]
         return PerceptionRecord(
             len(self._truths),
             _by_range(places),
             _by_range(hit),
-            hidden,
+            _by_range(hidden),
             {one.name: self._tally(one) for one in self._conditions},
         )
 
@@ -85,7 +100,7 @@ class Measurement:
         return Tally(
             b"".join(part.astype("<u2").tobytes() for part in scores),
             b"".join(part.astype("<u2").tobytes() for part in codes),
-            tuple(int(count) for count in np.sum(hidden, axis=0)) if samples else (),
+            tuple(map(tuple, np.sum(hidden, axis=0).tolist())) if samples else (),
             0.0 if receiver is None else receiver.megabytes_per_second(self._now),
         )
 
@@ -100,14 +115,14 @@ class MeasuredStations(Stations):
     def add(self, spec: ActorSpec) -> None:
         super().add(spec)
         if spec.name in self.settings:
-            self.measurement.crew.add(spec)
+            self.measurement.crew.add(spec, self._agents[spec.name].perception.detector)
 
     def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
         """Let the stations act, and all receivers if this is the time of a scan."""
         steps, readings = super().act(world, view, inputs), self.readings
         if readings and all(reading.lidars for reading in readings.values()):
             for name, known in self.measurement.crew.known.items():
-                known.found, known.pose = steps[name].detections, readings[name].ego
+                known.update(steps[name].detections, readings[name].ego)
             self.measurement.scan(view, readings)
         return steps
 
@@ -131,7 +146,9 @@ def run_trial(
         stacks.append(MeasuredStations(context, ego, conditions))
         return stacks[-1]
 
-    result = run_file(with_properties(scenario, PROPERTIES), seed=seed, settings=settings, stack=build)
+    assert settings.detector is not None
+    properties = {"detector": settings.detector, **PROPERTIES, **DETECTOR_PROPERTIES[settings.detector]}
+    result = run_file(with_properties(scenario, properties), seed=seed, settings=settings, stack=build)
     return result, stacks[-1].measurement.record()
 
 

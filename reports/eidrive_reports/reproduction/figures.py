@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +161,8 @@ ARM_COLORS = {
     "covariance_intersection": "#0b6e99",
     "covariance_intersection, aligned": "#7c3aed",
     "early": "#15803d",
+    "attention": "#7e22ce",
+    "where2comm": "#be185d",
 }
 """Color of each arm."""
 UNITS = {"pose error": "pose error [m], and 1° at 0.6 m", "pose drift": "pose drift [m], and 1° at 0.6 m"}
@@ -168,9 +171,9 @@ OVERLAPS = (0.5, 0.7)
 HIDDEN_AXES = ("pose error", "loss")
 
 
-def perception_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
-    """Draw the curves over each axis at two overlaps, then range, hidden objects and volume."""
-    curves, hidden, volumes = data["perception"], data["perception_hidden"], data["perception_volume"]
+def precision_figure(data: Mapping[str, Sequence[Row]], part: str) -> Figure:
+    """Draw the curves of a part over each axis at two overlaps, then range, hidden objects and volume."""
+    curves, hidden, volumes = data[part], data[f"{part}_hidden"], data[f"{part}_volume"]
     axes_names = list(dict.fromkeys(str(row["axis"]) for row in curves))
     figure = Figure(figsize=(3.4 * len(axes_names), 9.0), layout="constrained")
     panels = figure.subplots(len(OVERLAPS) + 1, len(axes_names), squeeze=False)
@@ -185,21 +188,27 @@ def perception_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
     panels[0][0].legend(fontsize=7)
     last = panels[-1]
     _ranges(last[0], [row for row in curves if row["axis"] == "latency" and row["value"] == 0.0])
-    for name, axes in zip(HIDDEN_AXES, last[1:], strict=False):
+    for name, axes in zip(HIDDEN_AXES, last[1:-1], strict=False):
         _curves(axes, [row for row in hidden if row["axis"] == name and row["iou"] == OVERLAPS[0]], "recall")
         axes.set_xlabel(UNITS[name], fontsize=8)
         axes.set_ylabel("recall of hidden objects at 0.5", fontsize=8)
         axes.set_ylim(0.0, 1.0)
-    _volumes(last[3], volumes)
+    _volumes(last[-1], volumes)
     for axes in panels.ravel():
         axes.tick_params(labelsize=7)
         axes.grid(alpha=0.3, lw=0.5)
     return figure
 
 
+def _present(rows: Sequence[Row]) -> dict[str, str]:
+    """Return the colors of the arms of these rows."""
+    names = set(distinct(rows, "arm"))
+    return {arm: color for arm, color in ARM_COLORS.items() if arm in names}
+
+
 def _curves(axes: Axes, rows: Sequence[Row], name: str) -> None:
     """Draw one curve per arm with its interval."""
-    for arm, color in ARM_COLORS.items():
+    for arm, color in _present(rows).items():
         mine = [row for row in rows if row["arm"] == arm]
         at, middle = ([number(row, field) for row in mine] for field in ("value", name))
         axes.fill_between(at, *limits(mine, name), color=color, alpha=0.12, lw=0)
@@ -210,10 +219,11 @@ def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
     """Draw the average precision by range and arm."""
     mine = [row for row in rows if row["iou"] == OVERLAPS[0] and row["range"] != "all"]
     places = list(dict.fromkeys(str(row["range"]) for row in mine))
-    width = 0.8 / len(ARM_COLORS)
-    for place, (arm, color) in enumerate(ARM_COLORS.items()):
+    colors = _present(mine)
+    width = 0.8 / len(colors)
+    for place, (arm, color) in enumerate(colors.items()):
         some = [row for row in mine if row["arm"] == arm]
-        at = [places.index(str(row["range"])) + width * (place - (len(ARM_COLORS) - 1) / 2) for row in some]
+        at = [places.index(str(row["range"])) + width * (place - (len(colors) - 1) / 2) for row in some]
         values = [number(row, "ap") for row in some]
         errors = [[abs(end - value) for value, end in zip(values, ends, strict=True)] for ends in limits(some, "ap")]
         axes.bar(at, values, width, color=color, yerr=errors, error_kw={"lw": 0.8})
@@ -223,21 +233,38 @@ def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 def _volumes(axes: Axes, rows: Sequence[Row]) -> None:
-    """Draw the average precision over the size of the messages; the ego alone is a horizontal line."""
-    for arm, color in ARM_COLORS.items():
-        mine = sorted((row for row in rows if row["arm"] == arm), key=lambda row: number(row, "megabytes_per_second"))
+    """Draw the average precision over the size of the messages; the ego alone is a horizontal line.
+
+    Arms with features form two curves: with 8-bit integers from `attention` with all cells down to `where2comm`, and
+    with codes.
+    """
+    for arm, color in {**_present(rows), CODES: CODES_COLOR}.items():
+        mine = sorted((row for row in rows if _volume_curve(row) == arm), key=lambda row: number(row, VOLUME))
         for overlap, style in zip(OVERLAPS, ("o-", "s--"), strict=True):
             values = [number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
             if arm == "none":
                 axes.axhline(values[0], color=color, lw=1, ls=style[1:])
                 continue
-            at = [number(row, "megabytes_per_second") for row in mine]
-            label = f"at {overlap:g}" if arm == "early" else None
+            at = [number(row, VOLUME) for row in mine]
+            label = f"at {overlap:g}" if arm == "early" else arm if arm == CODES and mine and style == "o-" else None
             axes.plot(at, values, style, color=color, ms=3, lw=1.2, label=label)
     axes.set_xscale("log")
     axes.set_xlabel("all messages [MB/s]", fontsize=8)
     axes.set_ylabel("average precision", fontsize=8)
     axes.legend(fontsize=7)
+
+
+CODES, CODES_COLOR = "codes", "#ca8a04"
+VOLUME = "megabytes_per_second"
+
+
+def _volume_curve(row: Row) -> str | None:
+    """Return the curve over the volume to which a row belongs; None for another method with all cells."""
+    if row["share"] is None:
+        return str(row["arm"])
+    if row["encoding"] == CODES:
+        return CODES
+    return None if row["arm"] == "max" else "attention"
 
 
 ORDERED_COLORS = ("#0b6e99", "#c2410c")
@@ -339,7 +366,8 @@ FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
     "detection": detection_figure,
     "sensitivity": sensitivity_figure,
     "channels": channels_figure,
-    "perception": perception_figure,
+    "perception": partial(precision_figure, part="perception"),
+    "learned": partial(precision_figure, part="learned"),
 }
 """Figure of a part, by the name of the part. The others have none."""
 

@@ -8,6 +8,7 @@ from eidrive_reports.reproduction import (
     channels,
     detection,
     ei,
+    learned,
     perception,
     pipeline,
     sensitivity,
@@ -17,7 +18,7 @@ from eidrive_reports.reproduction import (
 from eidrive_reports.reproduction.part import Part
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, suggestion
 
-MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels, perception)
+MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels, perception, learned)
 PARTS = {module.PART.name: module.PART for module in MODULES}
 """Parts by name."""
 ALL = "all"

@@ -132,8 +132,8 @@ def perception_runs(count: int) -> list[PerceptionRecord]:
         )
         codes = np.concatenate([np.ones(right), np.zeros(wrong)])
         found = int(random.binomial(hidden, share))
-        tally = Tally(scores.astype("<u2").tobytes(), codes.astype("<u2").tobytes(), (found, found, found), 0.0)
-        records.append(PerceptionRecord(1, (objects, 0, 0), (objects, 0, 0), hidden, {"arm": tally}))
+        tally = Tally(scores.astype("<u2").tobytes(), codes.astype("<u2").tobytes(), ((found, 0, 0),) * 3, 0.0)
+        records.append(PerceptionRecord(1, (objects, 0, 0), (objects, 0, 0), (hidden, 0, 0), {"arm": tally}))
     return records
 
 
