@@ -246,15 +246,17 @@ def _volumes(axes: Axes, rows: Sequence[Row]) -> None:
                 axes.axhline(values[0], color=color, lw=1, ls=style[1:])
                 continue
             at = [number(row, VOLUME) for row in mine]
-            label = f"at {overlap:g}" if arm == "early" else arm if arm == CODES and mine and style == "o-" else None
+            label = f"at {overlap:g}" if arm == "early" else VOLUME_LABELS.get(arm) if mine and style == "o-" else None
             axes.plot(at, values, style, color=color, ms=3, lw=1.2, label=label)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("all messages [MB/s]", fontsize=8)
     axes.set_ylabel("average precision", fontsize=8)
     axes.legend(fontsize=7)
 
 
 CODES, CODES_COLOR = "codes", "#ca8a04"
+VOLUME_LABELS = {"attention": "features, int8", CODES: "features, codes"}
 VOLUME = "megabytes_per_second"
 
 

@@ -20,9 +20,9 @@ def records(episodes: Sequence[Episode]) -> list[PerceptionRecord]:
     return [one.perception for one in ordered if one.perception is not None]
 
 
-def pool(found: Sequence[PerceptionRecord], study: Study, condition: Condition) -> Pool:
+def pool(measurements: Sequence[PerceptionRecord], study: Study, condition: Condition) -> Pool:
     """Return the detections of a condition in the ranges of a study."""
-    return Pool(found, condition.name, study.reach)
+    return Pool(measurements, condition.name, study.reach)
 
 
 def range_name(place: int | None) -> str:
@@ -32,12 +32,12 @@ def range_name(place: int | None) -> str:
     return f"{RANGES[place - 1] if place else 0.0:g} to {RANGES[place]:g} m"
 
 
-def curve_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
+def curve_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
     """Yield the average precision of each arm over each axis, by range and overlap."""
     places: tuple[int | None, ...] = (None, *range(study.reach))
     for arm, axis in product(study.compared, study.axes):
         for value in AXES[axis][2]:
-            measured = pool(found, study, on_axis(arm, axis, value))
+            measured = pool(measurements, study, on_axis(arm, axis, value))
             for place, (index, overlap) in product(places, enumerate(OVERLAPS)):
                 one = measured.precision(index, place)
                 yield {
@@ -54,11 +54,11 @@ def curve_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]
                 }
 
 
-def hidden_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
+def hidden_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
     """Yield the recall of objects that are hidden to the ego and that the lidar of another station hits."""
     for arm, axis in product(study.compared, study.axes):
         for value in AXES[axis][2]:
-            measured = pool(found, study, on_axis(arm, axis, value))
+            measured = pool(measurements, study, on_axis(arm, axis, value))
             for index, overlap in enumerate(OVERLAPS):
                 one = measured.hidden_recall(index)
                 place: dict[str, Value] = {"arm": arm, "axis": axis, "value": value, "iou": overlap}
@@ -67,10 +67,10 @@ def hidden_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row
                 yield {**place, **counts, "recall": finite(one.value), **limits}
 
 
-def arm_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
+def arm_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
     """Yield the results of each arm without faults, with both ways of sorting and both truths."""
     for arm in study.arms:
-        measured = pool(found, study, Condition(arm))
+        measured = pool(measurements, study, Condition(arm))
         whole = [measured.precision(number) for number in range(len(OVERLAPS))]
         row: dict[str, Value] = {"arm": arm}
         for overlap, one in zip(OVERLAPS, whole, strict=True):
@@ -87,13 +87,13 @@ def arm_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
         yield row
 
 
-def volume_rows(found: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
+def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
     """Yield the average precision beside the size of the messages, for the ego alone and for each way of sending.
 
     share  of the cells of a map of features
     """
     for one in (Condition(study.arms[0]), *study.volumes):
-        measured, arm = pool(found, study, one), ARMS[one.arm]
+        measured, arm = pool(measurements, study, one), ARMS[one.arm]
         row: dict[str, Value] = {
             "arm": one.arm,
             "messages_per_second": SCAN_RATE / one.every if arm.cooperates else None,
