@@ -74,11 +74,12 @@ def test_report_on_learned_fusion_states_gains_within_the_range_of_features(tmp_
     gains = data["learned_gains"]
     assert {(row["over"], round(float(row["gain_70"] or 0.0), 9)) for row in gains} == {
         ("covariance_intersection", 0.1),
+        ("covariance_intersection, aligned", 0.1),
         ("average", 0.1),
     }
     assert all(row["low_70"] == pytest.approx(0.1) for row in gains), "equal runs have no spread"
     text = report.markdown()
-    assert "The expected gain of +0.03 is reached by attention, where2comm." in text
+    assert "The expected gain of +0.03 is reached by attention, attention, aligned, where2comm." in text
     assert "40 frames with 80 objects, of which the lidar of any station hits 72 and 32 are hidden" in text
     path = draw("learned", report, tmp_path)
     assert path is not None
@@ -137,6 +138,7 @@ PUBLISHED = {
     "covariance_intersection": [0.65, 0.3, 0.2],
     "covariance_intersection, aligned": [0.65, 0.5, 0.3],
     "early": [0.7, 0.3, 0.2],
+    "attention, aligned": [0.72, 0.72, 0.71],
     "attention": [0.72, 0.71, 0.7],
     "where2comm": [0.71, 0.7, 0.69],
 }

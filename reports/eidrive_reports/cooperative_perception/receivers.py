@@ -44,9 +44,10 @@ class Arm:
 _FILTERED = {"existence": LEAST_EXISTENCE}
 
 
-def _intermediate(fusion: str, share: float, encoding: str = "int8") -> Arm:
+def _intermediate(fusion: str, share: float, encoding: str = "int8", *, aligned: bool = False) -> Arm:
     """Return an arm whose senders send a share of the cells of their features."""
-    return Arm(fusion, {**_FILTERED, "share": share, "encoding": encoding}, shares="features")
+    settings = {**_FILTERED, "share": share, "encoding": encoding, "align_poses": aligned}
+    return Arm(fusion, settings, shares="features")
 
 
 ARMS: Mapping[str, Arm] = {
@@ -54,9 +55,11 @@ ARMS: Mapping[str, Arm] = {
     "none, filtered": Arm("covariance_intersection", _FILTERED, cooperates=False),
     "average": Arm("average"),
     "covariance_intersection": Arm("covariance_intersection", _FILTERED),
+    "covariance_intersection, aligned": Arm("covariance_intersection", {**_FILTERED, "align_poses": True}),
     "early": Arm("early", {**_FILTERED, "max_age": ONE_SCAN}, shares="points"),
     "max": _intermediate("max", 1.0),
     "attention": _intermediate("attention", 1.0),
+    "attention, aligned": _intermediate("attention", 1.0, aligned=True),
     "attention, codes": _intermediate("attention", 1.0, "codes"),
     "where2comm, 10 %": _intermediate("where2comm", 0.1),
     "where2comm, 5 %": _intermediate("where2comm", 0.05),
@@ -64,8 +67,8 @@ ARMS: Mapping[str, Arm] = {
     "where2comm, codes": _intermediate("where2comm", 0.01, "codes"),
     "where2comm, 0.1 %": _intermediate("where2comm", 0.001),
 }
-"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only. Without a
-share in its name, `where2comm` sends 1 % of the cells and other intermediate fusion sends all."""
+"""Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only; `aligned`
+corrects the poses of senders by shared objects. Without a share in its name, `where2comm` sends 1 % of the cells and other intermediate fusion sends all."""
 
 
 @dataclass(frozen=True)

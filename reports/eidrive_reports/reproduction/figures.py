@@ -159,9 +159,10 @@ ARM_COLORS = {
     "none": "#6b7280",
     "average": "#c2410c",
     "covariance_intersection": "#0b6e99",
-    "covariance_intersection, aligned": "#7c3aed",
+    "covariance_intersection, aligned": "#38bdf8",
     "early": "#15803d",
     "attention": "#7e22ce",
+    "attention, aligned": "#d8b4fe",
     "where2comm": "#be185d",
 }
 """Color of each arm."""
@@ -266,7 +267,7 @@ def _volume_curve(row: Row) -> str | None:
         return str(row["arm"])
     if row["encoding"] == CODES:
         return CODES
-    return None if row["arm"] == "max" else "attention"
+    return None if row["arm"] in ("max", "attention, aligned") else "attention"
 
 
 ORDERED_COLORS = ("#0b6e99", "#c2410c")

@@ -53,7 +53,16 @@ from eidrive_scenario.api.experiments import jackknife_interval
 STUDY = Study(
     "learned",
     tuple(ARMS),
-    ("none", "average", "covariance_intersection", "early", "attention", "where2comm"),
+    (
+        "none",
+        "average",
+        "covariance_intersection",
+        "covariance_intersection, aligned",
+        "early",
+        "attention",
+        "attention, aligned",
+        "where2comm",
+    ),
     ("pose error", "latency", "loss"),
     tuple(Condition(arm) for arm, one in ARMS.items() if one.cooperates),
     2,
@@ -63,7 +72,7 @@ DETECTORS = ("pillars",)
 
 
 FEATURES = tuple(arm for arm, one in ARMS.items() if one.shares == "features")
-LATE = ("covariance_intersection", "average")
+LATE = ("covariance_intersection", "covariance_intersection, aligned", "average")
 """Arms with late fusion: of all scans by their covariances, and of single scans as in the literature."""
 TARGETS = {0.0: 0.03, 0.4: 0.1}
 """Gain of intermediate over late fusion in AP 0.7 that the literature leads to expect, by pose error [m]."""
@@ -94,7 +103,7 @@ def setup(measured: Sequence[PerceptionRecord], seeds: int) -> tuple[str, ...]:
         "Arms. `none`, `average`, `covariance_intersection` and `early` as in part `perception`; points that a "
         "station receives have the intensity 1, as messages do not contain it. `max`, `attention` and `where2comm` "
         "fuse features; they filter objects of all scans as covariance intersection does, fuse boxes of others where "
-        "their features are missing, and do not correct poses. `attention` and `max` send all cells, `where2comm` the "
+        "their features are missing. Only arms with `aligned` correct poses of senders by shared objects. `attention` and `max` send all cells, `where2comm` the "
         "most confident 1 %, or the stated share; 8 bytes per cell and 2 for its place, with `codes` 1 byte and 2.",
     )
 

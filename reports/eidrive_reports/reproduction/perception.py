@@ -36,7 +36,7 @@ from eidrive_reports.reproduction.perception_tables import (
 )
 from eidrive_scenario.api.run import RunSettings
 
-SENDING = ("average", "covariance_intersection", "early")
+SENDING = ("average", "covariance_intersection", "covariance_intersection, aligned", "early")
 STUDY = Study(
     "perception",
     ("none", "none, filtered", *SENDING),
@@ -63,7 +63,8 @@ def setup(records: Sequence[PerceptionRecord], seeds: int, scenes: int) -> tuple
         "messages over a separate channel. They do not steer. So arms differ by fusion and messages only, not "
         "by traffic.",
         "Arms. `none`: detections of the last scan of the ego. `average`: boxes as measured, the rule of EI-Drive. "
-        "`covariance_intersection`: boxes of all scans, filtered and predicted to the current time. `early`: points "
+        "`covariance_intersection`: boxes of all scans, filtered and predicted to the current time; `aligned` corrects "
+        "the poses of the senders by objects that the ego detects, too (`align_poses`). `early`: points "
         "of all stations, one scan at a time. `none, filtered` is the filter of covariance intersection on own "
         "detections only, which separates its effect from that of messages.",
         f"Faults. Pose error: normal, standard deviation on x and on y each, and {YAW_PER_POSITION * 0.6:g}° per 0.6 "

@@ -42,6 +42,7 @@ def shapes(study: Study, curves: Sequence[Row], volumes: Sequence[Row]) -> tuple
         _strict_falls_first(held, sending, study.axes),
         _loss_of_messages(held, whole),
         _compensated(held),
+        *(_aligned(held, arm, study.axes) for arm in sending if f"{arm}, aligned" in sending),
         *_plateaus(volumes, whole),
         _order(held),
     ]
@@ -149,6 +150,19 @@ def _compensated(curves: _Curves) -> Row:
     return _row("compensated latency is at least as good as uncompensated", least >= -TOLERANCE, text)
 
 
+def _aligned(curves: _Curves, arm: str, axes: Sequence[str]) -> Row:
+    """Shared objects show the pose error of a sender; without an error its pose stays as it is."""
+    gains = [
+        curves[f"{arm}, aligned", axis, overlap][value] - precision
+        for axis in ("pose error", "pose drift")
+        if axis in axes
+        for overlap in (0.5, 0.7)
+        for value, precision in curves[arm, axis, overlap].items()
+    ]
+    text = f"difference {min(gains):+.3f} to {max(gains):+.3f}"
+    return _row(f"{arm}: aligned poses are at least as good as those with errors", min(gains) >= -TOLERANCE, text)
+
+
 def _order(curves: _Curves) -> Row:
     values = {
         overlap: [curves[arm, "latency", overlap][0.0] for arm in (ALONE, "average", "early")] for overlap in (0.5, 0.7)
@@ -194,7 +208,7 @@ def _plateaus(volumes: Sequence[Row], arms: Sequence[str]) -> list[Row]:
 
 def _masks(volumes: Sequence[Row]) -> list[Row]:
     """A few per cent of the cells suffice, and less does not."""
-    mine = [row for row in volumes if row["encoding"] == "int8" and row["arm"] != "max"]
+    mine = [row for row in volumes if row["encoding"] == "int8" and row["arm"] not in ("max", "attention, aligned")]
     by_share = {number(row, "share"): number(row, "ap_50") for row in mine}
     text = ", ".join(f"{number(row, 'ap_50'):.3f} with {number(row, 'share'):.1%} of the cells" for row in mine)
     few, fewest = by_share[FEW_CELLS], by_share[FEWEST_CELLS]
