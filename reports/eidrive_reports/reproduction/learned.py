@@ -188,8 +188,8 @@ def _departures(ap_70: Mapping[str, float], gains: Sequence[Row]) -> Iterator[st
     if ap_70["attention, codes"] < ap_70["attention"] - TARGETS[0.0]:
         yield (
             f"{REASON} (a code book lowers AP 0.7 of `attention` from {ap_70['attention']:.3f} to "
-            f"{ap_70['attention, codes']:.3f}): 256 entries for all features leave few for the offset, the size and "
-            "the heading of a box, so that objects are found and their boxes are less accurate."
+            f"{ap_70['attention, codes']:.3f}): most of the 256 entries stand for cells without objects. Those "
+            "with objects share few, so that objects are found and their boxes are displaced and turned."
         )
     displaced = [row for row in gains if row["fault"] == "pose error" and row["over"] == LATE[0]]
     if any(number(row, "gain_70") < 0.0 for row in displaced):
