@@ -68,7 +68,8 @@ ARMS: Mapping[str, Arm] = {
     "where2comm, 0.1 %": _intermediate("where2comm", 0.001),
 }
 """Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only; `aligned`
-corrects the poses of senders by shared objects. Without a share in its name, `where2comm` sends 1 % of the cells and other intermediate fusion sends all."""
+corrects the poses of senders by shared objects. Without a share in its name, `where2comm` sends 1 % of the cells and
+other intermediate fusion sends all."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ def reproduce(
         list[str] | None,
         typer.Argument(
             metavar="PART",
-            help="table2, table3, detection, pipeline, ei, sensitivity, channels, perception, learned, or all; benchmark.",
+            help="table2, table3, detection, pipeline, ei, sensitivity, channels, perception, learned, all; benchmark.",
             show_default="all",
         ),
     ] = None,
@@ -23,7 +23,7 @@ def reproduce(
             min=1,
             max=10_000,
             help="Episodes of each cell, with seeds from 1.",
-            show_default="table2: 20, table3: 40, sensitivity: 3, channels, benchmark: 10, perception: 4, learned: 2, else 5",
+            show_default="table2: 20, table3: 40, channels, benchmark: 10, perception: 4, sensitivity: 3, learned: 2; 5",
         ),
     ] = None,
     detectors: Annotated[

@@ -103,7 +103,8 @@ def setup(measured: Sequence[PerceptionRecord], seeds: int) -> tuple[str, ...]:
         "Arms. `none`, `average`, `covariance_intersection` and `early` as in part `perception`; points that a "
         "station receives have the intensity 1, as messages do not contain it. `max`, `attention` and `where2comm` "
         "fuse features; they filter objects of all scans as covariance intersection does, fuse boxes of others where "
-        "their features are missing. Only arms with `aligned` correct poses of senders by shared objects. `attention` and `max` send all cells, `where2comm` the "
+        "their features are missing. Only arms with `aligned` correct poses of senders by shared objects. `attention` "
+        "and `max` send all cells, `where2comm` the "
         "most confident 1 %, or the stated share; 8 bytes per cell and 2 for its place, with `codes` 1 byte and 2.",
     )
 
