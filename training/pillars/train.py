@@ -22,8 +22,6 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from training.pillars.network import (
     BOX,
-    LATENT,
-    LATENT_LIMIT,
     OUT,
     REACH,
     STRIDE_SIDE,
@@ -248,34 +246,6 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
     return {name: round(average_precision(detections.get(name, []), objects[name]), 4) for name in objects}
 
 
-@torch.no_grad()
-def codebook(
-    network: Pillars, sampler: Sampler, arguments: argparse.Namespace, entries: int = 256
-) -> np.ndarray[Any, Any]:
-    """Return the centers (256, 8) of the values of the most confident cells, by k-means."""
-    maker = SceneMaker(Assets.load(arguments.assets))
-    held = []
-    for number in range(12):
-        batch = sampler.batch(maker.batch((arguments.seed, 10**5, number), arguments.scenes))
-        features = network.features(batch.grids)
-        mask = most_confident(probabilities(network.head(features)), 0.05).flatten(1) > 0.0
-        values = network.sent(features).flatten(2).permute(0, 2, 1)[mask]
-        held.append(values[torch.randperm(len(values), device=values.device)[:20_000]])
-    values = torch.cat(held).float()
-    generator = torch.Generator(device=values.device).manual_seed(arguments.seed)
-    centers = values[torch.randperm(len(values), generator=generator, device=values.device)[:entries]].clone()
-    for _ in range(60):
-        nearest = torch.cdist(values, centers).argmin(dim=1)
-        sums = torch.zeros_like(centers).index_add_(0, nearest, values)
-        counts = torch.zeros(entries, device=values.device).index_add_(
-            0, nearest, torch.ones(len(values), device=values.device)
-        )
-        centers = torch.where(counts[:, None] > 0, sums / counts[:, None].clamp(min=1.0), centers)
-    assert centers.shape == (entries, LATENT)
-    assert float(centers.abs().max()) <= LATENT_LIMIT
-    return centers.cpu().numpy()
-
-
 def main() -> None:
     """Train one stage, and write its state, and after the second stage the weights."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -307,8 +277,7 @@ def main() -> None:
     torch.save(average.state_dict(), arguments.out / f"pillars_{arguments.stage}.pt")
     scores = evaluate(average, sampler, arguments)
     print(json.dumps(scores), flush=True)
-    arrays = {**average.folded(), "codebook": codebook(average, sampler, arguments)}
-    np.savez(arguments.out / f"pillars_{arguments.stage}.npz", allow_pickle=False, **arrays)
+    np.savez(arguments.out / f"pillars_{arguments.stage}.npz", allow_pickle=False, **average.folded())
     (arguments.out / f"pillars_{arguments.stage}_scores.json").write_text(json.dumps(scores, indent=2))
 
 

@@ -23,7 +23,8 @@ def reproduce(
             min=1,
             max=10_000,
             help="Episodes of each cell, with seeds from 1.",
-            show_default="table2: 20, table3: 40, channels, benchmark: 10, perception: 4, sensitivity: 3, learned: 2; 5",
+            show_default="table2: 20, table3: 40, channels, benchmark: 10, perception: 4, sensitivity: 3, "
+            "learned: 2, else 5",
         ),
     ] = None,
     detectors: Annotated[
