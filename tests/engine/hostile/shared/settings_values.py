@@ -92,6 +92,12 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
         "fusion": "covariance_intersection",
         "fusion_settings": {"gate": 0.99, "gate_distance": 4.0, "max_age": 1.5, "existence": 0.5},
     },
+    "features": {
+        "detector": "pillars",
+        "detector_settings": {"confidence": 0.3, "runtime": "auto", "precision": "float32"},
+        "fusion": "where2comm",
+        "fusion_settings": {"share": 0.01, "encoding": "int8", "max_lateness": 0.5, "align_poses": True},
+    },
     "early": {
         "detector": "lidar",
         "detector_settings": {"off_road": 0.5, "min_points": 3, "min_score": 0.05},
