@@ -154,9 +154,9 @@ def main() -> None:
             **{f"ap{round(100 * overlap)}": round(scores(results, overlap)[0], 4) for overlap in (0.3, 0.5, 0.7)},
         }
     for stage in ("single", "fusion"):
-        path = options.trained.with_name(f"pillars_{stage}_scores.json")
+        path = options.trained.with_name(f"pillars_{stage}.json")
         if path.exists():
-            card[f"{stage}_ap_1m"] = json.loads(path.read_text(encoding="utf-8"))
+            card[stage] = json.loads(path.read_text(encoding="utf-8"))
     options.out.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(card, indent=1))
 

@@ -129,8 +129,8 @@ def _own_cells(batch: Batch) -> Tensor:
 
 def train(
     network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], arguments: argparse.Namespace
-) -> Pillars:
-    """Train until the time is over; return the moving average of the network."""
+) -> tuple[Pillars, int]:
+    """Train until the time is over; return the moving average of the network, and the number of steps."""
     joint = arguments.stage == "fusion"
     network.train()
     average = copy.deepcopy(network).eval()
@@ -177,8 +177,7 @@ def train(
         if step % 100 == 0:
             mean = torch.stack(held[-100:]).mean().item()
             print(f"step {step}  {time.monotonic() - start:.0f} s  loss {mean:.3f}  rate {rate:.2e}", flush=True)
-    print(f"{step} steps of {arguments.scenes * STATIONS} grids", flush=True)
-    return average
+    return average, step
 
 
 def peaks(maps: Tensor, count: int = 100) -> tuple[Tensor, Tensor, Tensor]:
@@ -272,13 +271,22 @@ def main() -> None:
         Scenes(arguments.assets, arguments.seed + (1000 if arguments.stage == "fusion" else 0), arguments.scenes),
         batch_size=None, num_workers=arguments.workers, prefetch_factor=4 if arguments.workers else None,
     )  # fmt: skip
-    average = train(network, sampler, iter(loader), arguments)
+    average, steps = train(network, sampler, iter(loader), arguments)
     arguments.out.mkdir(parents=True, exist_ok=True)
     torch.save(average.state_dict(), arguments.out / f"pillars_{arguments.stage}.pt")
-    scores = evaluate(average, sampler, arguments)
-    print(json.dumps(scores), flush=True)
+    record = {
+        "script": "training/pillars/train.py",
+        "seed": arguments.seed,
+        "steps": steps,
+        "grids_per_step": arguments.scenes * STATIONS,
+        "minutes": arguments.minutes,
+        "device": torch.cuda.get_device_name() if sampler.device_type == "cuda" else "cpu",
+        "torch": str(torch.__version__),
+        "ap_1m": evaluate(average, sampler, arguments),
+    }
+    print(json.dumps(record), flush=True)
     np.savez(arguments.out / f"pillars_{arguments.stage}.npz", allow_pickle=False, **average.folded())
-    (arguments.out / f"pillars_{arguments.stage}_scores.json").write_text(json.dumps(scores, indent=2))
+    (arguments.out / f"pillars_{arguments.stage}.json").write_text(json.dumps(record, indent=2))
 
 
 if __name__ == "__main__":
