@@ -189,14 +189,14 @@ def _departures(ap_70: Mapping[str, float], gains: Sequence[Row]) -> Iterator[st
     if ap_70["attention, codes"] < ap_70["attention"] - TARGETS[0.0]:
         yield (
             f"{REASON} (a code book lowers AP 0.7 of `attention` from {ap_70['attention']:.3f} to "
-            f"{ap_70['attention, codes']:.3f}): most of the 256 entries stand for cells without objects. Those "
-            "with objects share few, so that objects are found and their boxes are displaced and turned."
+            f"{ap_70['attention, codes']:.3f}): 256 entries round the eight compressed numbers of a cell coarsely: "
+            "objects are found, and their boxes are displaced and turned."
         )
     displaced = [row for row in gains if row["fault"] == "pose error" and row["over"] == LATE[0]]
     if any(number(row, "gain_70") < 0.0 for row in displaced):
         yield (
-            f"{REASON} (with pose errors intermediate fusion is below `{LATE[0]}`): covariance intersection knows the "
-            "covariance of the pose of a sender, keeps the accurate own box of an object that both see, and averages "
+            f"{REASON} (with pose errors intermediate fusion without aligned poses is below `{LATE[0]}`): covariance "
+            "intersection knows the covariance of the pose of a sender, keeps the accurate own box of an object that both see, and averages "
             "independent errors over the scans; features have no covariance, and displaced ones blur those of the ego."
         )
 
