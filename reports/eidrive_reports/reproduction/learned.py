@@ -196,7 +196,8 @@ def _departures(ap_70: Mapping[str, float], gains: Sequence[Row]) -> Iterator[st
     if any(number(row, "gain_70") < 0.0 for row in displaced):
         yield (
             f"{REASON} (with pose errors intermediate fusion without aligned poses is below `{LATE[0]}`): covariance "
-            "intersection knows the covariance of the pose of a sender, keeps the accurate own box of an object that both see, and averages "
+            "intersection knows the covariance of the pose of a sender, keeps the accurate own box of an object that "
+            "both see, and averages "
             "independent errors over the scans; features have no covariance, and displaced ones blur those of the ego."
         )
 
