@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.base.detections import CLASSES
 from eidrive_scenario.perception.learned.graphs import IMAGE, Graph
-from eidrive_scenario.perception.learned.pillars.cell_layer import CellLayer
-from eidrive_scenario.perception.learned.pillars.codec import FEATURES, LATENT, FeatureCodec
+from eidrive_scenario.perception.learned.pillars.codec import FEATURES, LATENT, CellLayer, FeatureCodec
 from eidrive_scenario.perception.learned.pillars.decode import ATTRIBUTES
 from eidrive_scenario.perception.learned.pillars.grid import CELLS, CHANNELS
 from eidrive_scenario.perception.learned.quantization import Ranges
