@@ -108,22 +108,25 @@ def _digest_with(name: str, value: str, scenario: Path, points: Sequence[Point],
     """Return the digest of the inputs with one value of an axis; None if no tried run with it is valid.
 
     The value alone, so that the digest does not depend on the order of the points. Other values follow where this run
-    is excluded by constraints, or where the value of a parameter requires others.
+    is excluded by constraints, or where the value requires others, as a fusion method requires a detector.
     """
-    same = (point for point in points if point.get(name) == value)
+    same = [point for point in points if point.get(name) == value][:MOST_TRIED]
     tried: Iterator[Point] = (
         {key: given for key, given in point.items() if key == name or not is_setting(key)} for point in same
     )
-    for point in ({name: value, **_run_of(points[0])}, *islice(tried, MOST_TRIED)):
+    whole = (_without_channel_keys(point) | _run_of(point) for point in same)
+    invalid: InputError | None = None
+    for point in ({name: value, **_run_of(points[0])}, *tried, *whole):
         try:
             return digest_of(
                 scenario, _resolved(scenario, point.get(RUN), settings_at(without_run(point), settings, None))
             )
         except ConstraintError:
             continue
-        except InputError:
-            if is_setting(name):
-                raise
+        except InputError as error:
+            invalid = invalid or error
+    if invalid is not None and is_setting(name):
+        raise invalid
     return None
 
 
