@@ -114,7 +114,7 @@ def _digest_with(name: str, value: str, scenario: Path, points: Sequence[Point],
     tried: Iterator[Point] = (
         {key: given for key, given in point.items() if key == name or not is_setting(key)} for point in same
     )
-    whole = (_without_channel_keys(point) | _run_of(point) for point in same)
+    whole = ({**_without_channel_keys(point), **_run_of(point)} for point in same)
     invalid: InputError | None = None
     for point in ({name: value, **_run_of(points[0])}, *tried, *whole):
         try:
