@@ -14,6 +14,8 @@ from training.pillars.scenes import CLASSES, LAG, STATIONS
 
 CLEARANCE, TALLEST = 0.25, 4.5
 """Heights between which a point stands on the ground [m]."""
+SHARED_CELL = 0.1
+"""Cells of the points of a message of early fusion [m]."""
 GROUND_NOISE = 0.02
 """Standard deviation of the estimated height of the ground [m]."""
 FEWEST = 3
@@ -32,6 +34,7 @@ class Batch:
     own     (N,) slot of the carrier; -1: a mast
     points  (N, B) number of points of each station on each body
     known   (N,) whether the grid has the earlier scan
+    merged  (S, 12, 256, 256) grids of the first stations with the points of all, as in early fusion; None without them
     """
 
     grids: Tensor
@@ -42,6 +45,7 @@ class Batch:
     own: Tensor
     points: Tensor
     known: Tensor
+    merged: Tensor | None
 
 
 class Sampler:
@@ -51,8 +55,12 @@ class Sampler:
         self._meshes, self._device = meshes, device
         self.device_type = torch.device(device).type
 
-    def batch(self, arrays: dict[str, Any]) -> Batch:
-        """Return the batch of scenes of `SceneMaker.batch`, each turned by a random angle."""
+    def batch(self, arrays: dict[str, Any], noise: Tensor | None = None) -> Batch:
+        """Return the batch of scenes of `SceneMaker.batch`, each turned by a random angle.
+
+        noise  errors (N, 3) of the poses of the stations in x, y [m] and heading [rad], of the merged points; None:
+               points are not merged
+        """
         scene = {
             name: torch.as_tensor(value).to(self._device, non_blocking=True)
             for name, value in arrays.items()
@@ -81,18 +89,24 @@ class Sampler:
         earlier = cast(self._meshes, moved, scene["count"], heads(before))
         phase = (torch.rand(len(place), 2, device=self._device) - 0.5) * STRIDE_SIDE
         center = place[:, :2] + phase
-        grids = _grids(
-            _placed(now, place, scene["yaw"], center), now, _placed(earlier, before, scene["yaw"], center), earlier
-        )
+        placed = _placed(now, place, scene["yaw"], center), _placed(earlier, before, scene["yaw"], center)
+        grids = _grids(placed[0], now, placed[1], earlier)
+        merged = None
+        if noise is not None:
+            merged = _grids(
+                *_merged(placed[0], now, center, own, noise), *_merged(placed[1], earlier, center, own, noise)
+            )
         known = torch.rand(len(place), device=self._device) < 0.9  # the earlier scan is sometimes missing
         grids[:, 8:] *= known[:, None, None, None]
+        if merged is not None:
+            merged[:, 8:] *= known[::STATIONS, None, None, None]
         slots = scene["bodies"].shape[1]
         hits = torch.zeros(len(place), slots + 1, device=self._device)
         rows = torch.where(now.returned & (now.rows >= 0), now.rows, slots).long()
         hits.scatter_add_(1, rows, torch.ones_like(rows, dtype=torch.float32))
         return Batch(
             grids, center, scene["boxes"], scene["velocity"], scene["classes"].long(), own.long(),
-            hits[:, :slots], known,
+            hits[:, :slots], known, merged,
         )  # fmt: skip
 
 
@@ -120,6 +134,40 @@ def _placed(scans: Scans, place: Tensor, yaw: Tensor, center: Tensor) -> Tensor:
     shift = (place[:, :2] - center)[:, None]
     height = z + place[:, 2:3] + GROUND_NOISE * torch.randn(len(place), 1, device=z.device)
     return torch.stack([cos * x - sin * y + shift[..., 0], sin * x + cos * y + shift[..., 1], height], dim=2)
+
+
+def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Tensor) -> tuple[Tensor, Scans]:
+    """Return the points (S, STATIONS · M, 3) of all stations of each scene in the grid of the first one, and their
+    returns.
+
+    Points of the others are those of the message: centers of occupied cells, each once, with the intensity 1, without
+    those on the body of the receiver.
+    """
+    number, rays = points.shape[:2]
+    stations = torch.arange(number, device=points.device)
+    receiver = stations // STATIONS * STATIONS
+    cos, sin = torch.cos(noise[:, 2:3]), torch.sin(noise[:, 2:3])
+    x, y, height = points.unbind(2)
+    shift = center + noise[:, :2] - center[receiver]
+    apart = torch.stack([cos * x - sin * y + shift[:, :1], sin * x + cos * y + shift[:, 1:], height], dim=2)
+    cells = torch.floor(apart / SHARED_CELL)
+    mine = (stations == receiver)[:, None]
+    apart = torch.where(mine[..., None], points, (cells + 0.5) * SHARED_CELL)
+    # One number per station and cell; the first point of equal ones remains.
+    i, j, k = (cells.long() + 4096).clamp(0, 8191).unbind(2)
+    key = ((stations[:, None] * 8192 + i) * 8192 + j) * 8192 + k
+    order = torch.sort(torch.where(scans.returned, key, -1).flatten(), stable=True)
+    again = torch.zeros_like(order.values, dtype=torch.bool)
+    again[1:] = order.values[1:] == order.values[:-1]
+    repeated = torch.zeros_like(again).scatter_(0, order.indices, again).reshape(number, rays)
+    body = own[receiver, None]
+    on_receiver = (scans.rows == body) & (body >= 0)
+    returned = scans.returned & (mine | ~(repeated | on_receiver))
+    intensity = torch.where(mine, scans.intensity, 1.0)
+    size = number // STATIONS, STATIONS * rays
+    return apart.reshape(*size, 3), Scans(
+        apart.reshape(*size, 3), returned.reshape(size), intensity.reshape(size), scans.rows.reshape(size)
+    )
 
 
 def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor:
@@ -184,19 +232,20 @@ class Targets:
     objects: Tensor
 
 
-def targets(batch: Batch, points: Tensor) -> Targets:
-    """Return the targets of each station, for bodies with these numbers of points (N, B)."""
-    number, slots = points.shape
+def targets(batch: Batch, points: Tensor, step: int = 1) -> Targets:
+    """Return the targets of every station, or of every `step`th, for bodies with these numbers of points (N, B)."""
     device = points.device
-    scene = torch.arange(len(batch.boxes), device=device).repeat_interleave(STATIONS)
+    points, center, own, known = (part[::step] for part in (points, batch.center, batch.own, batch.known))
+    number, slots = points.shape
+    scene = torch.arange(len(batch.own), device=device)[::step] // STATIONS
     boxes, velocity, classes = batch.boxes[scene], batch.velocity[scene], batch.classes[scene]
-    offset = boxes[..., :2] - batch.center[:, None]
+    offset = boxes[..., :2] - center[:, None]
     i, j = (torch.floor((offset[..., axis] + REACH) / STRIDE_SIDE) for axis in (0, 1))
     inside = (i >= 0) & (i < OUT) & (j >= 0) & (j < OUT) & (classes >= 0) & (points > 0)
-    inside &= torch.arange(slots, device=device) != batch.own[:, None]
+    inside &= torch.arange(slots, device=device) != own[:, None]
     n, b = torch.nonzero(inside, as_tuple=True)
     required = points[n, b] >= FEWEST
-    box, kind, center = boxes[n, b], classes[n, b], offset[n, b]
+    box, kind, middle = boxes[n, b], classes[n, b], offset[n, b]
     i, j = i[n, b].long(), j[n, b].long()
     sigma = (0.17 / STRIDE_SIDE * torch.sqrt(box[:, 3] * box[:, 4])).clamp(0.6, 1.5)
     around = torch.arange(-PATCH, PATCH + 1, device=device)
@@ -212,7 +261,7 @@ def targets(batch: Batch, points: Tensor) -> Targets:
     heat = heat.reshape(number, OUT, OUT, len(CLASSES)).permute(0, 3, 1, 2)
     near = on & (di.abs() <= 1) & (dj.abs() <= 1) & required[:, None]
     rows, columns = torch.nonzero(near, as_tuple=True)
-    held, point = box[rows], center[rows]
+    held, point = box[rows], middle[rows]
     cx = (pi[rows, columns] + 0.5) * STRIDE_SIDE - REACH
     cy = (pj[rows, columns] + 0.5) * STRIDE_SIDE - REACH
     shift = velocity[n, b][rows] * LAG
@@ -228,5 +277,5 @@ def targets(batch: Batch, points: Tensor) -> Targets:
     assert values.shape[1] == BOX
     weights = value[rows, columns]
     return Targets(
-        heat, cell[rows, columns], values, weights, batch.known[n][rows].float(), required.sum().clamp(min=1).float()
+        heat, cell[rows, columns], values, weights, known[n][rows].float(), required.sum().clamp(min=1).float()
     )

@@ -21,6 +21,10 @@ LAG = 0.2
 PATTERNS = ((32, 312), (32, 156), (64, 500), (16, 450))
 """Rings and columns of the lidars: the default at 10 and at 20 revolutions per second, and others."""
 PATTERN_ODDS = (0.5, 0.2, 0.2, 0.1)
+FIELDS = (360.0, 180.0, 120.0, 100.0)
+"""Fields of view of lidars at the front [degrees]."""
+SELDOM_FIELDS = (*(360.0,) * 6, 180.0, 110.0, 100.0)
+"""Fields of view of the others [degrees]."""
 _SPREAD = 60.0
 """Maximum distance of road users from the receiver [m]."""
 _ODDS = {
@@ -153,7 +157,8 @@ class SceneMaker:
                     mesh = int(rng.choice(self._shapes["rsu"]))
                     if add(mesh, x, y, heading, 0.0, (1.0, 1.0, tall / float(assets.sizes[mesh, 2]))):
                         yaw = heading + float(rng.uniform(-math.pi, math.pi))
-                        stations.append((-1, x, y, tall, yaw, 0.0, 0.0, math.pi))
+                        half = math.radians(float(rng.choice(SELDOM_FIELDS))) / 2.0
+                        stations.append((-1, x, y, tall, yaw, 0.0, 0.0, half))
                         break
                 else:
                     shape = str(
@@ -165,7 +170,7 @@ class SceneMaker:
                         ahead, up = (
                             (length / 2.0 + 0.06, 1.0) if front else (float(rng.uniform(-0.9, 0.3)), height + 0.35)
                         )
-                        half = math.radians(float(rng.choice([360.0, 180.0, 120.0, 100.0]))) / 2.0 if front else math.pi
+                        half = math.radians(float(rng.choice(FIELDS if front else SELDOM_FIELDS))) / 2.0
                         stations.append((
                             len(entries) - 1, x + ahead * math.cos(heading), y + ahead * math.sin(heading), up, heading,
                             vx, vy, half,

@@ -22,6 +22,7 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from training.pillars.network import (
     BOX,
+    CODES,
     OUT,
     REACH,
     STRIDE_SIDE,
@@ -41,8 +42,16 @@ AVERAGE = 0.998
 """Decay of the moving average of the weights in each step."""
 SHARES = (1.0, 1.0, 0.1, 0.05, 0.02, 0.01)
 """Shares of the cells that senders of a batch send."""
-LARGEST_NOISE = 0.4
+LARGEST_NOISE = 0.6
 """Largest standard deviation of the pose error of a sender, in meters and in degrees; half of the batches have none."""
+CODED = 0.35
+"""Share of the batches with features of the code book."""
+CHANGE_WEIGHT = 0.1
+"""Weight of the change of features by the code book in the loss."""
+OBJECT = 0.1
+"""Confidence from which a cell has an object."""
+OTHERS = 0.1
+"""Share of the other cells in 5 % of a map from which the code book is made; more would have most of its entries."""
 TEST_SEED = 10**6
 _BOX_WEIGHTS = (2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 K = len(CLASSES)
@@ -95,6 +104,50 @@ def union(batch: Batch) -> Tensor:
     return batch.points.reshape(-1, STATIONS, batch.points.shape[1]).sum(dim=1).repeat_interleave(STATIONS, dim=0)
 
 
+class CodeBook:
+    """Code book that follows the features (van den Oord, Vinyals, Kavukcuoglu: Neural discrete representation
+    learning, 2017, appendix A.1): its entries are moving means of the features that are nearest to them.
+    """
+
+    DECAY = 0.99
+    FEWEST = 0.02
+    """Moving count of features below which an entry is replaced by a feature."""
+
+    def __init__(self, network: Pillars) -> None:
+        self._network = network
+        self._count = torch.zeros(CODES, device=network.codebook.device)
+        self._sum = torch.zeros_like(network.codebook)
+
+    @torch.no_grad()
+    def update(self, values: Tensor) -> None:
+        """Update the entries by features (M, 8)."""
+        if not len(values):
+            return
+        book = self._network.codebook
+        nearest = self._network.nearest(values)
+        count = torch.zeros_like(self._count).index_add_(0, nearest, torch.ones_like(values[:, 0]))
+        self._count.lerp_(count, 1.0 - self.DECAY)
+        self._sum.lerp_(torch.zeros_like(self._sum).index_add_(0, nearest, values), 1.0 - self.DECAY)
+        unused = self._count < self.FEWEST
+        picked = values[torch.randint(len(values), (CODES,), device=values.device)]
+        book.copy_(torch.where(unused[:, None], picked, self._sum / self._count.clamp(min=1e-6)[:, None]))
+        self._sum = torch.where(unused[:, None], picked, self._sum)
+        self._count = torch.where(unused, 1.0, self._count)
+
+
+def _book_cells(confidence: Tensor) -> Tensor:
+    """Return the cells (N, H, W) that the code book follows."""
+    others = most_confident(confidence, 0.05) > 0.0
+    return (confidence >= OBJECT) | (others & (torch.rand_like(confidence) < OTHERS))
+
+
+def pose_errors(number: int, noise: float, device: torch.device) -> Tensor:
+    """Return errors (number, 3) in x, y [m] and heading [rad] with the standard deviation `noise` in m and degrees."""
+    errors = noise * torch.randn(number, 3, device=device)
+    errors[:, 2] = torch.deg2rad(errors[:, 2])
+    return errors
+
+
 def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, noise: float) -> tuple[Tensor, Tensor]:
     """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells."""
     number = len(latent)
@@ -103,10 +156,9 @@ def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, 
     maps, present = [], []
     for step in range(1, STATIONS):
         sender = scene * STATIONS + (station + step) % STATIONS
-        error = noise * torch.randn(number, 3, device=latent.device)
-        turn = torch.deg2rad(error[:, 2])
+        error = pose_errors(number, noise, latent.device)
         shift = batch.center - batch.center[sender] + error[:, :2]
-        values, held = warp(latent[sender], mask[sender], shift, turn)
+        values, held = warp(latent[sender], mask[sender], shift, error[:, 2])
         held = held * ~_own_cells(batch)
         maps.append(network.received(values.to(latent.dtype)))
         present.append(held)
@@ -136,19 +188,26 @@ def train(
     average = copy.deepcopy(network).eval()
     parameters = [entry for entry in network.parameters() if entry.requires_grad]
     optimizer = torch.optim.AdamW(parameters, lr=RATE, weight_decay=DECAY)
-    features = torch.compile(network.features) if arguments.compile else network.features
+    features = torch.compile(network.features, dynamic=False) if arguments.compile else network.features
     random = np.random.default_rng(arguments.seed + (1 if joint else 0))
+    book, device = CodeBook(network), network.codebook.device
     start, step, held = time.monotonic(), 0, []
     peak = RATE * (0.4 if joint else 1.0)
     while (progress := (time.monotonic() - start) / (60.0 * arguments.minutes)) < 1.0:
         rate = peak * min(1.0, (step + 1) / 300.0) * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * progress)))
         for group in optimizer.param_groups:
             group["lr"] = rate
+        noise = float(random.uniform(0.0, LARGEST_NOISE)) if joint and random.random() < 0.5 else 0.0
         with torch.no_grad():
-            batch = sampler.batch(next(scenes))
+            arrays = next(scenes)
+            number = len(arrays["bodies"]) * STATIONS
+            batch = sampler.batch(arrays, pose_errors(number, noise, device) if joint else None)
             own = targets(batch, batch.points)
+            # In one batch, so that normalization has the same statistics in training as later.
+            grids = batch.grids if batch.merged is None else torch.cat([batch.grids, batch.merged])
         with torch.autocast(sampler.device_type, torch.bfloat16):
-            own_features = features(batch.grids.contiguous(memory_format=torch.channels_last))
+            all_features = features(grids.contiguous(memory_format=torch.channels_last))
+            own_features = all_features[:number]
             own_maps = network.head(own_features)
             latent = network.sent(own_features)
             restored = network.head(network.received(latent))
@@ -156,13 +215,19 @@ def train(
         if joint:
             together = targets(batch, union(batch))
             share = float(random.choice(SHARES))
-            noise = float(random.uniform(0.0, LARGEST_NOISE)) if random.random() < 0.5 else 0.0
-            mask = most_confident(probabilities(own_maps.detach()), share)
+            confidence = probabilities(own_maps.detach())
+            mask = most_confident(confidence, share)
+            book.update(latent.detach().float().permute(0, 2, 3, 1)[_book_cells(confidence)])
+            if random.random() < CODED:
+                latent, change = network.coded(latent, mask)
+                loss = loss + CHANGE_WEIGHT * change
             with torch.autocast(sampler.device_type, torch.bfloat16):
                 maps, present = received_maps(network, batch, latent, mask, noise)
                 fused = fuse(own_features.float(), maps.float(), present, str(random.choice(["max", "attention"])))
                 fused_maps = network.head(fused)
+                merged_maps = network.head(all_features[number:])
             loss = loss + loss_of(fused_maps, together)
+            loss = loss + 0.5 * loss_of(merged_maps, targets(batch, union(batch), step=STATIONS))
         optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(parameters, 10.0)
@@ -210,7 +275,8 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
     detections: dict[str, list[tuple[float, bool]]] = {}
     objects: dict[str, int] = {}
     for number in range(batches):
-        batch = sampler.batch(maker.batch((TEST_SEED, number), arguments.scenes))
+        arrays = maker.batch((TEST_SEED, number), arguments.scenes)
+        batch = sampler.batch(arrays, pose_errors(arguments.scenes * STATIONS, 0.0, network.codebook.device))
         features = network.features(batch.grids)
         own = network.head(features)
         latent = network.sent(features)
@@ -223,14 +289,20 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
             for method in methods:
                 name = f"{method} {share:g} {noise:g}"
                 results[name] = (network.head(fuse(features, maps, present, method)), union(batch))
+            if noise == 0.0:
+                maps, present = received_maps(network, batch, network.coded(latent, mask)[0], mask, 0.0)
+                results[f"codes {share:g}"] = network.head(fuse(features, maps, present, "attention")), union(batch)
+        if batch.merged is not None:
+            results["early"] = network.head(network.features(batch.merged)), union(batch)
         scene = torch.arange(len(batch.own), device=batch.own.device) // STATIONS
         centers = batch.boxes[scene][..., :2] - batch.center[:, None]
         inside = (centers.abs() < REACH).all(dim=2) & (batch.classes[scene] >= 0)
         inside &= torch.arange(centers.shape[1], device=centers.device) != batch.own[:, None]
         for name, (maps, points) in results.items():
             scores, _, places = (part.cpu().numpy() for part in peaks(maps))
-            truth = (inside & (points > 0)).cpu().numpy()
-            distance = torch.cdist(torch.as_tensor(places), centers.cpu().float()).numpy()
+            step = len(inside) // len(maps)
+            truth = (inside & (points > 0))[::step].cpu().numpy()
+            distance = torch.cdist(torch.as_tensor(places), centers[::step].cpu().float()).numpy()
             for row in range(len(scores)):
                 open_rows = truth[row].copy()
                 objects[name] = objects.get(name, 0) + int(open_rows.sum())
