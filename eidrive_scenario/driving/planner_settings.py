@@ -94,10 +94,10 @@ def split_planner_settings(
             _parse(
                 other, {key: rest.pop(key)}, source, lines.get(key, line), lines, origins, diagnostics, incomplete=True
             )
-    place = lines.get("planner_settings", lines.get("planner", line))
+    planner_line = lines.get("planner_settings", lines.get("planner", line))
     nested_origins = {path.removeprefix("planner_settings."): text for path, text in origins.items()}
-    found = _parse(model, {**own, **nested}, source, place, lines, nested_origins, diagnostics)
-    return rest, found or PlannerSettings()
+    settings = _parse(model, {**own, **nested}, source, planner_line, lines, nested_origins, diagnostics)
+    return rest, settings or PlannerSettings()
 
 
 def _parse(
@@ -122,8 +122,8 @@ def _parse(
         if not isinstance(cause, ValidationError):
             diagnostics += error.diagnostics
             return None
-        for diagnostic, found in zip(error.diagnostics, cause.errors(include_url=False), strict=False):
-            if found["type"] != "missing" or not (incomplete or found["loc"][0] in lines):
+        for diagnostic, details in zip(error.diagnostics, cause.errors(include_url=False), strict=False):
+            if details["type"] != "missing" or not (incomplete or details["loc"][0] in lines):
                 diagnostics.append(diagnostic)
         return None
 

@@ -279,14 +279,14 @@ def parse_station_settings(
     `lines` gives the line of each property, and `origins` is that of `parse_settings`. Raise SettingError with these
     diagnostics and those of invalid settings.
     """
-    found = list(diagnostics)
+    errors = list(diagnostics)
     station, planner_settings = split_planner_settings(
-        data, AgentSettings.model_fields, source=source, line=line, lines=lines, origins=origins, diagnostics=found
+        data, AgentSettings.model_fields, source=source, line=line, lines=lines, origins=origins, diagnostics=errors
     )
     try:
         settings = parse_settings(AgentSettings, station, source=source, line=line, lines=lines, origins=origins)
     except SettingError as error:
-        raise SettingError([*found, *error.diagnostics]) from error
-    if found:
-        raise SettingError(found)
+        raise SettingError([*errors, *error.diagnostics]) from error
+    if errors:
+        raise SettingError(errors)
     return settings.model_copy(update={"planner_settings": planner_settings})

@@ -40,21 +40,21 @@ def declared_settings(
     ]
     if diagnostics:
         raise SettingError(diagnostics)
-    found: dict[str, AgentSettings] = {}
+    declared: dict[str, AgentSettings] = {}
     controllers: dict[str, Controller] = {}
     for name, assigned in scenario.controllers.items():
         for controller in filter(is_agent_controller, assigned):
             try:
-                found[name] = agent_settings(controller)
+                declared[name] = agent_settings(controller)
             except SettingError as error:
                 diagnostics.extend(error.diagnostics)
             controllers[name] = controller
     selections = EntitySelections(scenario)
-    for name, settings in found.items():
+    for name, settings in declared.items():
         senders = _without_selections(settings.cooperates_with, selections, controllers)
         if senders != settings.cooperates_with:
-            found[name] = settings.model_copy(update={"cooperates_with": senders})
-        diagnostics.extend(_unknown_senders(name, found[name], selections, controllers))
+            declared[name] = settings.model_copy(update={"cooperates_with": senders})
+        diagnostics.extend(_unknown_senders(name, declared[name], selections, controllers))
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
             line = _line(controllers[name], "planner")
@@ -68,7 +68,7 @@ def declared_settings(
     if diagnostics:
         raise SettingError(diagnostics)
     updated = {}
-    for name, settings in found.items():
+    for name, settings in declared.items():
         update: dict[str, Any] = dict(selected)
         # Settings of the file apply to the detector and the fusion method of the file
         update |= {f"{part}_settings": {} for part, name in selected.items() if name != getattr(settings, part)}
@@ -176,11 +176,11 @@ def _without_selections(
     """Return the senders with each selection replaced by the stations among its members, if there are any."""
     if senders is None:
         return None
-    found: dict[str, None] = {}
+    expanded: dict[str, None] = {}
     for sender in senders:
         members = [name for name in selections.members(sender) if name in stations]
-        found.update(dict.fromkeys(members or [sender]))
-    return tuple(found)
+        expanded.update(dict.fromkeys(members or [sender]))
+    return tuple(expanded)
 
 
 def _unknown_senders(

@@ -167,7 +167,7 @@ class MotionlessStations:
     def warnings(self, scenario: Scenario, time: float) -> Iterator[Diagnostic]:
         """Yield a warning for each driving station that did not move until the end of the run at `time` [s]."""
         entities = scenario.document.entities
-        lines = {one.name: one.line for one in entities.scenario_object} if entities is not None else {}
+        lines = {entity.name: entity.line for entity in entities.scenario_object} if entities is not None else {}
         for name in self._starts:
             if name in self._reached and time - self._since[name] >= PATIENCE:
                 yield Diagnostic(

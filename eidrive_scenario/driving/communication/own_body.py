@@ -83,7 +83,7 @@ class OwnBody:
         reach = driven - self._places[0].driven + self._half_diagonal
         self._vicinity = x, y, math.inf if self._has_trailers else reach
 
-    def place(self, time: float) -> tuple[float, float, float, float]:
+    def pose(self, time: float) -> tuple[float, float, float, float]:
         """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
         return self._at(time).pose
 
@@ -95,14 +95,14 @@ class OwnBody:
 
     def reference_pose(self, time: float) -> tuple[float, float, float, float]:
         """Return position [m] and heading [rad] of the reference point at that time."""
-        x, y, z, yaw = self.place(time)
+        x, y, z, yaw = self.pose(time)
         cos, sin = math.cos(yaw), math.sin(yaw)
         ahead, aside, _ = self._spec.offset
         return x - cos * ahead + sin * aside, y - sin * ahead - cos * aside, z, yaw
 
     def box(self, time: float) -> Array:
         """Return the box (7,) of the outline at that time, with a margin that covers objects on the body."""
-        x, y, z, yaw = self.place(time)
+        x, y, z, yaw = self.pose(time)
         length, width, height = self._spec.size
         return np.array([x, y, z, length + BODY_MARGIN, width + BODY_MARGIN, 4.0 * height, yaw])
 
@@ -115,9 +115,9 @@ class OwnBody:
         boxes = detections.boxes
         if len(boxes) == 1 and math.hypot(boxes.item(0) - center_x, boxes.item(1) - center_y) > reach:
             return detections  # a single object that is far from all stored places
-        place = self._at(detections.time)
-        detections = _without_bodies(detections, place.trailers)
-        return _without_bodies(detections, [place.body])
+        stored = self._at(detections.time)
+        detections = _without_bodies(detections, stored.trailers)
+        return _without_bodies(detections, [stored.body])
 
     def without_perceived(
         self,
@@ -138,9 +138,9 @@ class OwnBody:
         own              newest own detections
         pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
         """
-        place = self._at(detections.time)
-        detections = _without_bodies(detections, place.trailers)
-        inside = rows_on_bodies(detections, [place.body])
+        stored = self._at(detections.time)
+        detections = _without_bodies(detections, stored.trailers)
+        inside = rows_on_bodies(detections, [stored.body])
         if not inside:
             row = self._likeliest_row(detections, station, state, own, pose_covariance)
             inside = [] if row is None else [row]
@@ -172,7 +172,7 @@ class OwnBody:
             if not math.isfinite(covariance[0, 0]):
                 continue
             if body is None:
-                body = np.array(self.place(detections.time)[:2])
+                body = np.array(self.pose(detections.time)[:2])
             if state is not None and state.pose_covariance is not None:
                 point = detections.boxes[row : row + 1, :2]
                 covariance = covariance + pose_part(point, state.x, state.y, state.pose_covariance)[0]
@@ -195,11 +195,11 @@ def _explained(position: Array, covariance: Array, time: float, cost: float, own
     """Return whether an own detection is likelier than this cost to be the object."""
     if own is None or not len(own):
         return False
-    places = own.boxes[:, :2] + np.nan_to_num(own.velocity) * (time - own.time)
-    for place, other in zip(places, own.covariance, strict=True):
-        if math.isfinite(other[0, 0]) and _squared_mahalanobis(position - place, covariance + other)[1] <= cost:
-            return True
-    return False
+    positions = own.boxes[:, :2] + np.nan_to_num(own.velocity) * (time - own.time)
+    return any(
+        math.isfinite(spread[0, 0]) and _squared_mahalanobis(position - other, covariance + spread)[1] <= cost
+        for other, spread in zip(positions, own.covariance, strict=True)
+    )
 
 
 def _squared_mahalanobis(offset: Array, covariance: Array) -> tuple[float, float]:

@@ -56,8 +56,8 @@ def ground_height(view: WorldView, spec: ActorSpec, roads: RoadNetwork | None) -
     x, y, z, *_ = view.states[view.rows[spec.name]]
     if roads is None or spec.has_wheels:
         return z
-    found = roads.locate_at(x, y, z=z)
-    return z if found is None else roads.road_pose_at(found.road, found.s, found.t).z
+    ground = roads.locate_at(x, y, z=z)
+    return z if ground is None else roads.road_pose_at(ground.road, ground.s, ground.t).z
 
 
 def line_of_sight_states(
@@ -93,16 +93,16 @@ def line_of_sight_states(
         begin, end = points[first[lines]], points[second[lines]]
         share = _share_of_line(begin[:, :2], end[:, :2], view.centers[rows, :2])
         tops -= below[first[lines]] * (1.0 - share) + below[second[lines]] * share
-    found: dict[int, list[str]] = {}
+    blocking: dict[int, list[str]] = {}
     for line, row, top in zip(lines.tolist(), rows.tolist(), tops.tolist(), strict=True):
-        names = found.setdefault(line, [])
+        names = blocking.setdefault(line, [])
         if len(names) < _MOST_BODIES:
             names.append(view.names[row])
             heights[line] = max(heights[line], top)
     states = np.full(count, LOS)
-    states[[*found]] = NLOSV
+    states[[*blocking]] = NLOSV
     states[crossed.scenery < 1.0] = NLOS
-    return LineOfSightStates(states, heights, {line: tuple(names) for line, names in found.items()})
+    return LineOfSightStates(states, heights, {line: tuple(names) for line, names in blocking.items()})
 
 
 def _share_of_line(begin: Array, end: Array, points: Array) -> Array:

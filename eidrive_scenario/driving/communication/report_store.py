@@ -65,22 +65,22 @@ class PartialReportAssembler:
         if not self._rows:
             return Detections(time)
         numbers = sorted(self._rows)
-        known = [self._rows[number][1] for number in numbers]
-        boxes = np.concatenate([one.boxes for one in known])
-        velocity = np.concatenate([one.velocity for one in known])
-        for row, (one, (vx, vy)) in enumerate(zip(known, velocity.tolist(), strict=True)):
+        detections = [self._rows[number][1] for number in numbers]
+        boxes = np.concatenate([detection.boxes for detection in detections])
+        velocity = np.concatenate([detection.velocity for detection in detections])
+        for row, (detection, (vx, vy)) in enumerate(zip(detections, velocity.tolist(), strict=True)):
             if not math.isnan(vx + vy):
-                boxes[row, 0] += vx * (time - one.time)
-                boxes[row, 1] += vy * (time - one.time)
+                boxes[row, 0] += vx * (time - detection.time)
+                boxes[row, 1] += vy * (time - detection.time)
         return Detections(
             time,
             boxes,
-            np.concatenate([one.scores for one in known]),
-            tuple(one.classes[0] for one in known),
+            np.concatenate([detection.scores for detection in detections]),
+            tuple(detection.classes[0] for detection in detections),
             velocity,
-            np.concatenate([one.covariance for one in known]),
+            np.concatenate([detection.covariance for detection in detections]),
             tuple(numbers),
-            np.concatenate([one.confidence for one in known]),
+            np.concatenate([detection.confidence for detection in detections]),
         )
 
 
@@ -105,7 +105,9 @@ class PerceptionRegionStore:
         """
         held = self._regions.get(station)
         if held is None or held.time <= time:
-            self._regions[station] = PerceptionRegion(station, time, tuple([one.placed(*pose) for one in sectors]))
+            self._regions[station] = PerceptionRegion(
+                station, time, tuple([sector.placed(*pose) for sector in sectors])
+            )
 
     def add_message(self, message: Message) -> None:
         """Store the region of a CPM. Without information about the sensors of its sender it has none.

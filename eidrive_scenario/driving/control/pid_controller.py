@@ -165,7 +165,7 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
 
     The heading is interpolated between the midpoints of segments, so that the steering is continuous.
     """
-    best, nearest, place, leads_away = 0, math.inf, 0.0, math.inf
+    best, nearest, nearest_share, leads_away = 0, math.inf, 0.0, math.inf
     x0, y0 = points[0]
     for index, (x1, y1) in enumerate(points[1:]):
         dx, dy = x1 - x0, y1 - y0
@@ -176,16 +176,16 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
         gap = ax * ax + ay * ay
         if gap < nearest:
             root = math.sqrt(gap)
-            best, nearest, place, leads_away = index, gap - 2e-9 * root, held, (root + LEADS_AWAY) ** 2
+            best, nearest, nearest_share, leads_away = index, gap - 2e-9 * root, held, (root + LEADS_AWAY) ** 2
         elif gap > leads_away:
             break
         x0, y0 = x1, y1
     heading = _heading(points, best)
     (x0, y0), (x1, y1) = points[best], points[best + 1]
     left = ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) / math.hypot(x1 - x0, y1 - y0)
-    neighbor = best + 1 if place > 0.5 else best - 1
+    neighbor = best + 1 if nearest_share > 0.5 else best - 1
     if 0 <= neighbor < len(points) - 1:
-        heading += abs(place - 0.5) * wrap_angle(_heading(points, neighbor) - heading)
+        heading += abs(nearest_share - 0.5) * wrap_angle(_heading(points, neighbor) - heading)
     return heading, left
 
 

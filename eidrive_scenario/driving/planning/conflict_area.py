@@ -113,17 +113,17 @@ class ConflictAreaPlanner(RoutePlanner):
 
         heights  of the path [m]; objects on another level, such as below a bridge, are in no area
         """
-        found = [
+        inside = [
             index
             for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())
             if any([point_in_polygon(x, y, area) for area in self.planner_settings.conflict_area])
         ]
         path = self._path
-        if found and path is not None and heights is not None:
+        if inside and path is not None and heights is not None:
             bottom = objects.boxes[:, 2] - objects.boxes[:, 5] / 2.0
             places = np.column_stack([objects.boxes[:, :2], bottom])
-            found = [index for index in found if is_on_level(places[index], path.points, heights)]
-        if not found:
+            inside = [index for index in inside if is_on_level(places[index], path.points, heights)]
+        if not inside:
             return ()
         existence = objects.confidence.tolist()
-        return tuple([index for index in found if existence[index] >= self.planner_settings.min_existence])
+        return tuple([index for index in inside if existence[index] >= self.planner_settings.min_existence])

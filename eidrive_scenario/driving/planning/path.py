@@ -163,24 +163,24 @@ def path_heights(path: PlannedPath, roads: RoadNetwork | None, z: float) -> Arra
     z  height of the vehicle at the start of the path [m]
     """
     if path.heights is None and roads is not None and not roads.is_level:
-        place, found = None, []
+        location, heights = None, []
         for x, y in path.points.tolist():
-            place = roads.locate_at(x, y, place, z, reach=5.0)
-            z = z if place is None else roads.road_pose_at(place.road, place.s, place.t).z
-            found.append(z)
-        path.heights = np.array(found)
+            location = roads.locate_at(x, y, location, z, reach=5.0)
+            z = z if location is None else roads.road_pose_at(location.road, location.s, location.t).z
+            heights.append(z)
+        path.heights = np.array(heights)
     return path.heights
 
 
-def is_on_level(place: Array, points: Array, heights: Array) -> bool:
+def is_on_level(point: Array, points: Array, heights: Array) -> bool:
     """Return whether an object is on the level of a path (M, 2) with these heights (M,); True far from the path.
 
-    place  x, y, and height of the lower side of the object [m]
+    point  x, y, and height of the lower side of the object [m]
     """
-    gap = np.hypot(*(points - place[:2]).T)
+    gap = np.hypot(*(points - point[:2]).T)
     nearest = float(gap.min())
     there = heights[gap <= nearest + SAME_PLACE]
-    return nearest > NEAR_PATH or bool(np.any(np.abs(there - place[2]) <= OTHER_LEVEL))
+    return nearest > NEAR_PATH or bool(np.any(np.abs(there - point[2]) <= OTHER_LEVEL))
 
 
 ALIGNED = 0.6
@@ -194,33 +194,33 @@ def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
     lane on the level of the vehicle is selected whose traffic drives closest to its heading, if it is aligned.
     """
     x, y, z = ego.position.tolist()
-    place = roads.locate_at(x, y)
-    if place is None:
+    location = roads.locate_at(x, y)
+    if location is None:
         return None
-    is_level = _is_level(roads, place, z)
-    if is_level and _angle(roads, place, ego.yaw) <= ALIGNED:
-        return place
+    is_level = _is_level(roads, location, z)
+    if is_level and _angle(roads, location, ego.yaw) <= ALIGNED:
+        return location
     height = None if roads.is_level else np.array([z])
     rows, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
     keys = [key for key, _ in roads.tables.lane_keys()]
-    found = [
+    candidates = [
         roads.location(keys[row].road, keys[row].lane, s)
         for row, s in zip(rows.tolist(), along.tolist(), strict=True)
         if roads.tables.lane_drivable[row]
     ]
-    found = [one for one in found if _is_level(roads, one, z)]
-    best = min(found, key=lambda one: _angle(roads, one, ego.yaw), default=place)
-    return best if not is_level or _angle(roads, best, ego.yaw) <= ALIGNED else place
+    candidates = [candidate for candidate in candidates if _is_level(roads, candidate, z)]
+    best = min(candidates, key=lambda candidate: _angle(roads, candidate, ego.yaw), default=location)
+    return best if not is_level or _angle(roads, best, ego.yaw) <= ALIGNED else location
 
 
-def _is_level(roads: RoadNetwork, place: LaneLocation, z: float) -> bool:
+def _is_level(roads: RoadNetwork, location: LaneLocation, z: float) -> bool:
     """Return whether a lane is on the level of a vehicle at height z [m]."""
-    return roads.is_level or abs(roads.road_pose_at(place.road, place.s, place.t).z - z) <= OTHER_LEVEL
+    return roads.is_level or abs(roads.road_pose_at(location.road, location.s, location.t).z - z) <= OTHER_LEVEL
 
 
-def _angle(roads: RoadNetwork, place: LaneLocation, yaw: float) -> float:
+def _angle(roads: RoadNetwork, location: LaneLocation, yaw: float) -> float:
     """Return the angle between a heading and the driving direction of a lane [rad]."""
-    heading = roads.lane_pose_at(place.road, place.lane, place.s).h
-    if roads.driving_direction(place.road, place.lane) < 0:
+    heading = roads.lane_pose_at(location.road, location.lane, location.s).h
+    if roads.driving_direction(location.road, location.lane) < 0:
         heading += math.pi
     return abs(float(wrap_angle(yaw - heading)))

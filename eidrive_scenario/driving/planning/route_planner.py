@@ -233,7 +233,7 @@ class RoutePlanner(Planner):
         if self.roads is None:
             return None
         places = [lane_below(self.roads, ego), *(self.roads.locate_at(x, y) for x, y in waypoints[:, :2].tolist())]
-        on_road = [place for place in places if place is not None]
+        on_road = [location for location in places if location is not None]
         if len(on_road) < len(places):
             return None
         line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
@@ -258,23 +258,23 @@ class RoutePlanner(Planner):
         """Return the lane at the vehicle if its driving direction is that of the vehicle."""
         if self.roads is None:
             return []
-        place = lane_below(self.roads, ego)
-        if place is None:
+        location = lane_below(self.roads, ego)
+        if location is None:
             return []
-        heading = self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0).h
-        direction = self.roads.driving_direction(place.road, place.lane)
-        return [place] if direction * math.cos(ego.yaw - heading) > 0.0 else []
+        heading = self.roads.lane_pose_at(location.road, location.lane, location.s, 0.0).h
+        direction = self.roads.driving_direction(location.road, location.lane)
+        return [location] if direction * math.cos(ego.yaw - heading) > 0.0 else []
 
 
-def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:
+def _further(roads: RoadNetwork, location: LaneLocation) -> list[LaneLocation]:
     """Return the next STRIDE positions along the lane, about SPACING apart; fewer at its end."""
-    there = roads.advance(place, STRIDE * SPACING)
-    if there is not None and there[:2] == place[:2]:
-        road, step = roads.road(place.road), (there.s - place.s) / STRIDE
-        same = road.section_at(place.s) is road.section_at(there.s)
-        if same and road.length > TURNS and step * roads.driving_direction(place.road, place.lane) > 0.0:
-            return [*(place._replace(s=place.s + number * step) for number in range(1, STRIDE)), there]
-    places = [place]
+    there = roads.advance(location, STRIDE * SPACING)
+    if there is not None and there[:2] == location[:2]:
+        road, step = roads.road(location.road), (there.s - location.s) / STRIDE
+        same = road.section_at(location.s) is road.section_at(there.s)
+        if same and road.length > TURNS and step * roads.driving_direction(location.road, location.lane) > 0.0:
+            return [*(location._replace(s=location.s + number * step) for number in range(1, STRIDE)), there]
+    places = [location]
     while len(places) <= STRIDE and (onward := roads.advance(places[-1], SPACING)) is not None:
         places.append(onward)
     return places[1:]

@@ -38,7 +38,7 @@ WAIT = 3.0
 class StopPoint(NamedTuple):
     """Stop point: distance along the path [m], and reason."""
 
-    place: float
+    along: float
     reason: str
 
 
@@ -65,7 +65,7 @@ class SignalStops:
 
     def next(self, along: float, speed: float, now: float) -> StopPoint | None:
         """Return the next stop of a vehicle at distance `along` of the path [m]; None if no signal requires one."""
-        found: StopPoint | None = None
+        stop: StopPoint | None = None
         ahead: dict[str, SignalAhead] = {}
         for signal in self.signals.ahead(along):
             ahead.setdefault(signal.signal, signal)
@@ -76,10 +76,10 @@ class SignalStops:
         for signal in ahead.values():
             left = signal.distance - self._front - BEFORE_LINE
             holds = self._light_holds if signal.kind == "light" else self._sign_holds
-            if holds(signal, left, speed, now) and found is None:
+            if holds(signal, left, speed, now) and stop is None:
                 what = "traffic light" if signal.kind == "light" else "stop sign"
-                found = StopPoint(along + max(left, 0.0), f"stop at {what} {signal.signal}")
-        return found
+                stop = StopPoint(along + max(left, 0.0), f"stop at {what} {signal.signal}")
+        return stop
 
     def _forget(self, name: str) -> None:
         """Delete the state of a signal that the vehicle has passed."""
@@ -91,7 +91,7 @@ class SignalStops:
 
     def limits(self, stop: StopPoint, part: slice) -> Array:
         """Return the maximum speeds at points of the path with which the vehicle stops there [m/s]."""
-        return np.sqrt(2.0 * APPROACH_DECELERATION * np.maximum(stop.place - self._along[part], 0.0))
+        return np.sqrt(2.0 * APPROACH_DECELERATION * np.maximum(stop.along - self._along[part], 0.0))
 
     def place_of(self, index: int, path: Array, x: float, y: float) -> float:
         """Return the distance of a point along the path [m]; its nearest segment begins at `index`."""

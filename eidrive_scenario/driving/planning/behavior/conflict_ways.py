@@ -88,12 +88,12 @@ class ConflictWays:
 
         passages  of junctions by the line
         """
-        found = [way for passage in passages for way in self._of_junction(line, passage)]
+        ways = [way for passage in passages for way in self._of_junction(line, passage)]
         lit = [(passage.start - AROUND, passage.end + AROUND) for passage in passages if passage.has_light]
         for number, outline in enumerate(self._crosswalks):
-            ways = _beside_crosswalk(line, number, outline, self._half_width)
-            found += [way._replace(has_light=any(low <= way.start <= high for low, high in lit)) for way in ways]
-        return _grouped(sorted(found, key=lambda way: way.start), self._length + ROOM)
+            for way in _beside_crosswalk(line, number, outline, self._half_width):
+                ways.append(way._replace(has_light=any(low <= way.start <= high for low, high in lit)))
+        return _grouped(sorted(ways, key=lambda way: way.start), self._length + ROOM)
 
     def _of_junction(self, line: ReferenceLine, own: Passage) -> Iterator[ConflictWay]:
         low, high = line.index_at(own.start - AROUND), line.index_at(own.end + AROUND) + 1
@@ -143,7 +143,7 @@ class ConflictWays:
                 break
             if len(before) > 1:
                 longer = ([key, *chain] for key in before)
-                chains = [self._upstream(one, length + self._lane_length(one[0])) for one in longer]
+                chains = [self._upstream(extended, length + self._lane_length(extended[0])) for extended in longer]
                 # In turn, so that each of the preceding lanes is among the first ones.
                 return [more for turn in zip_longest(*chains) for more in turn if more is not None][:MOST]
             chain = [before[0], *chain]
@@ -217,12 +217,12 @@ def _grouped(ways: list[ConflictWay], room: float) -> list[ConflictWay]:
 
     room  length of a place between two zones at which the vehicle can wait [m]
     """
-    found: list[ConflictWay] = []
+    grouped: list[ConflictWay] = []
     hold = end = lane = -np.inf
     for way in ways:
         if way.start - end > room:
             hold, lane = way.start, np.inf
         end = max(end, way.end)
         lane = min(lane, way.start) if way.kind == "lane" else lane
-        found.append(way._replace(hold=hold, look=lane if way.kind == "lane" else hold))
-    return found
+        grouped.append(way._replace(hold=hold, look=lane if way.kind == "lane" else hold))
+    return grouped

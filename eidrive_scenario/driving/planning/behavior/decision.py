@@ -176,7 +176,7 @@ class Decider:
         if current is None or shift is None:
             self._current = None
             return
-        places = tuple(place + shift for place in current.places)
+        places = tuple(s + shift for s in current.places)
         self._current = msgspec.structs.replace(current, places=places, waits_at=current.waits_at + shift)
         if aside:
             values = tuple(value - aside for value in current.values)
@@ -326,11 +326,11 @@ class Decider:
             holds: list[Wall] = []
             verdict = Verdict.GO
             if profile.uses_oncoming:
-                profile, verdict, place = self._verified(situation, scene, profile, stops)
+                profile, verdict, waits_at = self._verified(situation, scene, profile, stops)
                 if verdict in (Verdict.WAIT, Verdict.FOLLOW):
                     waiting.add(number)
                 if verdict is Verdict.WAIT:
-                    holds.append(Wall(place, math.inf, "wait for a free oncoming lane"))
+                    holds.append(Wall(waits_at, math.inf, "wait for a free oncoming lane"))
                 if verdict is Verdict.GIVE_UP:
                     refused.add(number)
             merges = change is not None and profile.name == change.name
@@ -419,7 +419,7 @@ class Decider:
         has_begun = self._passes and is_current
         now = situation.now
         verdict = self._oncoming.verify(profile, motion, outlook, now, is_current=is_current, has_begun=has_begun)
-        place = self._oncoming.waiting_place(profile, situation.s)
+        waits_at = self._oncoming.waiting_place(profile, situation.s)
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
             verdict = Verdict.WAIT
         start = Start(*situation.steered, situation.speed)
@@ -429,24 +429,24 @@ class Decider:
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
             better = with_view(profile, start, self._settings, sufficient)
             if better is not None:
-                profile, place = better, self._oncoming.waiting_place(better, situation.s)
+                profile, waits_at = better, self._oncoming.waiting_place(better, situation.s)
             elif math.isinf(profile.waits_at):
                 # Nearer to the obstacle it would see less.
                 stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
-                place = min(place, situation.s + stop)
-            waits = situation.speed < AT_REST and place - situation.s < NEAR_PLACE
+                waits_at = min(waits_at, situation.s + stop)
+            waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene, self._body):
                 is_last_place = math.isinf(profile.waits_at)
                 is_free = self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:
             if self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=False):
-                return profile, Verdict.GO, place
+                return profile, Verdict.GO, waits_at
             edge = at_edge(profile, start, self._settings)
             # A motion to the edge that has begun is completed, instead of a new one in each tick.
             current = self._current if is_current else None
             profile = current if current is not None and abs(current.last - edge.last) < AT_OFFSET else edge
-        return profile, verdict, place
+        return profile, verdict, waits_at
 
     def _required_change(self, situation: Situation, scene: Surroundings, change: LaneChange) -> LateralProfile | None:
         """Return the motion into the lane to which the route changes; None without a gap.

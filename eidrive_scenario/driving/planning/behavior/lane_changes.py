@@ -61,8 +61,8 @@ class LaneChange(msgspec.Struct, frozen=True):
 
         front  distance of the front from the reference point [m]
         """
-        place = self.end - front - change_length(self.offset, 0.0, lateral_acceleration)
-        return Wall(place, np.inf, "wait for a gap before the end of the lane")
+        s = self.end - front - change_length(self.offset, 0.0, lateral_acceleration)
+        return Wall(s, np.inf, "wait for a gap before the end of the lane")
 
     def desire(self, s: float, speed: float) -> float:
         """Return how urgent the change is at a distance along the line [m] and a speed [m/s], in [0, 1]."""
@@ -140,8 +140,8 @@ def _followed(line: ReferenceLine, index: int, center: float) -> _Lane:
             here, value = there, onward
             offsets[here] = value
         ends.append(here)
-    places = sorted(offsets)
-    filled = np.interp(np.arange(len(line.points)), places, [offsets[place] for place in places])
+    at_points = sorted(offsets)
+    filled = np.interp(np.arange(len(line.points)), at_points, [offsets[point] for point in at_points])
     return _Lane(filled, *ends)
 
 

@@ -79,17 +79,17 @@ class Situation(msgspec.Struct, frozen=True):
 
     def describe(self, owner: int) -> str:
         """Return class, distance and speed of an object as text."""
-        known = self.objects[owner]
+        known_object = self.objects[owner]
         x, y = self.line.points[self.line.index_at(self.s)].tolist()
-        distance = math.hypot(known.x - x, known.y - y)
+        distance = math.hypot(known_object.x - x, known_object.y - y)
         motion = "that approaches at" if self.approaches(owner) else "at"
-        return f"{known.kind} {distance:.0f} m ahead {motion} {known.speed:.1f} m/s"
+        return f"{known_object.kind} {distance:.0f} m ahead {motion} {known_object.speed:.1f} m/s"
 
     def approaches(self, owner: int) -> bool:
         """Return whether an object moves against the direction of the line."""
-        known = self.objects[owner]
-        _, _, heading = self.line.project(np.array([known.x]), np.array([known.y]), *self.window)
-        along = known.vx * math.cos(heading[0]) + known.vy * math.sin(heading[0])
+        known_object = self.objects[owner]
+        _, _, heading = self.line.project(np.array([known_object.x]), np.array([known_object.y]), *self.window)
+        along = known_object.vx * math.cos(heading[0]) + known_object.vy * math.sin(heading[0])
         return bool(along < -ONCOMING_SPEED)
 
     def is_lowered_at(self, s: float) -> bool:
@@ -202,7 +202,7 @@ def passing_profiles(
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
-    moves = obstacle is not None and max(one.speed for one in obstacle.objects) > ONCOMING_SPEED
+    moves = obstacle is not None and max(hypothesis.speed for hypothesis in obstacle.objects) > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
     change = situation.change
     last = situation.end if change is None else change.begin
@@ -238,7 +238,11 @@ def extended(
     if blocker is None or blocker.rear > end + TOGETHER:
         return profile
     obstacle = _obstacle(situation, scene, settings, blocker, body)
-    if obstacle is None or obstacle.end <= end or max(one.speed for one in obstacle.objects) > ONCOMING_SPEED:
+    if (
+        obstacle is None
+        or obstacle.end <= end
+        or max(hypothesis.speed for hypothesis in obstacle.objects) > ONCOMING_SPEED
+    ):
         return profile
     value = side * profile.values[-2]
     outer, every = _sides(obstacle, side)
@@ -253,15 +257,17 @@ def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present |
     whose distance the vehicle should keep there."""
     center = situation.s + body.center
 
-    def comes(one: Present) -> bool:
-        if situation.kind_of(one.owner) in VULNERABLE:
-            return one.speed < -ONCOMING_SPEED and _is_in_way(one, body.half_width)
-        return one.speed < -WRONG_WAY and abs(one.d) - one.half_width < body.half_width
+    def comes(hypothesis: Present) -> bool:
+        if situation.kind_of(hypothesis.owner) in VULNERABLE:
+            return hypothesis.speed < -ONCOMING_SPEED and _is_in_way(hypothesis, body.half_width)
+        return hypothesis.speed < -WRONG_WAY and abs(hypothesis.d) - hypothesis.half_width < body.half_width
 
-    found = [
-        one for one in scene.present if one.s > center and not one.crosses and comes(one) and scene.certain[one.row]
+    oncoming = [
+        hypothesis
+        for hypothesis in scene.present
+        if hypothesis.s > center and not hypothesis.crosses and comes(hypothesis) and scene.certain[hypothesis.row]
     ]
-    return min(found, key=attrgetter("s"), default=None)
+    return min(oncoming, key=attrgetter("s"), default=None)
 
 
 def _evasions(
@@ -273,7 +279,7 @@ def _evasions(
     The first lane is away from those of the opposite direction.
     """
     places = (situation.s + 10.0, head_on.s)
-    here, there = (situation.line.lanes_beside(situation.lanes_at(place)) for place in places)
+    here, there = (situation.line.lanes_beside(situation.lanes_at(s)) for s in places)
     evasions = []
     if situation.kind_of(head_on.owner) in VULNERABLE:
         obstacle = _meeting(situation, head_on, body)
@@ -295,7 +301,7 @@ def _meeting(situation: Situation, head_on: Present, body: Body) -> _Obstacle:
     end += body.rear + BEFORE_OBSTACLE
     step = (end - begin) / 3.0
     places = (begin, begin + step, begin + 2.0 * step, end)
-    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in places]
+    beside = [situation.line.lanes_beside(situation.lanes_at(s)) for s in places]
     return _Obstacle([head_on], begin, end, beside)
 
 
@@ -311,19 +317,19 @@ def _behind_neighbor(
         return None
     side = 1 if d > 0.0 else -1
     rear, front = situation.s - body.rear, situation.s + body.front
-    found = [
-        one
-        for one in scene.present
-        if one.front > rear
-        and one.rear < front
-        and side * one.d - one.half_width < side * d
-        and _is_in_way(one, body.half_width)
-        and not one.crosses
-        and abs(one.speed) < WAITING
+    beside = [
+        hypothesis
+        for hypothesis in scene.present
+        if hypothesis.front > rear
+        and hypothesis.rear < front
+        and side * hypothesis.d - hypothesis.half_width < side * d
+        and _is_in_way(hypothesis, body.half_width)
+        and not hypothesis.crosses
+        and abs(hypothesis.speed) < WAITING
     ]
-    if not found:
+    if not beside:
         return None
-    last = max(found, key=attrgetter("front"))
+    last = max(beside, key=attrgetter("front"))
     end = max(last.front + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
     back = change_length(d, max(situation.speed, 2.0), settings.lateral_acceleration)
     name = f"pass {situation.kind_of(last.owner)} on the {'left' if side > 0 else 'right'}"
@@ -337,39 +343,39 @@ def _border(lanes: LanesBeside, side: int, body: Body) -> float:
     return own - body.half_width - INSIDE if every > own else math.inf
 
 
-def _is_in_way(one: Present, half_width: float) -> bool:
+def _is_in_way(hypothesis: Present, half_width: float) -> bool:
     """Return whether a hypothesis is closer to the route than a vehicle on it should pass."""
-    return abs(one.d) - one.half_width < half_width + one.margin
+    return abs(hypothesis.d) - hypothesis.half_width < half_width + hypothesis.margin
 
 
 def _blocker(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
-    place, slower = situation.s + body.center, situation.wanted - SLOWER
+    center, slower = situation.s + body.center, situation.wanted - SLOWER
     found = [
-        one
-        for one in scene.present
-        if one.s > place
-        and -0.5 < one.speed < slower
-        and not one.crosses
-        and _is_in_way(one, body.half_width)
-        and _is_passable(situation, one, body)
+        hypothesis
+        for hypothesis in scene.present
+        if hypothesis.s > center
+        and -0.5 < hypothesis.speed < slower
+        and not hypothesis.crosses
+        and _is_in_way(hypothesis, body.half_width)
+        and _is_passable(situation, hypothesis, body)
     ]
     return min(found, key=attrgetter("s"), default=None)
 
 
-def _is_beside(situation: Situation, one: Present, body: Body) -> bool:
+def _is_beside(situation: Situation, hypothesis: Present, body: Body) -> bool:
     """Return whether the vehicle is beside an object, which it is then passing, and behind which it cannot wait."""
-    return one.rear < situation.s + body.front and abs(situation.d - one.d) > one.half_width
+    return hypothesis.rear < situation.s + body.front and abs(situation.d - hypothesis.d) > hypothesis.half_width
 
 
-def _is_passable(situation: Situation, one: Present, body: Body) -> bool:
+def _is_passable(situation: Situation, hypothesis: Present, body: Body) -> bool:
     """Return whether an object may be passed: not a crossing pedestrian, and standing for some time or moving."""
-    known = situation.objects[one.owner]
-    if known.still_since is None:
-        return known.kind not in ON_FOOT
-    if known.kind in ON_FOOT and not _is_parked(situation, one, body):
+    known_object = situation.objects[hypothesis.owner]
+    if known_object.still_since is None:
+        return known_object.kind not in ON_FOOT
+    if known_object.kind in ON_FOOT and not _is_parked(situation, hypothesis, body):
         return False
-    return known.kind == "misc" or situation.now - known.still_since >= PATIENCE
+    return known_object.kind == "misc" or situation.now - known_object.still_since >= PATIENCE
 
 
 def may_pass(situation: Situation, scene: Surroundings, body: Body) -> bool:
@@ -378,13 +384,13 @@ def may_pass(situation: Situation, scene: Surroundings, body: Body) -> bool:
     return blocker is None or _is_parked(situation, blocker, body)
 
 
-def _is_parked(situation: Situation, one: Present, body: Body) -> bool:
+def _is_parked(situation: Situation, hypothesis: Present, body: Body) -> bool:
     """Return whether an object does not seem to have stopped just now, behind which the vehicle would wait."""
-    known = situation.objects[one.owner]
-    if known.still_since is None or known.kind == "misc" or abs(one.d) > ASIDE:
+    known_object = situation.objects[hypothesis.owner]
+    if known_object.still_since is None or known_object.kind == "misc" or abs(hypothesis.d) > ASIDE:
         return True
-    stands = situation.now - known.still_since
-    return situation.speed < WAITING or stands >= LONG or _is_beside(situation, one, body)
+    stands = situation.now - known_object.still_since
+    return situation.speed < WAITING or stands >= LONG or _is_beside(situation, hypothesis, body)
 
 
 def _overtaking(situation: Situation) -> int:
@@ -392,22 +398,25 @@ def _overtaking(situation: Situation) -> int:
     return situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0)).overtaking
 
 
-def _is_steady(situation: Situation, one: Present) -> bool:
+def _is_steady(situation: Situation, hypothesis: Present) -> bool:
     """Return whether an object has moved for some time, and neither sets off nor brakes."""
-    known = situation.objects[one.owner]
-    has_moved = known.moving_since is not None and situation.now - known.moving_since >= SETTING_OFF
-    return has_moved and known.acceleration > -NOTICEABLE
+    known_object = situation.objects[hypothesis.owner]
+    has_moved = known_object.moving_since is not None and situation.now - known_object.moving_since >= SETTING_OFF
+    return has_moved and known_object.acceleration > -NOTICEABLE
 
 
 def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: Body) -> bool:
     """Return whether the blocker waits at a place where the vehicle stops as well, or behind another vehicle."""
     if situation.stop is not None and situation.stop.s < blocker.s + NEAR_STOP:
         return True
-    known = situation.objects[blocker.owner]
-    since = known.still_since
+    known_object = situation.objects[blocker.owner]
+    since = known_object.still_since
     if since is None or situation.now - since >= QUEUE_PATIENCE or _is_beside(situation, blocker, body):
         return False
-    return any(-0.5 < one.rear - blocker.front < QUEUE_GAP and abs(one.d - blocker.d) < 1.0 for one in scene.present)
+    return any(
+        -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP and abs(hypothesis.d - blocker.d) < 1.0
+        for hypothesis in scene.present
+    )
 
 
 def _catch_up_time(gap: float, closing: float, top: float, acceleration: float) -> float:
@@ -428,12 +437,12 @@ def _obstacle(
     """Return the blocker with what stands close behind it; None if it is too fast or not steady enough to pass it."""
     objects = _together(scene, blocker, body.half_width)
     wanted = max(situation.wanted, 1.0)
-    begin = min([one.rear for one in objects]) - (body.front - body.wheelbase) + SWUNG_OUT
-    ends = [one.front for one in objects]
-    speed = [max(one.speed, 0.0) for one in objects]
+    begin = min([hypothesis.rear for hypothesis in objects]) - (body.front - body.wheelbase) + SWUNG_OUT
+    ends = [hypothesis.front for hypothesis in objects]
+    speed = [max(hypothesis.speed, 0.0) for hypothesis in objects]
     fastest, slowest = max(speed), min(speed)
     if fastest > 0.5:
-        if wanted - fastest < SLOWER or not all(_is_steady(situation, one) for one in objects):
+        if wanted - fastest < SLOWER or not all(_is_steady(situation, hypothesis) for hypothesis in objects):
             return None
         gain = settings.acceleration * MEAN_SHARE
         rear = situation.s - body.rear - BEFORE_OBSTACLE
@@ -446,7 +455,7 @@ def _obstacle(
     end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
     step = (end - begin) / 3.0
     places = (begin, begin + step, begin + 2.0 * step, end)
-    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in places]
+    beside = [situation.line.lanes_beside(situation.lanes_at(s)) for s in places]
     return _Obstacle(objects, begin, end, beside)
 
 
@@ -463,7 +472,7 @@ def _around(
     beside = (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
     beside = clearance + SPARE if room >= clearance + SPARE else beside
     value = max(outer + beside + body.half_width, 0.0)
-    stands = all(situation.objects[one.owner].still_since is not None for one in obstacle.objects)
+    stands = all(situation.objects[hypothesis.owner].still_since is not None for hypothesis in obstacle.objects)
     profile = passing(
         f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
         side * value,
@@ -476,42 +485,44 @@ def _around(
     if profile is None:
         return None
     border = min(_border(lanes, side, body) for lanes in obstacle.beside)
-    fastest = max(one.speed for one in obstacle.objects)
+    fastest = max(hypothesis.speed for hypothesis in obstacle.objects)
     return msgspec.structs.replace(profile, border=border, overtakes=0.0 if stands else max(fastest, 0.0))
 
 
 def _is_vulnerable(situation: Situation, obstacle: _Obstacle) -> bool:
     """Return whether a pedestrian or cyclist is among the objects."""
-    return any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
+    return any(situation.kind_of(hypothesis.owner) in VULNERABLE for hypothesis in obstacle.objects)
 
 
 def _clearance(situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle) -> float:
     """Return the clearance that an obstacle should have [m]."""
     clearance = settings.pedestrian_margin if _is_vulnerable(situation, obstacle) else settings.lateral_margin
-    stops = any(situation.kind_of(one.owner) == "bus" and one.speed < WAITING for one in obstacle.objects)
+    stops = any(
+        situation.kind_of(hypothesis.owner) == "bus" and hypothesis.speed < WAITING for hypothesis in obstacle.objects
+    )
     return max(clearance, BESIDE_BUS) if stops else clearance
 
 
 def _sides(obstacle: _Obstacle, side: int) -> tuple[float, float]:
     """Return the offsets of the side of an obstacle, and of the border of the road beside it, to one side [m]."""
-    outer = max(side * one.d + one.half_width for one in obstacle.objects)
+    outer = max(side * hypothesis.d + hypothesis.half_width for hypothesis in obstacle.objects)
     return outer, min(lanes.room(side)[1] for lanes in obstacle.beside)
 
 
 def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:
     """Return the blocker and the objects of similar speed in the way that follow it closely."""
     alike = [
-        one
-        for one in scene.present
-        if one.s >= blocker.s
-        and not one.crosses
-        and abs(one.speed - blocker.speed) < SIMILAR_SPEED
-        and _is_in_way(one, half_width)
+        hypothesis
+        for hypothesis in scene.present
+        if hypothesis.s >= blocker.s
+        and not hypothesis.crosses
+        and abs(hypothesis.speed - blocker.speed) < SIMILAR_SPEED
+        and _is_in_way(hypothesis, half_width)
     ]
-    found = [blocker]
-    for one in sorted(alike, key=attrgetter("s")):
-        if one.rear - found[-1].s - found[-1].half_length > TOGETHER:
+    group = [blocker]
+    for hypothesis in sorted(alike, key=attrgetter("s")):
+        if hypothesis.rear - group[-1].s - group[-1].half_length > TOGETHER:
             break
-        if one.row != blocker.row:
-            found.append(one)
-    return found
+        if hypothesis.row != blocker.row:
+            group.append(hypothesis)
+    return group

@@ -121,6 +121,72 @@ class KnownObject(msgspec.Struct):
         x, y = self.mean_place
         return now - self.first_seen >= duration and math.hypot(self.x - x, self.y - y) <= NEARBY
 
+    def keep_course(self) -> None:
+        """Let an object that has just been lost move along its axis with its mean speed, if it moves about that way.
+
+        Velocities at the edge of the view are noisy.
+        """
+        ahead = self.vx * math.cos(self.yaw) + self.vy * math.sin(self.yaw)
+        if self.kind in ON_FOOT or abs(ahead) < ALONG * self.speed or self.speed < STILL:
+            return
+        speed = math.copysign(self.mean_speed, ahead)
+        self.vx, self.vy = speed * math.cos(self.yaw), speed * math.sin(self.yaw)
+        self.acceleration = min(self.acceleration, 0.0)
+
+    def observe(self, fresh: KnownObject, step: float, shares: _Shares) -> None:
+        """Update the object by its new observation.
+
+        step    time since the last observations [s]
+        shares  weights of the new observation after this time
+        """
+        before = self.speed if self.has_velocity else None
+        if fresh.has_velocity:
+            self.vx, self.vy = fresh.vx, fresh.vy
+        elif step > 0.0:
+            share = SMOOTHING if self.has_velocity else 1.0
+            self.vx += share * (fresh.x - self.x) / step
+            self.vy += share * (fresh.y - self.y) / step
+        speed = self.speed
+        if before is not None and step > 0.0:
+            change = (speed - before) / step
+            self.acceleration += (change - self.acceleration) * shares.acceleration
+        self.mean_speed += (speed - self.mean_speed) * (1.0 if before is None else shares.speed)
+        self.has_velocity |= fresh.has_velocity or step > 0.0
+        self.hidden_since = None
+        self._classify(fresh.kind, shares.kind)
+        self.row, self.seen = fresh.row, fresh.seen
+        self.x, self.y, self.yaw = fresh.x, fresh.y, fresh.yaw
+        self.length, self.width = fresh.length, fresh.width
+        self.z = fresh.z
+        self.error, self.ellipse, self.existence = fresh.error, fresh.ellipse, fresh.existence
+        x, y = self.mean_place
+        self.mean_place = x + shares.position * (fresh.x - x), y + shares.position * (fresh.y - y)
+
+    def note_motion(self, now: float, uncertainty: float) -> None:
+        """Update since when the object stands or moves.
+
+        It stands on while it has moved no farther and no faster than the errors of place and velocity explain.
+        """
+        moved = math.hypot(self.x - self.stands_at[0], self.y - self.stands_at[1])
+        if self.speed < STILL or (self.seems_to_stand and moved <= uncertainty * self.error):
+            if self.still_since is None:
+                self.stands_at, self.still_since = (self.x, self.y), now
+            self.moving_since = None
+        else:
+            self.still_since = None
+            self.moving_since = now if self.moving_since is None else self.moving_since
+
+    def _classify(self, kind: str, share: float) -> None:
+        """Set the class of an object to the one that was observed most, after a new observation with this weight."""
+        if kind == self.kind and not self.kinds:
+            return
+        shares = self.kinds or {self.kind: 1.0}
+        self.kinds = {name: value * (1.0 - share) for name, value in shares.items()}
+        self.kinds[kind] = self.kinds.get(kind, 0.0) + share
+        most = max(self.kinds.values())
+        if self.kinds.get(self.kind, 0.0) < most:
+            self.kind = max(self.kinds, key=lambda name: self.kinds[name])
+
 
 class ObjectMemory:
     """Fused objects of one vehicle, associated over time by their predicted positions."""
@@ -141,45 +207,42 @@ class ObjectMemory:
         in_view  returns whether the sensors of the vehicle show the places of objects; None: all of them
         """
         step = now - self._time if self._objects else 0.0
-        for known in self._objects:
-            known.x += known.vx * step
-            known.y += known.vy * step
-            known.row = None
+        for known_object in self._objects:
+            known_object.x += known_object.vx * step
+            known_object.y += known_object.vy * step
+            known_object.row = None
         self._time = now
-        found = _objects_of(detections, now, self._settings.possible_existence)
+        observed = _objects_of(detections, now, self._settings.possible_existence)
         shares = _Shares.of(step)
-        for index, known in self._pairs(found):
-            _take_over(known, found[index], step, shares)
-            found[index] = known
-        lost = [known for known in self._objects if known.row is None]
-        for known in lost:
-            if now - step - known.seen < TIME_TOLERANCE:
-                _keep_course(known)
+        for index, known_object in self._pairs(observed):
+            known_object.observe(observed[index], step, shares)
+            observed[index] = known_object
+        lost = [known_object for known_object in self._objects if known_object.row is None]
+        for lost_object in lost:
+            if now - step - lost_object.seen < TIME_TOLERANCE:
+                lost_object.keep_course()
         self._note_hidden(lost, now, in_view)
-        lost = [known for known in lost if self._is_kept(known, now) and not _is_among(known, found)]
-        for known in lost:
-            if known.still_since is None:
-                known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
-        self._objects = found + lost
-        uncertainty = self._settings.uncertainty
-        for known in self._objects:
-            # It stands on while it has moved no farther and no faster than the errors of place and velocity explain.
-            moved = math.hypot(known.x - known.stands_at[0], known.y - known.stands_at[1])
-            is_still = known.speed < STILL or (known.seems_to_stand and moved <= uncertainty * known.error)
-            if is_still and known.still_since is None:
-                known.stands_at = known.x, known.y
-            known.still_since = (now if known.still_since is None else known.still_since) if is_still else None
-            known.moving_since = None if is_still else now if known.moving_since is None else known.moving_since
+        lost = [
+            lost_object
+            for lost_object in lost
+            if self._is_kept(lost_object, now) and not _is_among(lost_object, observed)
+        ]
+        for lost_object in lost:
+            if lost_object.still_since is None:
+                lost_object.error = min(lost_object.error + SPEED_ERROR * step, LARGEST_ERROR)
+        self._objects = observed + lost
+        for known_object in self._objects:
+            known_object.note_motion(now, self._settings.uncertainty)
         return self._objects
 
-    def _pairs(self, found: list[KnownObject]) -> list[tuple[int, KnownObject]]:
+    def _pairs(self, observed: list[KnownObject]) -> list[tuple[int, KnownObject]]:
         """Return pairs of the index of a new object and a known one, the nearest first, each in at most one pair."""
-        if not found or not self._objects:
+        if not observed or not self._objects:
             return []
-        ahead: Array = np.array([(known.x, known.y) for known in self._objects])
-        places: Array = np.array([(known.x, known.y) for known in found])
+        ahead: Array = np.array([(known_object.x, known_object.y) for known_object in self._objects])
+        places: Array = np.array([(known_object.x, known_object.y) for known_object in observed])
         gap = np.hypot(places[:, None, 0] - ahead[None, :, 0], places[:, None, 1] - ahead[None, :, 1])
-        bottom, former = (np.array([known.z for known in some]) for some in (found, self._objects))
+        bottom, former = (np.array([known_object.z for known_object in group]) for group in (observed, self._objects))
         fresh, earlier = ((gap < GATE) & (np.abs(bottom[:, None] - former) < OTHER_LEVEL)).nonzero()
         order = gap[fresh, earlier].argsort(kind="stable")
         pairs: list[tuple[int, KnownObject]] = []
@@ -200,17 +263,19 @@ class ObjectMemory:
         if not lost:
             return
         shown = np.ones(len(lost), dtype=bool) if in_view is None else in_view(lost)
-        for known, is_shown in zip(lost, shown.tolist(), strict=True):
-            if is_shown and known.hidden_since is not None:
-                known.seen += now - known.hidden_since
-            known.hidden_since = None if is_shown else now if known.hidden_since is None else known.hidden_since
+        for lost_object, is_shown in zip(lost, shown.tolist(), strict=True):
+            if is_shown and lost_object.hidden_since is not None:
+                lost_object.seen += now - lost_object.hidden_since
+            lost_object.hidden_since = (
+                None if is_shown else now if lost_object.hidden_since is None else lost_object.hidden_since
+            )
 
-    def _is_kept(self, known: KnownObject, now: float) -> bool:
-        if known.existence < self._settings.min_existence:
+    def _is_kept(self, lost_object: KnownObject, now: float) -> bool:
+        if lost_object.existence < self._settings.min_existence:
             return False
-        if known.hidden_since is not None:
-            return self._settings.memory > 0.0 and now - known.hidden_since <= LONGEST_HIDDEN
-        return now - known.seen <= self._settings.memory
+        if lost_object.hidden_since is not None:
+            return self._settings.memory > 0.0 and now - lost_object.hidden_since <= LONGEST_HIDDEN
+        return now - lost_object.seen <= self._settings.memory
 
 
 def _objects_of(detections: Detections, now: float, least: float) -> list[KnownObject]:
@@ -233,11 +298,11 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         error = math.sqrt(variance) if variance >= 0.0 else USUAL_ERROR
         kind = detections.classes[row]
         x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
-        known = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
-        known.mean_speed, known.ellipse = known.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
-        known.first_seen, known.mean_place = now, (x, y)
-        known.z = z - height / 2.0
-        objects.append(known)
+        observation = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
+        observation.mean_speed, observation.ellipse = observation.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
+        observation.first_seen, observation.mean_place = now, (x, y)
+        observation.z = z - height / 2.0
+        objects.append(observation)
     return objects
 
 
@@ -252,24 +317,12 @@ def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:
     return tuple(dict.fromkeys(nearest[near].tolist()))
 
 
-def _is_among(lost: KnownObject, found: list[KnownObject]) -> bool:
+def _is_among(lost: KnownObject, observed: list[KnownObject]) -> bool:
     """Return whether a lost object is at the place of one in view, of which it was another track."""
     return any(
-        math.hypot(other.x - lost.x, other.y - lost.y) < GATE and abs(other.z - lost.z) < OTHER_LEVEL for other in found
+        math.hypot(other.x - lost.x, other.y - lost.y) < GATE and abs(other.z - lost.z) < OTHER_LEVEL
+        for other in observed
     )
-
-
-def _keep_course(known: KnownObject) -> None:
-    """Let an object that has just been lost move along its axis with its mean speed, if it moves about that way.
-
-    Velocities at the edge of the view are noisy.
-    """
-    ahead = known.vx * math.cos(known.yaw) + known.vy * math.sin(known.yaw)
-    if known.kind in ON_FOOT or abs(ahead) < ALONG * known.speed or known.speed < STILL:
-        return
-    speed = math.copysign(known.mean_speed, ahead)
-    known.vx, known.vy = speed * math.cos(known.yaw), speed * math.sin(known.yaw)
-    known.acceleration = min(known.acceleration, 0.0)
 
 
 class _Shares(NamedTuple):
@@ -277,52 +330,10 @@ class _Shares(NamedTuple):
 
     acceleration: float
     speed: float
-    place: float
+    position: float
     kind: float
 
     @classmethod
     def of(cls, step: float) -> _Shares:
         """Return the weights after a time step [s]."""
         return cls(*[1.0 - math.exp(-step / time) for time in (CHANGING, LASTING, STAYING, CLASSIFYING)])
-
-
-def _take_over(known: KnownObject, fresh: KnownObject, step: float, shares: _Shares) -> None:
-    """Update a known object by its new observation.
-
-    step    time since the last observations [s]
-    shares  weights of the new observation after this time
-    """
-    before = known.speed if known.has_velocity else None
-    if fresh.has_velocity:
-        known.vx, known.vy = fresh.vx, fresh.vy
-    elif step > 0.0:
-        share = SMOOTHING if known.has_velocity else 1.0
-        known.vx += share * (fresh.x - known.x) / step
-        known.vy += share * (fresh.y - known.y) / step
-    speed = known.speed
-    if before is not None and step > 0.0:
-        change = (speed - before) / step
-        known.acceleration += (change - known.acceleration) * shares.acceleration
-    known.mean_speed += (speed - known.mean_speed) * (1.0 if before is None else shares.speed)
-    known.has_velocity |= fresh.has_velocity or step > 0.0
-    known.hidden_since = None
-    _classify(known, fresh.kind, shares.kind)
-    known.row, known.seen = fresh.row, fresh.seen
-    known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
-    known.length, known.width = fresh.length, fresh.width
-    known.z = fresh.z
-    known.error, known.ellipse, known.existence = fresh.error, fresh.ellipse, fresh.existence
-    x, y = known.mean_place
-    known.mean_place = x + shares.place * (fresh.x - x), y + shares.place * (fresh.y - y)
-
-
-def _classify(known: KnownObject, kind: str, share: float) -> None:
-    """Set the class of an object to the one that was observed most, after a new observation with this weight."""
-    if kind == known.kind and not known.kinds:
-        return
-    shares = known.kinds or {known.kind: 1.0}
-    known.kinds = {name: value * (1.0 - share) for name, value in shares.items()}
-    known.kinds[kind] = known.kinds.get(kind, 0.0) + share
-    most = max(known.kinds.values())
-    if known.kinds.get(known.kind, 0.0) < most:
-        known.kind = max(known.kinds, key=lambda name: known.kinds[name])

@@ -153,17 +153,22 @@ class TimeGap:
         self.value: float | None = None
         """Time gap [s]; None: that of the settings."""
 
-    def update(self, scene: Surroundings, place: tuple[float, float], body: Body, *, merges: bool) -> None:
-        """Set the time gap of one decision; `place` are s and d of the vehicle [m]."""
+    def update(self, scene: Surroundings, position: tuple[float, float], body: Body, *, merges: bool) -> None:
+        """Set the time gap of one decision; `position` are s and d of the vehicle [m]."""
         if merges:
             self.value = min(MERGING_TIME_GAP, self._usual)
         if self.value is None:
             return
-        s, d = place
-        lane = [one for one in scene.present if abs(one.d - d) < one.half_width + body.half_width]
-        before = min((one.rear for one in lane if one.s > s + body.center), default=math.inf) - s - body.front
-        after = s - body.rear - max((one.front for one in lane if one.s <= s + body.center), default=-math.inf)
-        if after < before:
+        s, d = position
+        lane = [
+            hypothesis
+            for hypothesis in scene.present
+            if abs(hypothesis.d - d) < hypothesis.half_width + body.half_width
+        ]
+        center = s + body.center
+        rear = min((hypothesis.rear for hypothesis in lane if hypothesis.s > center), default=math.inf)
+        front = max((hypothesis.front for hypothesis in lane if hypothesis.s <= center), default=-math.inf)
+        if s - body.rear - front < rear - s - body.front:
             self.value = min(LEAST_TIME_GAP, self._usual)
         self.value += (self._usual - self.value) * self._period / RELAXATION
         if self._usual - self.value < NEARLY:

@@ -51,8 +51,8 @@ class Occluders(msgspec.Struct, frozen=True):
         for body in road_object_bodies(roads):
             if body.solid and body.height > TARGET_HEIGHT:
                 length, width = (2.0 * body.radius,) * 2 if body.radius else (body.length, body.width)
-                place = body.pose
-                boxes.append((place.x, place.y, place.z + body.height / 2.0, length, width, body.height, place.h))
+                pose = body.pose
+                boxes.append((pose.x, pose.y, pose.z + body.height / 2.0, length, width, body.height, pose.h))
         return cls.of_boxes(np.array(boxes, dtype=float))
 
     def near(self, x: float, y: float, distance: float) -> Occluders:
@@ -80,8 +80,8 @@ class Occluders(msgspec.Struct, frozen=True):
         for start, end, half in axes:
             step = end - start
             safe = np.where(np.abs(step) < 1e-9, 1e-9, step)
-            one, two = (-half - start) / safe, (half - start) / safe
-            entry, leave = np.maximum(entry, np.minimum(one, two)), np.minimum(leave, np.maximum(one, two))
+            first, second = (-half - start) / safe, (half - start) / safe
+            entry, leave = np.maximum(entry, np.minimum(first, second)), np.minimum(leave, np.maximum(first, second))
         # The line of sight descends or rises from the sensor to the target; it is lowest in a box at one of the ends.
         height = ground + TARGET_HEIGHT - eye.z
         lowest = eye.z + height * (leave if height < 0.0 else entry)
@@ -165,26 +165,26 @@ class HiddenTraffic:
         ways: Sequence[ConflictWay],
         along: Array,
         motion: tuple[float, float, float],
-        place: tuple[float, float, float],
+        position: tuple[float, float, float],
         regions: Sequence[PerceptionRegion],
         objects: Detections,
         now: float,
     ) -> tuple[Array, str] | None:
         """Return speed limits (M,) at distances along the line [m/s] and the way that is hidden; None without one.
 
-        motion  distance of the vehicle along the line [m], its speed and its wanted speed [m/s]
-        place   position of the vehicle; its height is that of the ground [m]
+        motion    distance of the vehicle along the line [m], its speed and its wanted speed [m/s]
+        position  of the vehicle; its height is that of the ground [m]
         """
         s, speed, wanted = motion
         # Of a way that the line meets several times only the first meeting ahead.
         ahead = {way.key: way for way in reversed(ways) if s + self._sensor < way.look and way.hold < s + FAR}
         if not ahead:
             return None
-        x, y, ground = place
+        x, y, ground = position
         seen = Occluders.of_boxes(objects.boxes)
         fixed = self._fixed.near(x, y, FAR + UPSTREAM)
         occluders = [group for group in (seen, fixed) if len(group.x)]
-        found: Array | None = None
+        lowest: Array | None = None
         nearest = (math.inf, "")
         for way in ahead.values():
             shown = self._shown(way, regions, occluders, ground, now)
@@ -193,9 +193,9 @@ class HiddenTraffic:
                 continue
             stop = way.hold - self._front - BEFORE_ZONE
             limits = np.where(along > way.look - self._sensor, math.inf, self.safe_speed(stop - along))
-            found = limits if found is None else np.minimum(found, limits)
+            lowest = limits if lowest is None else np.minimum(lowest, limits)
             nearest = min(nearest, (way.start, way.kind))
-        return None if found is None else (found, nearest[1])
+        return None if lowest is None else (lowest, nearest[1])
 
     def safe_speed(self, distance: Array) -> Array:
         """Return the speeds from which the vehicle stops within distances after its reaction [m/s], at least creeping.

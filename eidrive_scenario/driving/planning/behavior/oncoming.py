@@ -225,7 +225,7 @@ class OncomingTraffic:
         if not outside.any():
             return Verdict.GO
         first = int(outside.argmax())
-        back, place = self._return(profile, motion, outside)
+        back, return_s = self._return(profile, motion, outside)
         possible, duration = self._can_give_up(profile, motion, scene, np.maximum(side * offsets - border, 0.0))
         moves = self._moves(profile, motion, scene)
         if first and not moves:
@@ -238,7 +238,7 @@ class OncomingTraffic:
         has_stopped = float(motion.speed[0]) < SLOW and side * float(offsets[0]) < border + OVERRUN
         held = Verdict.FOLLOW if moves else Verdict.WAIT
         refused = held if first or (has_stopped and not moves) else Verdict.GIVE_UP
-        end, until = place + body.front, back if is_current else back + RESERVE
+        end, until = return_s + body.front, back if is_current else back + RESERVE
         if math.isinf(back) or self._meets(profile, motion, scene, first, until, end):
             return refused
         if last < 0 and has_begun:
@@ -258,14 +258,14 @@ class OncomingTraffic:
         if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
             return refused
         # Until then the vehicle may have to return to its lane for traffic that comes into view on its way out.
-        known, since, observer = free, 0.0, here[0]
+        free_to, since, observer = free, 0.0, here[0]
         for number in range(first, step + 1 if step > first else first):
             time, s = float(times[number]), float(viewpoints[number])
             returned = time + float(duration[number]) - since
-            if not self._suffices(known, observer, returned, s + body.half_length, beside, now):
+            if not self._suffices(free_to, observer, returned, s + body.half_length, beside, now):
                 return refused
             hidden = self.first_hidden(outlook, (s, float(beside_line[number])), number)
-            known = max(hidden, known - self.hidden_speed(beside, now) * (time - since))
+            free_to = max(hidden, free_to - self.hidden_speed(beside, now) * (time - since))
             since, observer = time, s
         return Verdict.GO
 
@@ -275,7 +275,7 @@ class OncomingTraffic:
 
         is_last_place  whether there is no other place to wait at
         """
-        place = self.first_hidden(outlook, viewpoint)
+        hidden = self.first_hidden(outlook, viewpoint)
         front = viewpoint[0] + self._body.half_length
         has_waited_long = self._is_patient(now, LONG)
         way = approach(self._usual, math.inf)
@@ -283,7 +283,7 @@ class OncomingTraffic:
             way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
         is_patient = has_waited_long or (is_last_place and self._is_patient(now))
         waits_in_vain = is_last_place and self._is_patient(now, LONGEST)
-        self._others_yield = waits_in_vain or (is_patient and place - way >= front)
+        self._others_yield = waits_in_vain or (is_patient and hidden - way >= front)
         return self._others_yield
 
     def _suffices(
@@ -309,11 +309,11 @@ class OncomingTraffic:
         What was in view stays free until traffic can have come there. Where none is expected from beyond the range of
         the sensors, none is expected until some comes into view.
         """
-        known = self._free_to - self.hidden_speed(outlook.beside, now) * (now - self._free_at)
+        still_free = self._free_to - self.hidden_speed(outlook.beside, now) * (now - self._free_at)
         hidden = self.first_hidden(outlook, viewpoint)
         if self._is_patient(now) and self._is_in_view(hidden, viewpoint[0]) and hidden >= end:
             hidden = math.inf
-        self._free_to, self._free_at = max(known, hidden), now
+        self._free_to, self._free_at = max(still_free, hidden), now
         return self._free_to
 
     def place_with_view(self, profile: LateralProfile, scene: Surroundings, oncoming: float, s: float) -> float:
@@ -345,11 +345,11 @@ class OncomingTraffic:
             return float(self._times[last]), float(motion.s[last])
         places = np.linspace(profile.places[-2], profile.places[-1], 20)
         inside: Bools = profile.side * profile.offset(places) <= profile.border
-        place = max(float(places[inside.argmax()]) if inside.any() else math.inf, float(motion.s[-1]))
+        return_s = max(float(places[inside.argmax()]) if inside.any() else math.inf, float(motion.s[-1]))
         speed = float(motion.speed[-1])
         if speed <= ONCOMING_SPEED:
-            return math.inf, place
-        return float(self._times[-1]) + (place - float(motion.s[-1])) / speed, place
+            return math.inf, return_s
+        return float(self._times[-1]) + (return_s - float(motion.s[-1])) / speed, return_s
 
     def _passed(self, profile: LateralProfile, motion: Motion, scene: Surroundings) -> Bools:
         """Return which hypotheses (N,) the profile passes: in the lane ahead of the rear of the vehicle."""

@@ -113,18 +113,18 @@ class BehaviorPlanner(RoutePlanner):
         path = self._advanced_path(ego, goal)
         line = self._line_of(path, ego)
         self._limit(line, follows_signs=self._follows_speed_limits(goal))
-        place = self._place_on(line, x, y)
+        position = self._project(line, x, y)
         wanted = self._target_speed(ego, goal)
         if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
             self._decided = now
-            self._decision = self._decide(ego, objects, line, place, wanted, now)
+            self._decision = self._decide(ego, objects, line, position, wanted, now)
             rows = self._decision.objects
             self._reasons = objects.boxes[list(rows), :2]
         else:
             rows = nearest_rows(objects, self._reasons)
-        plan = _trajectory(line, self._decision, place[0], rows)
+        plan = _trajectory(line, self._decision, position[0], rows)
         if goal is not None and goal.acceleration and self._decision.is_free:
-            limits = self._limits[_planned_part(line, place[0])]
+            limits = self._limits[_planned_part(line, position[0])]
             if float(limits[0]) >= wanted:
                 return replace(plan, speeds=np.minimum(limits, wanted), acceleration=goal.acceleration)
         return plan
@@ -155,7 +155,7 @@ class BehaviorPlanner(RoutePlanner):
             self._ways = self._conflict_ways.along(line, self._passages)
         shift = None
         if before is not None:
-            (s, d), (s_before, d_before) = (some.place(x, y, 0, len(some.points)) for some in (line, before))
+            (s, d), (s_before, d_before) = (each.project_point(x, y, 0, len(each.points)) for each in (line, before))
             shift = s - s_before if abs(d - d_before + aside) < SAME_LINE else None
         self._decision = None
         self._decider.line_changed(shift, aside)
@@ -185,7 +185,7 @@ class BehaviorPlanner(RoutePlanner):
         """Return the distance to the lane of the next change, to the left [m], if the vehicle is in it now; else 0."""
         if len(self._route_lanes) < 2:
             return 0.0
-        s, d = self._place_on(line, x, y)
+        s, d = self._project(line, x, y)
         change = self._change(line, s)
         return change.offset if change is not None and abs(d - change.offset) < abs(change.offset) / 2.0 else 0.0
 
@@ -204,10 +204,10 @@ class BehaviorPlanner(RoutePlanner):
                 self._range,
             )
         motion = (s, max(ego.speed, 0.0), wanted)
-        place: tuple[float, float, float] = tuple(ego.position.tolist())
+        position: tuple[float, float, float] = tuple(ego.position.tolist())
         ways = [way for way in self._ways if not way.has_light] if self._relies_on_lights(s) else self._ways
-        found = self._hidden.limits(ways, line.along, motion, place, self._regions, objects, now)
-        return (self._limits, "") if found is None else (np.minimum(self._limits, found[0]), found[1])
+        caution = self._hidden.limits(ways, line.along, motion, position, self._regions, objects, now)
+        return (self._limits, "") if caution is None else (np.minimum(self._limits, caution[0]), caution[1])
 
     def _relies_on_lights(self, s: float) -> bool:
         """Return whether the vehicle obeys traffic lights, and these are lit."""
@@ -220,15 +220,15 @@ class BehaviorPlanner(RoutePlanner):
             self._lights_work = any(mode == ON for _, mode in lamps(state))
         return self._lights_work
 
-    def _place_on(self, line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
+    def _project(self, line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
         low = max(self._progress - 3, 0)
-        return line.place(x, y, low, low + 12)
+        return line.project_point(x, y, low, low + 12)
 
     def _front_axle(self, ego: EgoState, line: ReferenceLine) -> tuple[float, float, float]:
         """Return the place of the front axle on the line and the slope of its motion."""
         x, y, _ = ego.position.tolist()
         ahead = self.spec.wheelbase
-        s, d = self._place_on(line, x + ahead * math.cos(ego.yaw), y + ahead * math.sin(ego.yaw))
+        s, d = self._project(line, x + ahead * math.cos(ego.yaw), y + ahead * math.sin(ego.yaw))
         turn = wrap_angle(ego.yaw - float(line.heading[line.index_at(s)]))
         return s, d, math.tan(min(max(turn, -STEEPEST), STEEPEST))
 
@@ -237,18 +237,22 @@ class BehaviorPlanner(RoutePlanner):
         ego: EgoState,
         objects: Detections,
         line: ReferenceLine,
-        place: tuple[float, float],
+        position: tuple[float, float],
         wanted: float,
         now: float,
     ) -> Decision:
         x, y, _ = ego.position.tolist()
-        s, d = place
-        known = self._memory.update(objects, now, self._in_view(ego))
-        lanes = self._predictor.lanes(known)
-        self._predictor.follow_lanes(known, lanes)
+        s, d = position
+        known_objects = self._memory.update(objects, now, self._in_view(ego))
+        lanes = self._predictor.lanes(known_objects)
+        self._predictor.follow_lanes(known_objects, lanes)
         reach = MARGIN_AHEAD + 2.0 * max(ego.speed, wanted) * self.planner_settings.horizon
-        rows = [row for row, entry in enumerate(known) if math.hypot(entry.x - x, entry.y - y) < reach]
-        near = [known[row] for row in rows]
+        indexes = [
+            index
+            for index, known_object in enumerate(known_objects)
+            if math.hypot(known_object.x - x, known_object.y - y) < reach
+        ]
+        near = [known_objects[index] for index in indexes]
         stop = self._stop(line.path, ego, x, y, now)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
         low = line.index_at(s - MARGIN_AHEAD)
@@ -262,9 +266,9 @@ class BehaviorPlanner(RoutePlanner):
             speed=max(ego.speed, 0.0),
             wanted=wanted,
             objects=near,
-            prediction=self._predictor.predict(near, [lanes[row] for row in rows]),
+            prediction=self._predictor.predict(near, [lanes[index] for index in indexes]),
             window=(low, max(high, low + 2)),
-            stop=None if stop is None else Wall(line.along_of(stop.place), math.inf, stop.reason),
+            stop=None if stop is None else Wall(line.along_of(stop.along), math.inf, stop.reason),
             now=now,
             gives_way=self._gives_way(s),
             hidden=hidden,
@@ -288,8 +292,8 @@ class BehaviorPlanner(RoutePlanner):
             return None
 
         def in_view(objects: Sequence[KnownObject]) -> Bools:
-            places = np.array([(known.x, known.y) for known in objects]) - ego.position[:2]
-            radius = np.array([known.width / 2.0 for known in objects])
+            places = np.array([(known_object.x, known_object.y) for known_object in objects]) - ego.position[:2]
+            radius = np.array([known_object.width / 2.0 for known_object in objects])
             cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
             x, y = cos * places[:, 0] + sin * places[:, 1], cos * places[:, 1] - sin * places[:, 0]
             shown = [sector.contains(x, y, radius) for sector in sectors]

@@ -81,12 +81,13 @@ class Predictor:
 
     def follow_lanes(self, objects: list[KnownObject], lanes: list[list[Course]]) -> None:
         """Let lost vehicles move along their lanes."""
-        for known, courses in zip(objects, lanes, strict=True):
-            for course in courses if known.row is None else ():
-                _, left, heading = course.place(known.x, known.y)
-                turn = float(wrap_angle(math.atan2(known.vy, known.vx) - heading))
+        for known_object, courses in zip(objects, lanes, strict=True):
+            for course in courses if known_object.row is None else ():
+                _, left, heading = course.project(known_object.x, known_object.y)
+                turn = float(wrap_angle(math.atan2(known_object.vy, known_object.vx) - heading))
                 if abs(turn) <= ALIGNED and abs(left) <= course.half_width:
-                    known.vx, known.vy = known.speed * math.cos(heading), known.speed * math.sin(heading)
+                    speed = known_object.speed
+                    known_object.vx, known_object.vy = speed * math.cos(heading), speed * math.sin(heading)
                     break
 
     def predict(self, objects: list[KnownObject], lanes: list[list[Course]] | None = None) -> Prediction:
@@ -96,89 +97,97 @@ class Predictor:
         """
         lanes = self.lanes(objects) if lanes is None else lanes
         owners: list[int] = []
-        found: list[Hypothesis] = []
-        for index, (known, courses) in enumerate(zip(objects, lanes, strict=True)):
-            new = self._hypotheses(known, courses)
+        hypotheses: list[Hypothesis] = []
+        for index, (known_object, courses) in enumerate(zip(objects, lanes, strict=True)):
+            new = self._hypotheses(known_object, courses)
             owners += [index] * len(new)
-            found += new
-        if not found:
+            hypotheses += new
+        if not hypotheses:
             nothing = np.empty((0, len(self._times)))
             return Prediction((), nothing, nothing, nothing, nothing, np.empty(0))
-        columns = [*zip(*[entry.poses for entry in found], strict=True), [entry.speed for entry in found]]
-        x, y, yaw, speed = (np.concatenate(column).reshape(len(found), -1) for column in columns)
+        columns = [
+            *zip(*[hypothesis.poses for hypothesis in hypotheses], strict=True),
+            [hypothesis.speed for hypothesis in hypotheses],
+        ]
+        x, y, yaw, speed = (np.concatenate(column).reshape(len(hypotheses), -1) for column in columns)
         return Prediction(
             tuple(owners),
             x,
             y,
             yaw,
             speed,
-            np.array([entry.room for entry in found]),
-            tuple([entry.passages for entry in found]),
-            None if self._level else self._heights(objects, owners, found),
+            np.array([hypothesis.room for hypothesis in hypotheses]),
+            tuple([hypothesis.passages for hypothesis in hypotheses]),
+            None if self._level else self._heights(objects, owners, hypotheses),
         )
 
-    def _heights(self, objects: list[KnownObject], owners: list[int], found: list[Hypothesis]) -> Array:
+    def _heights(self, objects: list[KnownObject], owners: list[int], hypotheses: list[Hypothesis]) -> Array:
         """Return the heights (N, K) of hypotheses [m]: those of the roads below them, else of the object."""
         now = np.array([objects[owner].z for owner in owners])
         z = np.repeat(now[:, None], len(self._times), axis=1)
-        for row, one in enumerate(found):
-            if one.z is not None:
-                z[row] = one.z
-        free = [row for row, one in enumerate(found) if one.z is None and one.speed[0] > 0.0]
+        for row, hypothesis in enumerate(hypotheses):
+            if hypothesis.z is not None:
+                z[row] = hypothesis.z
+        free = [row for row, hypothesis in enumerate(hypotheses) if hypothesis.z is None and hypothesis.speed[0] > 0.0]
         if free and self._roads is not None:
-            x, y = (np.concatenate([found[row].poses[axis] for row in free]) for axis in (0, 1))
+            x, y = (np.concatenate([hypotheses[row].poses[axis] for row in free]) for axis in (0, 1))
             heights = z[free].ravel()
             lanes, s, points = self._roads.overlapped_lanes(x, y, heights)
             heights[points] = self._roads.tables.lane_poses(lanes, s, np.zeros(len(s))).z
             z[free] = heights.reshape(len(free), -1)
         return z
 
-    def _hypotheses(self, known: KnownObject, courses: list[Course]) -> list[Hypothesis]:
-        times, now = self._times, known.speed
-        if now < STANDING or known.seems_to_stand:
-            x, y, yaw, speed = np.array([known.x, known.y, known.yaw, 0.0])[:, None].repeat(len(times), axis=1)
+    def _hypotheses(self, known_object: KnownObject, courses: list[Course]) -> list[Hypothesis]:
+        times, now = self._times, known_object.speed
+        if now < STANDING or known_object.seems_to_stand:
+            motion = np.array([known_object.x, known_object.y, known_object.yaw, 0.0])
+            x, y, yaw, speed = motion[:, None].repeat(len(times), axis=1)
             return [Hypothesis((x, y, yaw), speed)]
-        travelled, speed = longitudinal_motion(now, known.acceleration, times)
-        found: list[Hypothesis] = []
+        travelled, speed = longitudinal_motion(now, known_object.acceleration, times)
+        following: list[Hypothesis] = []
         too_fast: list[Hypothesis] = []
         """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
-        direction = math.atan2(known.vy, known.vx)
-        noise = known.speed_error
+        direction = math.atan2(known_object.vy, known_object.vx)
+        noise = known_object.speed_error
         for course in courses:
-            along, left, heading = course.place(known.x, known.y)
+            along, left, heading = course.project(known_object.x, known_object.y)
             turn = float(wrap_angle(direction - heading))
             along_lane = travelled
-            if not known.has_course:
+            if not known_object.has_course:
                 along_lane, turn = travelled * max(math.cos(turn), 0.0), 0.0
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
             aside = now * math.sin(turn)
             offset: float | Array = left
-            wandering = max(LEAVING_RATE, LEAVING_ERROR * known.error)
+            wandering = max(LEAVING_RATE, LEAVING_ERROR * known_object.error)
             if any(passage.start <= along <= passage.end for passage in course.passages):
                 wandering = max(wandering, CUTTING * now)
             leaves = abs(aside) > wandering
             if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
-            way, speeds = _held_by_sign(known, course, along, times) or (along_lane, speed)
+            way, speeds = _held_by_sign(known_object, course, along, times) or (along_lane, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            is_inside = abs(left) <= course.half_width + known.error
-            fitting = leaving if leaves or not is_inside else found if fits else too_fast
+            is_inside = abs(left) <= course.half_width + known_object.error
+            fitting = leaving if leaves or not is_inside else following if fits else too_fast
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
-            if len(found) == MOST_HYPOTHESES:
+            if len(following) == MOST_HYPOTHESES:
                 break
-        found = found or too_fast or leaving[:MOST_HYPOTHESES]
-        return found or [_straight_on(known, travelled, speed)]
+        following = following or too_fast or leaving[:MOST_HYPOTHESES]
+        return following or [_straight_on(known_object, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""
         lanes: list[list[Course]] = [[] for _ in objects]
-        moving = [index for index, known in enumerate(objects) if known.speed >= STANDING and known.kind not in ON_FOOT]
+        moving = [
+            index
+            for index, known_object in enumerate(objects)
+            if known_object.speed >= STANDING and known_object.kind not in ON_FOOT
+        ]
         if not moving or self._roads is None or self._courses is None:
             return lanes
         x, y, z = np.array([(objects[index].x, objects[index].y, objects[index].z) for index in moving]).T.copy()
@@ -190,17 +199,17 @@ class Predictor:
         return lanes
 
 
-def _straight_on(known: KnownObject, travelled: Array, speed: Array) -> Hypothesis:
+def _straight_on(known_object: KnownObject, travelled: Array, speed: Array) -> Hypothesis:
     """Return the motion of an object that follows no lane.
 
     A vehicle whose direction of motion is unknown moves along its axis.
     """
-    direction = math.atan2(known.vy, known.vx)
-    if not known.has_course and known.kind not in ON_FOOT:
-        ahead = math.cos(direction - known.yaw)
-        direction = known.yaw if ahead >= 0.0 else known.yaw + math.pi
+    direction = math.atan2(known_object.vy, known_object.vx)
+    if not known_object.has_course and known_object.kind not in ON_FOOT:
+        ahead = math.cos(direction - known_object.yaw)
+        direction = known_object.yaw if ahead >= 0.0 else known_object.yaw + math.pi
         travelled, speed = travelled * abs(ahead), speed * abs(ahead)
-    x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
+    x, y = known_object.x + math.cos(direction) * travelled, known_object.y + math.sin(direction) * travelled
     return Hypothesis((x, y, np.full(len(travelled), direction)), speed)
 
 
@@ -233,10 +242,10 @@ def stopping_motion(speed: float, left: float, times: Array) -> tuple[Array, Arr
     return np.asarray(way), np.asarray(speed - deceleration * braking)
 
 
-def _held_by_sign(known: KnownObject, course: Course, along: float, times: Array) -> tuple[Array, Array] | None:
+def _held_by_sign(known_object: KnownObject, course: Course, along: float, times: Array) -> tuple[Array, Array] | None:
     """Return the motion of a vehicle to the next stop sign; None without one, or if it does not stop there any more."""
-    front = along + known.length / 2.0
-    left = next((place - front for place in course.stops if place > front - AT_SIGN), math.inf)
-    if left < AT_SIGN or known.acceleration > NOTICEABLE or known.speed**2 > 2.0 * FIRM * left:
+    front = along + known_object.length / 2.0
+    left = next((stop - front for stop in course.stops if stop > front - AT_SIGN), math.inf)
+    if left < AT_SIGN or known_object.acceleration > NOTICEABLE or known_object.speed**2 > 2.0 * FIRM * left:
         return None
-    return stopping_motion(known.speed, left, times) if math.isfinite(left) else None
+    return stopping_motion(known_object.speed, left, times) if math.isfinite(left) else None

@@ -81,11 +81,11 @@ class LateralProfile(msgspec.Struct, frozen=True):
         index = places[1:-1].searchsorted(s, side="right")
         begin, length = places[index], (places[1:] - places[:-1])[index]
         share = np.minimum(np.maximum((s - begin) / length, 0.0), 1.0)
-        found = values[index] + (values[1:] - values[:-1])[index] * blend(share)
+        offsets = values[index] + (values[1:] - values[:-1])[index] * blend(share)
         if self.slope:
             first = np.where(index == 0, share, 1.0)
-            found = found + self.slope * float(places[1] - places[0]) * _leaving(first)
-        return np.asarray(found)
+            offsets = offsets + self.slope * float(places[1] - places[0]) * _leaving(first)
+        return np.asarray(offsets)
 
     def offset_at(self, s: float) -> float:
         """Return the offset at one distance along the line [m]."""
@@ -203,13 +203,15 @@ def at_edge(profile: LateralProfile, start: Start, settings: BehaviorSettings) -
     return towards(profile.name, edge, start, settings.lateral_acceleration, profile.side)
 
 
-def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings, place: float) -> LateralProfile | None:
+def with_view(
+    profile: LateralProfile, start: Start, settings: BehaviorSettings, viewpoint: float
+) -> LateralProfile | None:
     """Return a profile past an obstacle in two lateral motions, with a way at the edge of the lane between them, where
     the vehicle has a view into the oncoming lane.
 
     The result is None if there is not enough space, or if the profile has such a way already.
 
-    place  from which the view is sufficient [m]
+    viewpoint  distance along the line from which the view is sufficient [m]
     """
     s, offset, slope, speed = start
     edge = profile.side * (profile.border - AT_OFFSET)
@@ -220,7 +222,7 @@ def with_view(profile: LateralProfile, start: Start, settings: BehaviorSettings,
     onward = next((start for start in starts if s + length <= start), None)
     if math.isfinite(profile.waits_at) or onward is None:
         return None
-    waits_at = min(place, onward)
+    waits_at = min(viewpoint, onward)
     first = max(waits_at - length, s)
     before = ((s, offset), (first, offset)) if first - s >= 1.0 else ((s, offset),)
     after = ((first + length, edge), (onward, edge), (begin, value), (end, value), (back, 0.0))
@@ -318,7 +320,7 @@ def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float, 
 
 def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:
     """Return the objects that are outside the way (N, K) now and inside it later, ahead of `front` [m]."""
-    found = []
+    entering = []
     meets: Bools = np.logical_or.reduce(way & scene.crosses, axis=1) | (np.logical_or.reduce(way, axis=1) & ~way[:, 0])
     for row in (meets & ~scene.behind).nonzero()[0].tolist():
         steps = np.flatnonzero(way[row])
@@ -329,12 +331,12 @@ def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:
         if float(scene.front[row, occupied].max()) < front:
             continue
         s = float(scene.rear[row, occupied].min())
-        found.append(Conflict(row, first, run, s, crosses))
-    return found
+        entering.append(Conflict(row, first, run, s, crosses))
+    return entering
 
 
 def crossing_walls(
-    found: list[Conflict], times: Array, ego: tuple[float, float, float], precedence: Precedence, reasons: list[str]
+    conflicts: list[Conflict], times: Array, ego: tuple[float, float, float], precedence: Precedence, reasons: list[str]
 ) -> list[Wall]:
     """Return the walls before the zones of crossing objects to which a proposal gives way.
 
@@ -342,7 +344,7 @@ def crossing_walls(
     """
     front, s, speed = ego
     walls = []
-    for conflict in found:
+    for conflict in conflicts:
         if not conflict.crosses or precedence == "none":
             continue
         arrival = (conflict.s - front - s) / max(speed, 1.0)
@@ -355,7 +357,7 @@ def crossing_walls(
 
 def proposals_for(
     profile: int,
-    found: list[Conflict],
+    conflicts: list[Conflict],
     settings: BehaviorSettings,
     *,
     emergency: float,
@@ -368,7 +370,7 @@ def proposals_for(
     seeks_gap  whether they include gently changed speeds, by which the vehicle comes beside a gap in another lane
     """
     hard = settings.hard_deceleration
-    kinds: tuple[Precedence, ...] = ("all", "earlier", "none") if any(c.crosses for c in found) else ("all",)
+    kinds: tuple[Precedence, ...] = ("all", "earlier", "none") if any(c.crosses for c in conflicts) else ("all",)
     made = [Proposal(profile, share, kind, hard) for kind in kinds for share in SPEED_SHARES]
     if seeks_gap:
         made += [Proposal(profile, share, "all", settings.comfortable_deceleration) for share in TOWARDS_GAP]
@@ -392,14 +394,14 @@ def speed_limits(curvature: Array, path_limits: Array, spacing: float, settings:
     return np.array(values)
 
 
-def leading(scene: Surroundings, way: Bools, found: list[Conflict], center: float, proposal: Proposal) -> Bools:
+def leading(scene: Surroundings, way: Bools, conflicts: list[Conflict], center: float, proposal: Proposal) -> Bools:
     """Return where hypotheses lead the vehicle (N, K): in its way and not crossing.
 
     An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
     """
     leads = way & scene.may_lead
     if proposal.precedence == "all":
-        for conflict in found:
+        for conflict in conflicts:
             row = conflict.hypothesis
             is_oncoming = float(scene.speed[row, conflict.first]) < -ONCOMING_SPEED
             if not conflict.crosses and not is_oncoming and float(scene.s[row, 0]) > center:

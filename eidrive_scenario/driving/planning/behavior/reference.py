@@ -130,11 +130,11 @@ class ReferenceLine:
         roads = self._roads
         if roads is None:
             return limits
-        place = None
+        location = None
         for index, (x, y) in enumerate(self.points.tolist()):
-            place = roads.locate_at(x, y, place, reach=5.0)
-            if place is not None:
-                limits[index] = assumed_speed(roads.speed_limit(place.road, place.s, place.lane))
+            location = roads.locate_at(x, y, location, reach=5.0)
+            if location is not None:
+                limits[index] = assumed_speed(roads.speed_limit(location.road, location.s, location.lane))
         return limits
 
     @property
@@ -147,9 +147,9 @@ class ReferenceLine:
         """Heights of the road at the points (M,) [m]; None if all roads are level."""
         return path_heights(self.path, self._roads, self._z)
 
-    def along_of(self, place: float) -> float:
+    def along_of(self, distance: float) -> float:
         """Return the distance along the line at a distance along its path [m]."""
-        return place if self.points is self.path.points else float(np.interp(place, self._along_path, self.along))
+        return distance if self.points is self.path.points else float(np.interp(distance, self._along_path, self.along))
 
     @cached_property
     def _along_path(self) -> Array:
@@ -176,7 +176,7 @@ class ReferenceLine:
         d = dy * tx - dx * ty
         return s.reshape(x.shape), d.reshape(x.shape), heading.reshape(x.shape)
 
-    def place(self, x: float, y: float, low: int, high: int) -> tuple[float, float]:
+    def project_point(self, x: float, y: float, low: int, high: int) -> tuple[float, float]:
         """Return s and d of one point, nearest among the points from `low` to `high`."""
         gaps = [(x - px) ** 2 + (y - py) ** 2 for px, py in self.points[low:high].tolist()]
         index = low + gaps.index(min(gaps))
@@ -193,10 +193,10 @@ class ReferenceLine:
 
     def lanes_of_direction(self, index: int) -> LanesOfDirection:
         """Return the lanes of the direction of the line at a point; none outside of roads."""
-        known = self._of_direction.get(index)
-        if known is None:
-            known = self._of_direction[index] = self._centers_at(index)
-        return known
+        lanes = self._of_direction.get(index)
+        if lanes is None:
+            lanes = self._of_direction[index] = self._centers_at(index)
+        return lanes
 
     def _centers_at(self, index: int) -> LanesOfDirection:
         there = self._section_at(index)
@@ -214,33 +214,33 @@ class ReferenceLine:
         if roads is None:
             return None
         x, y = self.points[index].tolist()
-        place = self._place = roads.locate_at(x, y, self._place, reach=5.0)
-        if place is None:
+        location = self._place = roads.locate_at(x, y, self._place, reach=5.0)
+        if location is None:
             return None
-        road = roads.road(place.road)
-        section = road.section_at(place.s)
+        road = roads.road(location.road)
+        section = road.section_at(location.s)
         # The road may be passed against its driving direction; left is left of the motion.
-        pose = roads.road_pose_at(place.road, place.s)
+        pose = roads.road_pose_at(location.road, location.s)
         tx, ty = self.tangent[index].tolist()
         sense = 1 if tx * math.cos(pose.h) + ty * math.sin(pose.h) >= 0.0 else -1
         order = [number for number in section.lanes if number]
         order = order if sense > 0 else order[::-1]
-        if place.lane not in order:
+        if location.lane not in order:
             return None
         lanes = []
         for number in order:
             lane = section.lanes[number]
-            center = (lane_t(road, section, lane, place.s)[0] - place.t) * sense
-            half = lane.width.value(place.s - section.s) / 2.0
+            center = (lane_t(road, section, lane, location.s)[0] - location.t) * sense
+            half = lane.width.value(location.s - section.s) / 2.0
             lanes.append(_Lane(number, center, half, lane.drivable, roads.driving_direction(road.id, number) == sense))
-        key = LaneKey(road.id, section.index, place.lane)
-        return _Section(place, key, lanes, order.index(place.lane), road.rule == "LHT")
+        key = LaneKey(road.id, section.index, location.lane)
+        return _Section(location, key, lanes, order.index(location.lane), road.rule == "LHT")
 
     def _lanes_at(self, index: int) -> LanesBeside:
         there = self._section_at(index)
         if there is None or self._roads is None:
             return LanesBeside()
-        place, _, lanes, own, keeps_left = there
+        location, _, lanes, own, keeps_left = there
         if keeps_left:
             mirrored = [lane._replace(center=-lane.center) for lane in reversed(lanes)]
             beside = _beside(mirrored, len(lanes) - 1 - own).mirrored()
@@ -249,9 +249,9 @@ class ReferenceLine:
         if math.isnan(beside.oncoming):
             return beside
         opposite = min(lanes, key=lambda lane: abs(lane.center - beside.oncoming))
-        limit = self._roads.speed_limit(place.road, place.s, opposite.number)
-        section = self._roads.road(place.road).section_at(place.s)
-        beside = beside._replace(has_solid_line=_has_solid_line(section, place.s, place.lane))
+        limit = self._roads.speed_limit(location.road, location.s, opposite.number)
+        section = self._roads.road(location.road).section_at(location.s)
+        beside = beside._replace(has_solid_line=_has_solid_line(section, location.s, location.lane))
         return beside if limit is None else beside._replace(oncoming_limit=limit)
 
 
@@ -278,7 +278,7 @@ class _Lane(NamedTuple):
 class _Section(NamedTuple):
     """Lanes at a point of the line from left to right, the index of that at the point, and the side of the traffic."""
 
-    place: LaneLocation
+    location: LaneLocation
     key: LaneKey
     lanes: list[_Lane]
     own: int
@@ -308,19 +308,19 @@ def _beside(lanes: list[_Lane], own: int) -> LanesBeside:
     right_edge = center - half
     left = right = oncoming = math.nan
     same = True
-    for _, place, width, drivable, with_traffic in reversed(lanes[:own]):
+    for _, offset, width, drivable, with_traffic in reversed(lanes[:own]):
         if not drivable:
             break
         same = same and with_traffic
-        far_edge = place + width
+        far_edge = offset + width
         if same:
             left_edge = far_edge
-            left = place if math.isnan(left) and 2.0 * width >= NARROWEST else left
+            left = offset if math.isnan(left) and 2.0 * width >= NARROWEST else left
         elif math.isnan(oncoming) and math.isnan(left):
-            oncoming = place
-    for _, place, width, drivable, with_traffic in lanes[own + 1 :]:
+            oncoming = offset
+    for _, offset, width, drivable, with_traffic in lanes[own + 1 :]:
         if not drivable or not with_traffic:
             break
-        right_edge = place - width
-        right = place if math.isnan(right) and 2.0 * width >= NARROWEST else right
+        right_edge = offset - width
+        right = offset if math.isnan(right) and 2.0 * width >= NARROWEST else right
     return LanesBeside(center, left, right, oncoming, left_edge, right_edge, far_edge)

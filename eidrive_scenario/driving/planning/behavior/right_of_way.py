@@ -67,7 +67,7 @@ class JunctionRules:
         heights  as in `passages`
         """
         signs = places_along(self._lines_near(points), points, heights)
-        return tuple(sorted(place for place, line in signs if line.kind == "stop sign"))
+        return tuple(sorted(distance for distance, line in signs if line.kind == "stop sign"))
 
     def passages(self, points: Array, heights: Array | None = None) -> tuple[Passage, ...]:
         """Return the passages of junctions by a way (M, 2), in their order; a way may pass a junction several times.
@@ -87,14 +87,14 @@ class JunctionRules:
                 if junction in self._priorities:
                     covered.append((owner, junction, self._road[row]))
         signs = list(places_along(self._lines_near(points), points, heights))
-        found = [self._passage(*run, along, heading, signs) for run in _runs(inside)]
+        passages = [self._passage(*run, along, heading, signs) for run in _runs(inside)]
         if not covered:
-            return tuple(found)
+            return tuple(passages)
         roads: list[str | None] = []
         for junction, first, last in _runs(inside):  # the connecting road that covers most points of a stay
-            counts = Counter(road for place, name, road in covered if name == junction and first <= place <= last)
+            counts = Counter(road for index, name, road in covered if name == junction and first <= index <= last)
             roads.append(max(counts, key=lambda road: (counts[road], road), default=None))
-        return tuple([passage._replace(road=road) for passage, road in zip(found, roads, strict=True)])
+        return tuple([passage._replace(road=road) for passage, road in zip(passages, roads, strict=True)])
 
     def _lines_near(self, points: Array) -> list[StopLine]:
         """Return the stop lines in the extent of a way (M, 2)."""
@@ -111,7 +111,7 @@ class JunctionRules:
         signs: list[tuple[float, StopLine]],
     ) -> Passage:
         start, end = float(along[first]), float(along[last])
-        here = [line for place, line in signs if start - BEFORE_ENTRY <= place <= start + BEYOND_ENTRY]
+        here = [line for distance, line in signs if start - BEFORE_ENTRY <= distance <= start + BEYOND_ENTRY]
         before = float(heading[max(first - 1, 0)])
         turn = float(wrap_angle(float(heading[min(last, len(heading) - 1)]) - before))
         return Passage(
@@ -165,8 +165,8 @@ class JunctionRules:
         """Return whether a priority of the map holds `own` for `other`; None if the map has none for both."""
         if own.road is None or other.road is None:
             return None
-        known = self._priorities.get(own.junction, frozenset())
-        yields, precedes = (other.road, own.road) in known, (own.road, other.road) in known
+        priorities = self._priorities.get(own.junction, frozenset())
+        yields, precedes = (other.road, own.road) in priorities, (own.road, other.road) in priorities
         return None if yields == precedes else yields
 
 
@@ -227,7 +227,7 @@ class Course:
         self._inside = along[1:-1]
         """Distances at which the next segment begins."""
 
-    def place(self, x: float, y: float) -> tuple[float, float, float]:
+    def project(self, x: float, y: float) -> tuple[float, float, float]:
         """Return the distance along the course, the offset to the left and the heading at the nearest point.
 
         The heading is interpolated between the middles of the segments.
@@ -296,14 +296,14 @@ class LaneCourses:
         self._courses: dict[int, tuple[Course, ...]] = {}
         self._keys = [key for key, _ in roads.tables.lane_keys()]
 
-    def ahead(self, row: int) -> tuple[Course, ...]:
+    def ahead(self, lane: int) -> tuple[Course, ...]:
         """Return the likely courses from the start of a lane (running number), in its driving direction."""
-        found = self._courses.get(row)
-        if found is None:
-            chains = self._chains([self._keys[row]], 0.0)[:MOST]
-            found = tuple(course for chain in chains if (course := self.course_of(chain)) is not None)
-            self._courses[row] = found
-        return found
+        courses = self._courses.get(lane)
+        if courses is None:
+            chains = self._chains([self._keys[lane]], 0.0)[:MOST]
+            courses = tuple(course for chain in chains if (course := self.course_of(chain)) is not None)
+            self._courses[lane] = courses
+        return courses
 
     def _chains(self, chain: list[LaneKey], length: float) -> list[list[LaneKey]]:
         """Return the lanes that continue a chain, at most MOST alternatives."""

@@ -87,8 +87,8 @@ class Bounds:
             if limit < speed:
                 speed, cause = limit, LIMIT
         if self._walls:
-            for number, place in self._walls[step]:
-                allowed = math.sqrt(self._gain * max(place - s, 0.0))
+            for number, end in self._walls[step]:
+                allowed = math.sqrt(self._gain * max(end - s, 0.0))
                 if allowed < speed:
                     speed, cause = allowed, number
         return speed, cause
@@ -162,7 +162,7 @@ class Roller:
         reach = (max(course.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
         limits = Limits.ahead(course, start[0], reach)
         leaders = _Leaders(scene, body)
-        known: dict[object, _Motion] = {}
+        motion_of: dict[object, _Motion] = {}
         stops: dict[object, WallsOverTime] = {}
         motions = []
         for option in options:
@@ -171,12 +171,12 @@ class Roller:
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
             time_gap = self._driver.time_gap if option.time_gap is None else option.time_gap
             key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends, time_gap)
-            if key not in known:
+            if key not in motion_of:
                 if ends not in stops:
                     stops[ends] = walls_over_time(option.walls, self._times)
                 bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
-                known[key] = self._motion(proposal, bounds, start, ahead, time_gap)
-            motions.append(known[key])
+                motion_of[key] = self._motion(proposal, bounds, start, ahead, time_gap)
+            motions.append(motion_of[key])
         s, speed, cause = zip(*motions, strict=True)
         return Rollout(np.array(s), np.array(speed), np.array(cause))
 
@@ -252,15 +252,15 @@ class _Leaders:
     def of(self, leads: Bools) -> tuple[int, list[list[Leader]]]:
         """Return a number of these leaders (N, K), the same for shared ones, and the leaders at each time."""
         number = id(leads)
-        found = self._known.get(number)
-        if found is None:
-            found = self._known[number] = [[] for _ in range(leads.shape[1])]
+        leaders = self._known.get(number)
+        if leaders is None:
+            leaders = self._known[number] = [[] for _ in range(leads.shape[1])]
             for row in np.logical_or.reduce(leads, axis=1).nonzero()[0].tolist():
-                columns = (found, leads[row].tolist(), self._rears[row], self._centers[row], self._speeds[row])
+                columns = (leaders, leads[row].tolist(), self._rears[row], self._centers[row], self._speeds[row])
                 for ahead, leads_now, rear, center, speed in zip(*columns, strict=True):
                     if leads_now:
                         ahead.append((rear, row, center, speed))
-            for ahead in found:
+            for ahead in leaders:
                 if len(ahead) > 1:
                     ahead.sort()
-        return number, found
+        return number, leaders

@@ -150,12 +150,12 @@ def _offsets(options: Sequence[Option], rolled: Rollout, ego: Body) -> Array:
     return offsets
 
 
-def _first(found: Bools, times: Array) -> tuple[Array, Array, Array]:
-    """Return time, its index and hypothesis of the first entry of `found` (P, N, K) for each proposal."""
-    anyone: Bools = np.asarray(found.any(axis=1))
-    step, rows = anyone.argmax(axis=1), np.arange(len(found))
+def _first(events: Bools, times: Array) -> tuple[Array, Array, Array]:
+    """Return time, its index and hypothesis of the first entry of `events` (P, N, K) for each proposal."""
+    anyone: Bools = np.asarray(events.any(axis=1))
+    step, rows = anyone.argmax(axis=1), np.arange(len(events))
     happens = anyone[rows, step]
-    cause = found[rows, :, step].argmax(axis=1)
+    cause = events[rows, :, step].argmax(axis=1)
     return np.where(happens, times[step], np.inf), step, np.where(happens, cause, -1)
 
 
@@ -170,8 +170,8 @@ def _near(rolled: Rollout, offsets: Array, scene: Surroundings, ego: Body) -> In
     beside = np.abs(scene.d) - scene.half_width < aside + margin
     beside &= scene.rear < high + CLEAR_AHEAD + ROUNDING
     beside &= scene.front > low - CLEAR_AHEAD - ROUNDING
-    found: Integers = (np.logical_or.reduce(beside, axis=1) & ~scene.behind).nonzero()[0]
-    return found
+    rows: Integers = (np.logical_or.reduce(beside, axis=1) & ~scene.behind).nonzero()[0]
+    return rows
 
 
 def _overlaps(
@@ -216,11 +216,11 @@ def _overlaps(
             if not rows.size:
                 continue
             columns = (scene.s, scene.d, scene.half_length, scene.half_width)
-            s, place, length, width = (_shifted(part[rows], later) for part in columns)
+            s, d, length, width = (_shifted(part[rows], later) for part in columns)
             along = np.abs(s - center) - (length + half_length)
-            aside = np.abs(place - beside) - (width + ego.half_width)
-            found = np.logical_or.reduce((along < CONTACT) & (aside < CONTACT), axis=0)
-            lack[:, rows] = np.maximum(lack[:, rows], found)
+            aside = np.abs(d - beside) - (width + ego.half_width)
+            touches = np.logical_or.reduce((along < CONTACT) & (aside < CONTACT), axis=0)
+            lack[:, rows] = np.maximum(lack[:, rows], touches)
     stands = rolled.speed < AT_REST
     at_rest = stands[:, None, :]
     counts = ~at_rest
@@ -252,10 +252,10 @@ def _shifted(values: Array, steps: int) -> Array:
 
 def _recent_maximum(values: Array, steps: int) -> Array:
     """Return the maximum of values (P, K) at each time and the `steps` times before it."""
-    found = values.copy()
+    maximum = values.copy()
     for step in range(1, min(steps, values.shape[1] - 1) + 1):
-        np.maximum(found[:, step:], values[:, :-step], out=found[:, step:])
-    return found
+        np.maximum(maximum[:, step:], values[:, :-step], out=maximum[:, step:])
+    return maximum
 
 
 URGENT = 4.0

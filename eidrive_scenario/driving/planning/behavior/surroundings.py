@@ -137,7 +137,7 @@ def surroundings(
     turn = prediction.yaw - heading
     cos, sin = np.cos(turn), np.sin(turn)
     owners = [objects[index] for index in prediction.objects]
-    half = np.array([(known.length / 2.0, known.width / 2.0) for known in owners]).reshape(-1, 2, 1)
+    half = np.array([(owner.length / 2.0, owner.width / 2.0) for owner in owners]).reshape(-1, 2, 1)
     along, aside = position_errors(owners, heading - (prediction.yaw - prediction.yaw[:, :1]))
     ahead, across = np.abs(cos), np.abs(sin)
     half_length = ahead * half[:, 0] + across * half[:, 1]
@@ -147,7 +147,7 @@ def surroundings(
     # A vehicle that follows its lane is within it, whatever the error of its position.
     half_width = np.maximum(half_width, np.minimum(widened, prediction.room[:, None]))
     margin = np.array(
-        [settings.pedestrian_margin if known.kind in VULNERABLE else settings.lateral_margin for known in owners]
+        [settings.pedestrian_margin if owner.kind in VULNERABLE else settings.lateral_margin for owner in owners]
     )
     if prediction.z is not None and line.heights is not None:
         below = np.interp(s, line.along, line.heights, left=np.nan, right=np.nan)
@@ -163,9 +163,9 @@ def surroundings(
         prediction.speed * cos,
         margin,
         prediction.objects,
-        np.array([known.existence >= settings.min_existence for known in owners], dtype=bool),
+        np.array([owner.existence >= settings.min_existence for owner in owners], dtype=bool),
         np.array(
-            [settings.passing_gap * (known.still_since is not None and known.kind not in ON_FOOT) for known in owners]
+            [settings.passing_gap * (owner.still_since is not None and owner.kind not in ON_FOOT) for owner in owners]
         ),
         moving & (ahead < ACROSS),
         behind,
@@ -179,8 +179,10 @@ def position_errors(objects: list[KnownObject], direction: Array) -> tuple[Array
     They have shape (N, K), or (N, 1) if none depends on the direction. The error of an object that turns keeps its
     direction relative to the object.
     """
-    error = np.array([known.error for known in objects])[:, None]
-    mean, half, of_both = np.array([known.ellipse for known in objects]).reshape(-1, 3, 1).transpose(1, 0, 2)
+    error = np.array([known_object.error for known_object in objects])[:, None]
+    mean, half, of_both = (
+        np.array([known_object.ellipse for known_object in objects]).reshape(-1, 3, 1).transpose(1, 0, 2)
+    )
     if not (half.any() or of_both.any()):
         alike = error * np.sqrt(np.maximum(mean, 0.0))
         return alike, alike

@@ -67,7 +67,7 @@ class WalkingPace:
     def situation(self, situation: Situation) -> Situation:
         """Return the situation with walking pace as the wanted speed, and with vehicles and obstacles that stay near
         one place standing at their mean place."""
-        objects = [_at_mean_place(known, situation.now) for known in situation.objects]
+        objects = [_at_mean_place(known_object, situation.now) for known_object in situation.objects]
         wanted = min(situation.wanted, PACE)
         return msgspec.structs.replace(
             situation, wanted=wanted, objects=objects, prediction=_standing(situation.prediction, objects)
@@ -97,26 +97,26 @@ class WalkingPace:
         return msgspec.structs.replace(scene, margin=margin, half_width=np.minimum(scene.half_width, limit[:, None]))
 
 
-def _stands(known: KnownObject) -> bool:
-    return known.still_since is not None and known.kind not in VULNERABLE
+def _stands(known_object: KnownObject) -> bool:
+    return known_object.still_since is not None and known_object.kind not in VULNERABLE
 
 
-def _at_mean_place(known: KnownObject, now: float) -> KnownObject:
+def _at_mean_place(known_object: KnownObject, now: float) -> KnownObject:
     """Return the object at rest at its mean place if it stays there, else unchanged: velocities of objects that the
     border of an image cuts are noisy."""
-    if known.kind in VULNERABLE or not known.stays(now, WAIT):
-        return known
-    x, y = known.mean_place
-    still_since = known.first_seen if known.still_since is None else known.still_since
-    return msgspec.structs.replace(known, x=x, y=y, vx=0.0, vy=0.0, acceleration=0.0, still_since=still_since)
+    if known_object.kind in VULNERABLE or not known_object.stays(now, WAIT):
+        return known_object
+    x, y = known_object.mean_place
+    still_since = known_object.first_seen if known_object.still_since is None else known_object.still_since
+    return msgspec.structs.replace(known_object, x=x, y=y, vx=0.0, vy=0.0, acceleration=0.0, still_since=still_since)
 
 
 def _standing(prediction: Prediction, objects: list[KnownObject]) -> Prediction:
     """Return the prediction with the objects at rest at their places."""
-    owners = [objects[owner] for owner in prediction.objects]
-    stands = np.array([_stands(known) and known.speed == 0.0 for known in owners], dtype=bool)[:, None]
-    place = np.array([(known.x, known.y, known.yaw) for known in owners]).reshape(-1, 3, 1)
+    owners = [objects[index] for index in prediction.objects]
+    stands = np.array([_stands(owner) and owner.speed == 0.0 for owner in owners], dtype=bool)[:, None]
+    poses = np.array([(owner.x, owner.y, owner.yaw) for owner in owners]).reshape(-1, 3, 1)
     x, y, yaw = (
-        np.where(stands, place[:, axis], part) for axis, part in enumerate((prediction.x, prediction.y, prediction.yaw))
+        np.where(stands, poses[:, axis], part) for axis, part in enumerate((prediction.x, prediction.y, prediction.yaw))
     )
     return msgspec.structs.replace(prediction, x=x, y=y, yaw=yaw, speed=np.where(stands, 0.0, prediction.speed))

@@ -218,7 +218,7 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     predictor = Predictor(roads, TIMES)
     (courses,) = predictor.lanes([entry])
     turn = next(course for course in courses if course.points[-1, 1] < -50.0)
-    x, y, heading = (float(values[0]) for values in turn.poses(np.array([turn.place(52.0, 3.5)[0] + 6.0]), 0.0))
+    x, y, heading = (float(values[0]) for values in turn.poses(np.array([turn.project(52.0, 3.5)[0] + 6.0]), 0.0))
     box = KnownBox(x, y, 8.0 * math.cos(heading), 8.0 * math.sin(heading), yaw=heading)
     prediction = predictor.predict(known(box))
     assert (prediction.y[:, -1] < -20.0).any()
