@@ -122,9 +122,9 @@ class RoadAttributes:
         if not signal.references or self.signal_lanes(signal.place):
             return False
         ways = [
-            poses.lane_pose_at(self.road(place.road), number, place.s).h
-            + (0.0 if self.driving_direction(place.road, number) > 0 else np.pi)
-            for place in signal.references
-            for number in self.signal_lanes(place)
+            poses.lane_pose_at(self.road(reference.road), number, reference.s).h
+            + (0.0 if self.driving_direction(reference.road, number) > 0 else np.pi)
+            for reference in signal.references
+            for number in self.signal_lanes(reference)
         ]
         return bool(ways) and min(np.cos(pose.h - way) for way in ways) > np.cos(np.pi / 4.0)

@@ -52,8 +52,8 @@ class GeoReference:
         """Return x and y [m] of a point in WGS 84 [rad]. Raise ValueError if the projection is undefined there."""
         x, y = self.transformer.transform(longitude, latitude, radians=True)
         if not (math.isfinite(x) and math.isfinite(y)):
-            place = f"{math.degrees(latitude):g}°, {math.degrees(longitude):g}°"
-            raise ValueError(f"<geoReference>: the projection is undefined at latitude and longitude {place}")
+            point = f"{math.degrees(latitude):g}°, {math.degrees(longitude):g}°"
+            raise ValueError(f"<geoReference>: the projection is undefined at latitude and longitude {point}")
         return x, y
 
     def geodetic(self, x: float, y: float) -> tuple[float, float]:

@@ -69,28 +69,28 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
     if abs(curves[0].s) > JUMP:
         message = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
         yield MapWarning(GEOMETRY_GAP, spans, message, "start it at s=0", curves[0].line)
-    for one, other in pairwise(curves):
-        missing = other.s - one.s - one.length
+    for curve, following in pairwise(curves):
+        missing = following.s - curve.s - curve.length
         if abs(missing) > JUMP:
             relation = "ends before the next one starts" if missing > 0.0 else "overlaps the next one"
-            message = f"{name}: the geometry at s = {one.s:g} m {relation}, by {abs(missing):.3g} m"
-            yield MapWarning(GEOMETRY_GAP, spans, message, "set s to the sum of the preceding lengths", other.line)
+            message = f"{name}: the geometry at s = {curve.s:g} m {relation}, by {abs(missing):.3g} m"
+            yield MapWarning(GEOMETRY_GAP, spans, message, "set s to the sum of the preceding lengths", following.line)
             continue
-        end, start = one.at(one.length), other.at(0.0)
+        end, start = curve.at(curve.length), following.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
         turn = abs(wrap_angle(start.h - end.h))
         if apart > JUMP:
-            message = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
+            message = f"{name} jumps by {apart:.3g} m at s = {following.s:g} m"
             hint = "start each geometry at the end of its predecessor"
-            yield MapWarning(GEOMETRY_GAP, "such jumps", message, hint, other.line)
+            yield MapWarning(GEOMETRY_GAP, "such jumps", message, hint, following.line)
         elif KINK < turn < CORNER:
-            message = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
+            message = f"{name} has a kink of {turn:.3g} rad at s = {following.s:g} m"
             yield MapWarning(
                 HEADING_DISCONTINUITY,
                 "such kinks",
                 message,
                 "start each geometry with the final heading of its predecessor",
-                other.line,
+                following.line,
             )
     over = curves[-1].s + curves[-1].length - road.length
     if abs(over) > JUMP:
@@ -157,13 +157,13 @@ def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int
     yield from _broken(road, end_section(road, side), side, facing.lanes, f"the {link.contact} of road {other.id!r}")
 
 
-def _broken(road: Road, section: LaneSection, side: int, known: Mapping[int, Lane], where: str) -> Iterator[MapWarning]:
+def _broken(road: Road, section: LaneSection, side: int, lanes: Mapping[int, Lane], where: str) -> Iterator[MapWarning]:
     for lane in section.lanes.values():
         for number in lane.successors if side > 0 else lane.predecessors:
-            if number not in known:
+            if number not in lanes:
                 word = "successor" if side > 0 else "predecessor"
                 message = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
-                hint = "known: " + ", ".join(map(str, sorted(known)))
+                hint = "known: " + ", ".join(map(str, sorted(lanes)))
                 yield MapWarning(LANE_LINK, "links to lanes that do not exist", message, hint, lane.line)
 
 
@@ -185,13 +185,13 @@ def missing_lane_link(
 
 def _connected(edges: Mapping[LaneKey, Mapping[LaneKey, object]], start: LaneKey) -> dict[LaneKey, None]:
     """Return all lanes to which edges lead from `start`, the nearest first."""
-    found, waiting = {start: None}, deque([start])
+    reached, waiting = {start: None}, deque([start])
     while waiting:
         for other in edges.get(waiting.popleft(), ()):
-            if other not in found:
-                found[other] = None
+            if other not in reached:
+                reached[other] = None
                 waiting.append(other)
-    return found
+    return reached
 
 
 def _continuations(roads: Mapping[str, Road], key: LaneKey, link: RoadLink | None) -> Iterator[LaneKey]:
@@ -254,16 +254,16 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
     """Yield warnings of linked lanes of two roads whose ends do not meet. The reference lines need not meet."""
     ends: dict[tuple[str, int], EndCrossSection] = {}
-    for one, other in links.between_roads():
-        road, beyond = roads[one.lane.road], roads[other.lane.road]
-        lane = road.sections[one.lane.section].lanes[one.lane.lane]
-        if not lane.drivable or not beyond.sections[other.lane.section].lanes[other.lane.lane].drivable:
+    for end, other_end in links.between_roads():
+        road, beyond = roads[end.lane.road], roads[other_end.lane.road]
+        lane = road.sections[end.lane.section].lanes[end.lane.lane]
+        if not lane.drivable or not beyond.sections[other_end.lane.section].lanes[other_end.lane.lane].drivable:
             continue
-        x, y = _lane_end(road, one, ends)
-        u, v = _lane_end(beyond, other, ends)
+        x, y = _lane_end(road, end, ends)
+        u, v = _lane_end(beyond, other_end, ends)
         apart = math.hypot(u - x, v - y)
         if apart > JUMP:
-            names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
+            names = f"lane {end.lane.lane} of road {road.id!r} and lane {other_end.lane.lane} of road {beyond.id!r}"
             message = f"{names} are linked but their ends are {apart:.3g} m apart"
             yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", message, "make their ends meet", lane.line)
 
@@ -281,20 +281,20 @@ class EndCrossSection:
     offset: float
 
 
-def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], EndCrossSection]) -> tuple[float, float]:
-    """Return the end of the center line of a lane [m]. `known` caches the cross sections by road and side."""
-    found = known.get((road.id, end.side))
-    if found is None:
+def _lane_end(road: Road, end: LaneEnd, cross_sections: dict[tuple[str, int], EndCrossSection]) -> tuple[float, float]:
+    """Return the end of the center line of a lane [m]. The cross sections are cached by road and side."""
+    cross_section = cross_sections.get((road.id, end.side))
+    if cross_section is None:
         s = road.length if end.side > 0 else 0.0
         x, y, heading, *_ = road.reference.at(s)
         ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
         sin, cos = math.sin(heading), math.cos(heading)
         dx, dy = ahead * cos - left * sin, ahead * sin + left * cos
-        found = known[road.id, end.side] = EndCrossSection(x, y, dx, dy, road.lane_offset.value(s))
+        cross_section = cross_sections[road.id, end.side] = EndCrossSection(x, y, dx, dy, road.lane_offset.value(s))
     section = road.sections[end.lane.section]
     lane = section.lanes[end.lane.lane]
-    t = found.offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)
-    return found.x + t * found.dx, found.y + t * found.dy
+    t = cross_section.offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)
+    return cross_section.x + t * cross_section.dx, cross_section.y + t * cross_section.dy
 
 
 def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[MapWarning]:
@@ -328,10 +328,10 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
         hint = 'swap them; for left-hand traffic give the roads rule="LHT"'
         yield MapWarning(rule, "connections opposite to the traffic", message, hint, connection.line)
     for number, target in connection.lane_links:
-        for lane, known, road in ((number, incoming_lanes, incoming), (target, connecting_lanes, connecting)):
-            if lane not in known:
+        for lane, lanes, road in ((number, incoming_lanes, incoming), (target, connecting_lanes, connecting)):
+            if lane not in lanes:
                 message = f"{name} links lane {lane} of road {road.id!r}, which does not exist there"
-                hint = "known: " + ", ".join(map(str, sorted(known)))
+                hint = "known: " + ", ".join(map(str, sorted(lanes)))
                 yield MapWarning(rule, "links of lanes that do not exist", message, hint, connection.line)
     if not connection.lane_links and not set(incoming_lanes) & set(connecting_lanes) - {0}:
         message = f"{name} links no lane"

@@ -80,8 +80,8 @@ class RoadNetwork(RoadAttributes):
     @cached_property
     def map_warnings(self) -> tuple[Diagnostic, ...]:
         """Warnings of the file, which is readable nevertheless: one diagnostic per kind, with its rule."""
-        found = [*self._reading_warnings, *check_road_map(self.roads, self.junctions, self.links)]
-        return group_map_warnings(found, self.source)
+        warnings = [*self._reading_warnings, *check_road_map(self.roads, self.junctions, self.links)]
+        return group_map_warnings(warnings, self.source)
 
     @cached_property
     def tables(self) -> RoadTables:
@@ -163,16 +163,16 @@ class RoadNetwork(RoadAttributes):
     def centers(self, places: Sequence[LaneLocation]) -> Array:
         """Return points (N, 3) of the center lines of lanes at the s of `places` [m]. Offsets are ignored."""
         tables = self.tables
-        road = np.array([tables.index[place.road] for place in places], dtype=np.int64)
-        s = np.array([place.s for place in places])
-        row = tables.lane_row(road, s, np.array([place.lane for place in places], dtype=np.int64))
-        return np.column_stack(tables.lane_poses(row, s, np.zeros(len(s)))[:3])
+        road = np.array([tables.index[location.road] for location in places], dtype=np.int64)
+        s = np.array([location.s for location in places])
+        lane = tables.lane_row(road, s, np.array([location.lane for location in places], dtype=np.int64))
+        return np.column_stack(tables.lane_poses(lane, s, np.zeros(len(s)))[:3])
 
     def pose(self, location: LaneLocation) -> Pose:
         """Return the pose at a lane location with the heading of the driving direction of the lane."""
         road = self.road(location.road)
-        found = poses.lane_pose_at(road, location.lane, location.s, location.offset)
-        return found if driving_direction(road, location.lane) > 0 else found.turned(np.pi)
+        pose = poses.lane_pose_at(road, location.lane, location.s, location.offset)
+        return pose if driving_direction(road, location.lane) > 0 else pose.turned(np.pi)
 
     def road_pose(self, road_id: str, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
         """Return `road_pose_at` for broadcast arrays. Raise PositionError."""
@@ -180,8 +180,8 @@ class RoadNetwork(RoadAttributes):
         s, t = np.broadcast_arrays(np.asarray(s, dtype=np.float64), np.asarray(t, dtype=np.float64))
         road = np.full(s.size, self.tables.index[road_id])
         self.tables.check(road, s.ravel())
-        found = self.tables.road_poses(road, s.ravel(), t.ravel())
-        return Poses(*(part.reshape(s.shape) for part in found))
+        columns = self.tables.road_poses(road, s.ravel(), t.ravel())
+        return Poses(*(part.reshape(s.shape) for part in columns))
 
     def lane_pose(self, road_id: str, lane_id: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
         """Return `lane_pose_at` for broadcast arrays. Raise PositionError."""
@@ -193,8 +193,8 @@ class RoadNetwork(RoadAttributes):
         )
         road, flat = np.full(s.size, self.tables.index[road_id]), s.ravel()
         self.tables.check(road, flat)
-        found = self.tables.lane_poses(self.tables.lane_row(road, flat, lane.ravel()), flat, offset.ravel())
-        return Poses(*(part.reshape(s.shape) for part in found))
+        columns = self.tables.lane_poses(self.tables.lane_row(road, flat, lane.ravel()), flat, offset.ravel())
+        return Poses(*(part.reshape(s.shape) for part in columns))
 
     # World coordinates to road and lane coordinates
 
@@ -322,8 +322,8 @@ class RoadNetwork(RoadAttributes):
 
         The result is None if no chain of roads connects them.
         """
-        found = self._distances.placed(a, b)
-        return None if found is None else found[2]
+        relation = self._distances.placed(a, b)
+        return None if relation is None else relation[2]
 
     def lanes_between(self, a: LaneLocation, b: LaneLocation) -> int | None:
         """Return the number of lanes from the lane of a to that of b, positive in the direction of t at a, or None.
@@ -354,13 +354,13 @@ MAX_FACTOR = 10.0
 
 def fastest(network: RoadNetwork) -> Cost:
     """Return the travel time at the speed limits [s] as cost."""
-    known: dict[LaneKey, float] = {}
+    speeds: dict[LaneKey, float] = {}
 
-    def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
-        key = LaneKey(*one[:3])
-        if key not in known:
-            known[key] = network.usual_speed(key)
-        return float(data["weight"]) / known[key]
+    def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
+        key = LaneKey(*lane[:3])
+        if key not in speeds:
+            speeds[key] = network.usual_speed(key)
+        return float(data["weight"]) / speeds[key]
 
     return cost
 
@@ -371,8 +371,8 @@ def fewest_junctions(network: RoadNetwork) -> Cost:
     Routes with equally many junctions are ordered by length.
     """
 
-    def cost(one: LaneKey, other: LaneKey, data: Mapping[str, Any]) -> float:
-        before, after = network.road(one.road).junction_id, network.road(other.road).junction_id
+    def cost(lane: LaneKey, following: LaneKey, data: Mapping[str, Any]) -> float:
+        before, after = network.road(lane.road).junction_id, network.road(following.road).junction_id
         return float(data["weight"]) + (JUNCTION_COST if after is not None and after != before else 0.0)
 
     return cost
@@ -385,7 +385,7 @@ def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
     draws = generator.uniform(0.0, math.log(MAX_FACTOR), len(network.roads)).tolist()
     factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
 
-    def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
-        return float(data["weight"]) * factors[one.road]
+    def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
+        return float(data["weight"]) * factors[lane.road]
 
     return cost

@@ -64,8 +64,8 @@ def _corners(network: RoadNetwork, item: RoadObject, outline: tuple[Corner, ...]
     for corner in outline:
         if corner.on_road:
             s = min(max(corner.x, 0.0), network.roads[item.road].length)
-            place = network.road_pose_at(item.road, s, corner.y)
-            rows.append((place.x, place.y, place.z + corner.z))
+            corner_pose = network.road_pose_at(item.road, s, corner.y)
+            rows.append((corner_pose.x, corner_pose.y, corner_pose.z + corner.z))
         else:
             rows.append(
                 (

@@ -25,9 +25,10 @@ class Overlaps:
         count = len(tables.roads)
         self._first, self._last = np.searchsorted(road, [np.arange(count), np.arange(1, count + 1)])
         groups: dict[str, list[int]] = {}
-        for index, one in enumerate(tables.roads):
-            if one.junction_id is not None and self._last[index] > self._first[index]:
-                groups.setdefault(one.junction_id, []).append(index)
+        for index in range(count):
+            junction = tables.roads[index].junction_id
+            if junction is not None and self._last[index] > self._first[index]:
+                groups.setdefault(junction, []).append(index)
         others: list[list[int]] = [[] for _ in range(count)]
         for group in groups.values():
             for index in group:
@@ -107,10 +108,10 @@ class Locator:
         order = np.flatnonzero(distance < np.inf)
         order = order[np.argsort(nearest[order])]
         some = self._located(samples, points[order], nearest[order], reach)
-        found = LaneLocations(self._tables.ids, *_nowhere(len(points)))
-        for entry in fields(found)[1:]:
-            getattr(found, entry.name)[order] = getattr(some, entry.name)
-        return found
+        locations = LaneLocations(self._tables.ids, *_nowhere(len(points)))
+        for field in fields(locations)[1:]:
+            getattr(locations, field.name)[order] = getattr(some, field.name)
+        return locations
 
     def _nearest_samples(
         self, x: Array, y: Array, z: Array | None, reach: float

@@ -99,12 +99,12 @@ class NearestPoints:
 
     def _by_tree(self, to: Array, count: int, within: float) -> tuple[Array, Integers]:
         try:
-            found = self._tree.query(to, count + 1, distance_upper_bound=within)
+            nearest = self._tree.query(to, count + 1, distance_upper_bound=within)
         except ValueError:  # Some positions are not finite
             finite = np.isfinite(to).all(axis=1, keepdims=True)
-            found = self._tree.query(np.where(finite, to, 0.0), count + 1, distance_upper_bound=within)
-            found = np.where(finite, found[0], np.inf), np.where(finite, found[1], len(self.points))
-        distance, index = (np.asarray(part) for part in found)
+            nearest = self._tree.query(np.where(finite, to, 0.0), count + 1, distance_upper_bound=within)
+            nearest = np.where(finite, nearest[0], np.inf), np.where(finite, nearest[1], len(self.points))
+        distance, index = (np.asarray(part) for part in nearest)
         squares = distance * distance
         near, next_ = squares[:, :-1], squares[:, 1:]
         tied = (next_ * (1.0 - _ROUNDED) <= near) & (near < np.inf)

@@ -159,9 +159,9 @@ def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
     section = road.section_at(s)
     lane = section.lanes.get(lane_id)
     if lane is None:
-        known = ", ".join(str(number) for number in section.lanes)
+        lanes = ", ".join(str(number) for number in section.lanes)
         raise PositionError(
-            Diagnostic(f"road {road.id!r} has no lane {lane_id} at s = {s:g} m", f"its lanes are {known}")
+            Diagnostic(f"road {road.id!r} has no lane {lane_id} at s = {s:g} m", f"its lanes are {lanes}")
         )
     return section, lane
 
@@ -224,6 +224,6 @@ def off_road(road: Road, s: float) -> PositionError:
     )
 
 
-def unknown_road(number: str, known: list[str]) -> PositionError:
+def unknown_road(number: str, roads: list[str]) -> PositionError:
     """Return the error for a road that does not exist."""
-    return PositionError(Diagnostic(f"road {number!r} does not exist", suggestion(number, known)))
+    return PositionError(Diagnostic(f"road {number!r} does not exist", suggestion(number, roads)))

@@ -83,9 +83,9 @@ class RoadTables:
     def section_of(self, road: Integers, s: Array) -> Integers:
         """Return the running number of the lane section at s (N,) of roads (N,)."""
         keys = self.curves.base.take(road) + s
-        found: Integers = self._section_borders.searchsorted(keys, side="right")
+        section: Integers = self._section_borders.searchsorted(keys, side="right")
         first: Integers = self.first_section.take(road)
-        return np.maximum(found, first)
+        return np.maximum(section, first)
 
     def lane_row(self, road: Integers, s: Array, lane: Integers) -> Integers:
         """Return the running numbers of lanes by their id (N,) at s (N,). Raise PositionError if one does not exist."""

@@ -78,7 +78,7 @@ def shows_red(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> bool:
 
 def _named(state: str) -> dict[str, str]:
     """Return the lit lamps of a textual state with their modes."""
-    found: dict[str, str] = {}
+    modes: dict[str, str] = {}
     for part in re.split("[;,]", state):
         words = [word.lower() for word in re.findall("[A-Z]+(?![a-z])|[A-Z]?[a-z]+", part)]
         if "off" in words:
@@ -86,5 +86,5 @@ def _named(state: str) -> dict[str, str]:
         flashes = not _FLASHES.isdisjoint(words)
         colors: Sequence[str] = [_WORDS[word] for word in words if word in _WORDS]
         for color in colors or ([YELLOW] if flashes else []):
-            found[color] = FLASHING if flashes else ON
-    return found
+            modes[color] = FLASHING if flashes else ON
+    return modes

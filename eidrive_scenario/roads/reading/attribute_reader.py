@@ -37,7 +37,7 @@ class AttributeReader:
         self.errors.append(diagnostic)
         if len(self.errors) >= MAX_ERRORS:
             last = Diagnostic(f"reading ends after {MAX_ERRORS} errors", "", self.source, diagnostic.line)
-            raise RoadError([*sorted(self.errors, key=lambda one: one.line or 0), last])
+            raise RoadError([*sorted(self.errors, key=lambda error: error.line or 0), last])
 
     def spend(self, element: etree._Element, what: str, amount: float, limit: float) -> None:
         """Count the use of a limited resource. Report an error at the element that exceeds the limit."""

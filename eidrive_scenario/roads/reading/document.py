@@ -216,7 +216,7 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], collector: A
             connections.append(read)
     number, kind = collector.text(element, "id"), element.get("type", "default")
     if kind == "virtual":
-        connections = [one for one in connections if _ends_at(roads[one.incoming_road], number)]
+        connections = [link for link in connections if _ends_at(roads[link.incoming_road], number)]
     return Junction(
         id=number,
         name=element.get("name", ""),
@@ -276,13 +276,13 @@ def _with_valid_links(
     """Return the road without links to junctions that do not exist. SUMO writes such links at dead ends."""
 
     def valid_link(link: RoadLink | None) -> RoadLink | None:
-        known = {} if link is None else roads if link.element_type == "road" else junctions
-        if link is None or link.element_id in known:
+        targets = {} if link is None else roads if link.element_type == "road" else junctions
+        if link is None or link.element_id in targets:
             return link
         message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
         if link.element_type == "road":
             collector.append_diagnostic(
-                Diagnostic(message, suggestion(link.element_id, known), collector.source, link.line)
+                Diagnostic(message, suggestion(link.element_id, targets), collector.source, link.line)
             )
             return link
         hint = "remove the link or add the junction with its connections"

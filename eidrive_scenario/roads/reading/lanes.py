@@ -45,22 +45,22 @@ def read_sections(
     lanes: etree._Element, length: float, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[LaneSection, ...]:
     """Return the lane sections of a road in the order of s, without sections of length 0."""
-    found = sorted(
+    elements = sorted(
         ((min(max(collector.number(element, "s"), 0.0), length), element) for element in lanes.iterfind("laneSection")),
         key=lambda pair: pair[0],
     )
-    if not found:
+    if not elements:
         collector.report_error(lanes, "<lanes> has no <laneSection>", "add at least one")
         return ()
-    if any(collector.flag(element, "singleSide") for _, element in found):
-        found = _join_sides(found)
-    ends = [*(s for s, _ in found[1:]), length]
+    if any(collector.flag(element, "singleSide") for _, element in elements):
+        elements = _join_sides(elements)
+    ends = [*(s for s, _ in elements[1:]), length]
     sections: list[LaneSection] = []
     left_out: list[Mapping[int, Lane]] = []
-    for (s, element), end in zip(found, ends, strict=True):
+    for (s, element), end in zip(elements, ends, strict=True):
         start = s if sections else 0.0
         read = _read_section(element, start, lane_offset, collector)
-        if end - s <= 1e-6 and (sections or len(found) > 1):
+        if end - s <= 1e-6 and (sections or len(elements) > 1):
             if sections:
                 linked = _redirect_links(sections[-1].lanes, read, "successors")
                 sections[-1] = msgspec.structs.replace(sections[-1], lanes=linked)
@@ -93,12 +93,12 @@ def _redirect_links(
     return led
 
 
-def _join_sides(found: list[tuple[float, etree._Element]]) -> list[tuple[float, etree._Element]]:
+def _join_sides(elements: list[tuple[float, etree._Element]]) -> list[tuple[float, etree._Element]]:
     """Return sections with singleSide as sections with both sides. The other side is continued."""
     joined: list[tuple[float, etree._Element]] = []
     current: dict[str, tuple[float, etree._Element]] = {}
-    for s in sorted({s for s, _ in found}):
-        started = [element for start, element in found if start == s]
+    for s in sorted({s for s, _ in elements}):
+        started = [element for start, element in elements if start == s]
         merged = etree.Element("laneSection")
         for element in started:
             sides = [side for side in ("left", "right") if element.find(side) is not None]
@@ -134,7 +134,7 @@ def _continue_link(lane: etree._Element, name: str) -> None:
 def _read_section(
     section: etree._Element, s: float, lane_offset: Polynomials, collector: AttributeReader
 ) -> dict[int, Lane]:
-    found: dict[int, etree._Element] = {}
+    elements: dict[int, etree._Element] = {}
     for side, sign in (("left", 1), ("center", 0), ("right", -1)):
         for element in section.iterfind(f"{side}/lane"):
             number = collector.integer(element, "id")
@@ -148,19 +148,19 @@ def _read_section(
             elif is_misplaced:
                 collector.report_error(element, message, hint)
                 continue
-            if number in found:
+            if number in elements:
                 collector.report_error(
                     element, f"lane {number} occurs twice in its section", "give each lane a unique id"
                 )
             else:
-                found[number] = element
-    center = found.get(0)
+                elements[number] = element
+    center = elements.get(0)
     lanes = {0: CENTER if center is None else _lane(center, 0, ZERO, ZERO, collector)}
     offset = lane_offset.shifted(s)
     for sign in (1, -1):
         edge = ZERO
-        for number in sorted((n for n in found if n * sign > 0), key=abs):
-            lane = _lane(found[number], number, edge, offset, collector)
+        for number in sorted((n for n in elements if n * sign > 0), key=abs):
+            lane = _lane(elements[number], number, edge, offset, collector)
             lanes[number] = lane
             edge = lane.outer
     if not any(lanes):

@@ -51,9 +51,9 @@ def read_signals(
             signals[key] = read
         for reference in element.iterfind("signals/signalReference"):
             references.append((collector.text(reference, "id"), _read_place(road, reference, collector), reference))
-    for number, place, reference in references:
+    for number, position, reference in references:
         if number in signals:
-            signals[number] = replace(signals[number], references=(*signals[number].references, place))
+            signals[number] = replace(signals[number], references=(*signals[number].references, position))
         else:
             collector.report_error(
                 reference, f"<signalReference> refers to signal {number!r}, which does not exist", "correct the id"

@@ -33,25 +33,25 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
     if plan is None:
         collector.report_error(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
-    found: list[Curve] = []
+    curves: list[Curve] = []
     for geometry in plan.iterfind("geometry"):
-        found.extend(_read_geometry(geometry, collector))
-    if not found:
+        curves.extend(_read_geometry(geometry, collector))
+    if not curves:
         collector.report_error(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
-    found.sort(key=lambda curve: curve.s)
-    covered = found[-1].s + found[-1].length
+    curves.sort(key=lambda curve: curve.s)
+    covered = curves[-1].s + curves[-1].length
     if covered <= 0.0:
         what = f"the geometry of road {road.get('id')!r} ends at s = {covered:g} m"
         collector.report_error(plan, what, "start it at s = 0")
-        return ReferenceLine(found, length)
+        return ReferenceLine(curves, length)
     if abs(covered - length) > max(0.01 * length, 0.1):
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there} and has priority"
         hint = "correct the length or complete the geometry"
         collector.report_warning(road, GEOMETRY_GAP, "lengths that differ from the geometry", what, hint)
         length = covered
-    return ReferenceLine(found, length)
+    return ReferenceLine(curves, length)
 
 
 def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequence[Curve]:

@@ -37,8 +37,8 @@ class RoadDistances:
 
         only  1 for ways ahead only, -1 for ways behind
         """
-        found = self.placed(a, b, by, only)
-        return None if found is None else found[:2]
+        placed = self.placed(a, b, by, only)
+        return None if placed is None else placed[:2]
 
     def placed(
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", only: int = 0
@@ -78,9 +78,9 @@ class RoadDistances:
 
     def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
         """Return cost, length between [m] and direction of entry of each road reached from `road` in `direction`."""
-        known = self._found.get((road, direction, by))
-        if known is not None:
-            return known
+        cached = self._found.get((road, direction, by))
+        if cached is not None:
+            return cached
         reached: dict[str, tuple[float, float, int]] = {}
         done: set[tuple[str, int]] = set()
         first = self._links.beyond_road(road, direction)
@@ -114,9 +114,9 @@ def locate_near(
         ways = links.beyond(LaneKey(road.id, last, hint.lane), direction) if hint.lane else ()
         for other, way in ways:
             target = roads[other.road]
-            found = _on(target, x, y, 0.0 if way > 0 else target.length)
-            if found is not None:
-                return found
+            adjacent = _on(target, x, y, 0.0 if way > 0 else target.length)
+            if adjacent is not None:
+                return adjacent
     return None
 
 

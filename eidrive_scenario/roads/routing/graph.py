@@ -79,7 +79,7 @@ class LaneWays:
         graph: LaneGraph = nx.DiGraph()
         graph.add_nodes_from(self.nodes.items())
         graph.add_edges_from(
-            (one, other, data) for one, ways in self.successors.items() for other, data in ways.items()
+            (lane, other, data) for lane, ways in self.successors.items() for other, data in ways.items()
         )
         return graph
 
@@ -102,10 +102,10 @@ def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
                 successors[key][other] = {"weight": data["length"], "kind": "successor"}
     for road in roads.values():
         for section in road.sections:
-            for one, two in _neighbors(section):
-                if directions[road.id, one] == directions[road.id, two]:
+            for lane, neighbor in _neighbors(section):
+                if directions[road.id, lane] == directions[road.id, neighbor]:
                     cost = LANE_CHANGE_COST + SHORT_SECTION_COST / max(section.length, 1.0)
-                    left, right = LaneKey(road.id, section.index, one), LaneKey(road.id, section.index, two)
+                    left, right = LaneKey(road.id, section.index, lane), LaneKey(road.id, section.index, neighbor)
                     successors[left][right] = {"weight": cost, "kind": "change"}
                     successors[right][left] = {"weight": cost, "kind": "change"}
     return LaneWays(nodes, successors)
@@ -133,9 +133,9 @@ def _measure(
 def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
     """Yield pairs of adjacent drivable lanes, also across lane 0."""
     lanes = [lane for number, lane in section.lanes.items() if number]
-    for one, two in pairwise(lanes):
-        if _usable(one, section) and _usable(two, section):
-            yield one.id, two.id
+    for lane, neighbor in pairwise(lanes):
+        if _usable(lane, section) and _usable(neighbor, section):
+            yield lane.id, neighbor.id
 
 
 def _usable(lane: Lane, section: LaneSection) -> bool:
@@ -162,10 +162,10 @@ def find_lanes(
     behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < -REACHED_DISTANCE
     if source[:2] == target[:2] and behind and source in successors:
         successors, source = _with_start_copy(successors, source)
-    found = None
+    path = None
     if source in successors and target in successors:
-        found = cheapest_path(successors, source, target, cost, bound if cost is None else None)
-    if found is None:
+        path = cheapest_path(successors, source, target, cost, bound if cost is None else None)
+    if path is None:
         raise RouteError(
             Diagnostic(
                 f"no route over the lanes leads from road {start.road!r} lane {start.lane} s {start.s:.1f} "
@@ -173,7 +173,7 @@ def find_lanes(
                 "check the direction of the lanes and the links between them",
             )
         )
-    return tuple(LaneKey(*key[:3]) for key in found)
+    return tuple(LaneKey(*key[:3]) for key in path)
 
 
 def cheapest_path(

@@ -60,13 +60,13 @@ class LaneLinks:
         if (lane.road, lane.section) == (road, section):
             return lane.lane
         open_ = deque((lane, direction) for direction in (1, -1))
-        known = {lane}
-        while open_ and len(known) < FAR:
+        reached = {lane}
+        while open_ and len(reached) < FAR:
             for following, way in self.beyond(*open_.popleft()):
                 if (following.road, following.section) == (road, section):
                     return following.lane
-                if following not in known:
-                    known.add(following)
+                if following not in reached:
+                    reached.add(following)
                     open_.append((following, way))
         return None
 
@@ -77,22 +77,22 @@ class LaneLinks:
 
     def between_roads(self) -> Iterator[tuple[LaneEnd, LaneEnd]]:
         """Yield linked ends of lanes of different roads, each pair once."""
-        for one, others in self._lanes.items():
+        for end, others in self._lanes.items():
             for other in others:
-                if one.lane.road < other.lane.road:
-                    yield one, other
+                if end.lane.road < other.lane.road:
+                    yield end, other
 
-    def _join(self, one: LaneEnd, other: LaneEnd) -> None:
-        self._lanes.setdefault(one, {})[other] = None
-        self._lanes.setdefault(other, {})[one] = None
+    def _join(self, end: LaneEnd, other: LaneEnd) -> None:
+        self._lanes.setdefault(end, {})[other] = None
+        self._lanes.setdefault(other, {})[end] = None
 
     def _link_sections(self, road: Road) -> None:
         for before, after in zip(road.sections, road.sections[1:], strict=False):
             pairs = [(n, m) for n, lane in before.lanes.items() for m in lane.successors if m in after.lanes]
             pairs += [(n, m) for m, lane in after.lanes.items() for n in lane.predecessors if n in before.lanes]
             for n, m in pairs or [(n, n) for n in before.lanes if n in after.lanes]:
-                one, other = LaneKey(road.id, before.index, n), LaneKey(road.id, after.index, m)
-                self._join(LaneEnd(one, 1), LaneEnd(other, -1))
+                end = LaneEnd(LaneKey(road.id, before.index, n), 1)
+                self._join(end, LaneEnd(LaneKey(road.id, after.index, m), -1))
 
     def _link_road(self, road: Road, link: RoadLink | None, side: int) -> None:
         if link is None or link.element_type != "road" or not road.sections:
@@ -119,9 +119,9 @@ class LaneLinks:
         self, road: Road, side: int, other: Road, other_side: int, pairs: Iterable[tuple[int, int]]
     ) -> None:
         """Join an end of a road to that of another one, and those of the pairs of their lanes that both have."""
-        one, two = RoadEnd(road.id, side), RoadEnd(other.id, other_side)
-        self._ends.setdefault(one, {})[two] = None
-        self._ends.setdefault(two, {})[one] = None
+        end, other_end = RoadEnd(road.id, side), RoadEnd(other.id, other_side)
+        self._ends.setdefault(end, {})[other_end] = None
+        self._ends.setdefault(other_end, {})[end] = None
         section, facing = end_section(road, side), end_section(other, other_side)
         for n, m in pairs:
             if n in section.lanes and m in facing.lanes:
@@ -161,7 +161,7 @@ def lanes_between(roads: Mapping[str, Road], links: LaneLinks, a: LaneLocation, 
 
     runs  1 if s at b increases in the direction of s at a, else -1
     """
-    here, there = (roads[place.road].section_at(place.s) for place in (a, b))
+    here, there = (roads[location.road].section_at(location.s) for location in (a, b))
     own = _rank(a.lane)
     beside = sorted((lane for lane in here.lanes if lane), key=lambda lane: (lane * a.lane < 0, abs(_rank(lane) - own)))
     for lane in beside:

@@ -49,9 +49,9 @@ class BranchGuide(Protocol):
 
 def driving_direction(road: Road, lane_id: int) -> int:
     """Return +1 if traffic of the lane drives in the direction of s, else -1; +1 for lane 0."""
-    known = road.directions.get(lane_id)
-    if known is not None:
-        return known
+    direction = road.directions.get(lane_id)
+    if direction is not None:
+        return direction
     return -1 if (lane_id > 0) == (road.rule == "RHT") else 1
 
 
@@ -130,9 +130,9 @@ class Movement:
         if steady is None:
             road = self._roads[name]
             steady = self._steady[name, number] = SteadyLane(road, number, driving_direction(road, number))
-        found = steady.step(s, offset, distance)
-        if found is not None:
-            return found
+        stepped = steady.step(s, offset, distance)
+        if stepped is not None:
+            return stepped
         road = self._roads[name]
         section = road.section_at(s)
         lane = section.lanes.get(number)
@@ -164,32 +164,32 @@ class Movement:
     ) -> tuple[LaneKey, int, float] | None:
         """Return the lane after the end of a lane, the direction in it, and the change of offset; None without one."""
         key = LaneKey(road.id, section.index, lane.id)
-        found = self.branches(key, direction, with_traffic)
-        if not found:
+        branches = self.branches(key, direction, with_traffic)
+        if not branches:
             beside = self._beside_end(road, section, lane, direction, offset)
             return None if beside is None else (beside[0], direction, beside[1])
-        if len(found) == 1:
-            return found[0].lane, found[0].direction, 0.0
+        if len(branches) == 1:
+            return branches[0].lane, branches[0].direction, 0.0
         chosen: Branch | None = None
         if route is not None:
-            chosen = route.pick(found, road.id, visit)
+            chosen = route.pick(branches, road.id, visit)
         if chosen is None and choose is not None:
-            chosen = choose(found)
+            chosen = choose(branches)
         if chosen is None:
-            chosen = _default_branch(found, road)
+            chosen = _default_branch(branches, road)
         return chosen.lane, chosen.direction, 0.0
 
     def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
         """Return the branches at the end of a lane in the order of the file, preferably those with the traffic."""
-        found = list(self._links.beyond(key, direction))
+        beyond = list(self._links.beyond(key, direction))
         wanted = 1 if with_traffic else -1
-        along = [(k, d) for k, d in found if driving_direction(self._roads[k.road], k.lane) * d == wanted]
-        found = along or found
-        if len(found) == 1:
-            return [Branch(*found[0], 0.0)]
+        along = [(k, d) for k, d in beyond if driving_direction(self._roads[k.road], k.lane) * d == wanted]
+        beyond = along or beyond
+        if len(beyond) == 1:
+            return [Branch(*beyond[0], 0.0)]
         road = self._roads[key.road]
         start = road.reference.at(road.length if direction > 0 else 0.0).h + (0.0 if direction > 0 else math.pi)
-        return [Branch(k, d, wrap_angle(self._exit_heading(k, d) - start)) for k, d in found]
+        return [Branch(k, d, wrap_angle(self._exit_heading(k, d) - start)) for k, d in beyond]
 
     def _exit_heading(self, key: LaneKey, direction: int) -> float:
         road = self._roads[key.road]

@@ -146,8 +146,8 @@ class Route:
 
     def pose_at(self, distance: float) -> Pose:
         """Return the pose at a distance along the route with the heading of travel."""
-        place = self.location_at(distance)
-        pose = lane_pose_at(self.roads[place.road], place.lane, place.s, place.offset)
+        location = self.location_at(distance)
+        pose = lane_pose_at(self.roads[location.road], location.lane, location.s, location.offset)
         x, y, _ = self.points_at(np.array([distance - 0.25, distance + 0.25])).T
         if x[0] == x[1] and y[0] == y[1]:
             return pose
@@ -219,8 +219,8 @@ class Route:
                 part_of = min(max(((x - ax) * dx + (y - ay) * dy) / norm**2, 0.0), 1.0)
                 gap = math.hypot(x - ax - part_of * dx, y - ay - part_of * dy)
                 left = ((y - ay) * dx - (x - ax) * dy) / norm
-                place = float(along[i] + part_of * (along[i + 1] - along[i]))
-                best = min(best, (gap, place, left))
+                distance = float(along[i] + part_of * (along[i + 1] - along[i]))
+                best = min(best, (gap, distance, left))
         return best[1], float(best[2])
 
     def pick(self, branches: Sequence[Branch], road: str, visit: int = 0) -> Branch | None:
