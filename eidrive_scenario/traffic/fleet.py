@@ -260,9 +260,9 @@ class Fleet:
         if self._poses is None:
             cars, lanes = self._cars, self.lanes
             sign = lanes.direction[cars.row]
-            found = lanes.tables.lane_poses(cars.row, lanes.s(cars.row, cars.progress), cars.offset * sign)
-            yaw = found.h + np.where(sign > 0, 0.0, math.pi) + np.arctan(cars.slope)
-            self._poses = np.column_stack([found.x, found.y, found.z, yaw, found.p * sign, found.r * sign])
+            poses = lanes.tables.lane_poses(cars.row, lanes.s(cars.row, cars.progress), cars.offset * sign)
+            yaw = poses.h + np.where(sign > 0, 0.0, math.pi) + np.arctan(cars.slope)
+            self._poses = np.column_stack([poses.x, poses.y, poses.z, yaw, poses.p * sign, poses.r * sign])
         return self._poses
 
     def placements(self) -> dict[str, Placement]:

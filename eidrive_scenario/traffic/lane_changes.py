@@ -93,7 +93,6 @@ class LaneChanges:
         to_junction       (N,) distance to the next junction, inf if there is none within sight [m]
         """
         lanes, row = self._lanes, cars.row[indices]
-        found: list[tuple[float, int, int]] = []
         ends_in = lanes.ends_at[row] - cars.progress[indices]
         room = self.length(cars.speed[indices])
         able = (
@@ -109,19 +108,17 @@ class LaneChanges:
         some, room, able = np.tile(indices, 2), np.tile(room, 2), np.tile(able, 2)
         possible = np.flatnonzero(able & (target >= 0))
         possible = possible[lanes.ends_at[target[possible]] - cars.progress[some[possible]] > room[possible]]
-        if possible.size:
-            some, target, slow_side = some[possible], target[possible], slow_side[possible]
-            prospect = self._prospect(cars, some, target, leaders, desired, occupants)
-            gain = np.where(
-                slow_side, incentive(self._changer, prospect, True), incentive(self._changer, prospect, False)
-            )
-            chosen = np.flatnonzero(safe(self._changer, prospect) & (gain > 0.0))
-            found = [(-float(gain[n]), int(some[n]), int(target[n])) for n in chosen]
-        return self._one_at_a_time(cars, found)
+        if not possible.size:
+            return []
+        some, target, slow_side = some[possible], target[possible], slow_side[possible]
+        prospect = self._prospect(cars, some, target, leaders, desired, occupants)
+        gain = np.where(slow_side, incentive(self._changer, prospect, True), incentive(self._changer, prospect, False))
+        chosen = np.flatnonzero(safe(self._changer, prospect) & (gain > 0.0))
+        return self._one_at_a_time(cars, [(-float(gain[n]), int(some[n]), int(target[n])) for n in chosen])
 
-    def _one_at_a_time(self, cars: Cars, found: list[tuple[float, int, int]]) -> list[tuple[int, int]]:
+    def _one_at_a_time(self, cars: Cars, candidates: list[tuple[float, int, int]]) -> list[tuple[int, int]]:
         taken: list[tuple[int, int]] = []
-        for _, index, lane in sorted(found):
+        for _, index, lane in sorted(candidates):
             crowded = any(
                 other == index or (target == lane and abs(cars.progress[other] - cars.progress[index]) < ROOM)
                 for other, target in taken

@@ -65,16 +65,16 @@ class TrafficLanes:
         graph, drivable = self.roads.graph, self.tables.lane_drivable
         for row, key in enumerate(self.keys):
             ways = graph[key].items() if key in graph else ()
-            found = [
+            successors = [
                 other
                 for way, edge in ways
                 if edge["kind"] == "successor"
                 and (drivable[row], self.walkable[row]) == (drivable[other := self.row[way]], self.walkable[other])
             ]
-            self._ways.append(found)
-            if found:
-                self.onward[row] = found[0]
-            for other in found:
+            self._ways.append(successors)
+            if successors:
+                self.onward[row] = successors[0]
+            for other in successors:
                 if self.backward[other] < 0:
                     self.backward[other] = row
 
@@ -84,26 +84,26 @@ class TrafficLanes:
                 continue
             for section in road.sections:
                 numbers = [number for number in section.lanes if number]
-                for leftmost, rightmost in pairwise(numbers):
-                    one, two = (self.row[LaneKey(road.id, section.index, number)] for number in (leftmost, rightmost))
-                    same = self.direction[one] == self.direction[two]
-                    if not (same and self.tables.lane_drivable[one] and self.tables.lane_drivable[two]):
+                rows = [self.row[LaneKey(road.id, section.index, number)] for number in numbers]
+                for left, right in pairwise(rows):
+                    same = self.direction[left] == self.direction[right]
+                    if not (same and self.tables.lane_drivable[left] and self.tables.lane_drivable[right]):
                         continue
-                    outward, inward = self._may_cross(one, two)
-                    if self.direction[one] > 0:
-                        self.beside_right[one], self.beside_left[two] = two, one
-                        self.right[one], self.left[two] = (two if outward else -1), (one if inward else -1)
+                    outward, inward = self._may_cross(left, right)
+                    if self.direction[left] > 0:
+                        self.beside_right[left], self.beside_left[right] = right, left
+                        self.right[left], self.left[right] = (right if outward else -1), (left if inward else -1)
                     else:
-                        self.beside_left[one], self.beside_right[two] = two, one
-                        self.left[one], self.right[two] = (two if outward else -1), (one if inward else -1)
+                        self.beside_left[left], self.beside_right[right] = right, left
+                        self.left[left], self.right[right] = (right if outward else -1), (left if inward else -1)
 
-    def _may_cross(self, one: int, two: int) -> tuple[bool, bool]:
-        """Return whether the marking permits changes from lane `one` to lane `two` at its right, and back.
+    def _may_cross(self, left: int, right: int) -> tuple[bool, bool]:
+        """Return whether the marking permits changes from lane `left` to lane `right` at its right, and back.
 
         It is the marking on the outer edge of the lane nearer to lane 0. `increase` permits changes to the higher id.
         """
-        numbers = self.keys[one].lane, self.keys[two].lane
-        between = self.tables.roads[self.road[one]].sections[self.keys[one].section].lanes
+        numbers = self.keys[left].lane, self.keys[right].lane
+        between = self.tables.roads[self.road[left]].sections[self.keys[left].section].lanes
         edge = 0 if numbers[0] > 0 > numbers[1] else min(numbers, key=abs)
         marks = between[edge].road_marks
         rule = marks[0].lane_change if marks else "both"
@@ -168,28 +168,28 @@ class TrafficLanes:
 
     def tightest(self, row: Integers) -> Array:
         """Return the maximum curvature of lanes [1/m] for rows of any shape."""
-        found = self._tightest[row]
-        if np.isnan(found).any():
-            for fresh in np.unique(row[np.isnan(found)]).tolist():
+        curvatures = self._tightest[row]
+        if np.isnan(curvatures).any():
+            for fresh in np.unique(row[np.isnan(curvatures)]).tolist():
                 count = max(math.ceil(self.length[fresh] / SAMPLE), 1) + 1
                 rows = np.full(count, fresh)
                 s = self.s(rows, np.linspace(0.0, self.length[fresh], count))
                 t, _ = self.tables.lane_t(rows, s)
                 _, _, _, curvature, _ = self.tables.curves.at(self.road[rows], s)
                 self._tightest[fresh] = np.max(np.abs(curvature) / np.maximum(np.abs(1.0 - curvature * t), 0.05))
-            found = self._tightest[row]
-        return found
+            curvatures = self._tightest[row]
+        return curvatures
 
     def limits(self, row: Integers, progress: Array) -> Array:
         """Return the speed limits at positions (N,) [m/s]; NaN if the map gives none, inf for `no limit`."""
-        found = self._limit[row]
-        fresh = np.isnan(found) | self._varying[row]
+        limits = self._limit[row]
+        fresh = np.isnan(limits) | self._varying[row]
         for n in np.flatnonzero(fresh):
             limit = self._limit_at(int(row[n]), float(progress[n]))
-            found[n] = limit
+            limits[n] = limit
             if not self._varying[row[n]]:
                 self._limit[row[n]] = limit
-        return np.where(found < 0.0, np.nan, found)
+        return np.where(limits < 0.0, np.nan, limits)
 
     def _limit_at(self, row: int, progress: float) -> float:
         """Return the limit at one position, -1 if the map gives none."""

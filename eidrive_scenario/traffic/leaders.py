@@ -41,9 +41,9 @@ class Occupants:
     @cached_property
     def order(self) -> tuple[Integers, Array]:
         """Indices in the order along the axis of all lanes, and the positions on this axis."""
-        place = self.row * BIG + self.key
-        order = np.argsort(place, kind="stable")
-        return order, place[order]
+        position = self.row * BIG + self.key
+        order = np.argsort(position, kind="stable")
+        return order, position[order]
 
     def without(self, owner: int) -> Occupants:
         """Return the occupants of other owners."""
@@ -101,7 +101,7 @@ def find_leaders(
     gap, speed = np.full(count, np.inf), np.zeros(count)
     if not len(occupants.row) or not count:
         return Leaders(gap, speed)
-    order, place = occupants.order
+    order, positions = occupants.order
     me = np.arange(count) if own is None else own
     open_, offset = np.arange(count), -progress
     for d in range(depth):
@@ -111,14 +111,14 @@ def find_leaders(
         if not open_.size:
             break
         if d == 0:
-            at = place.searchsorted(row * BIG + progress[open_], side="right")
+            at = positions.searchsorted(row * BIG + progress[open_], side="right")
         else:
-            at = place.searchsorted(row * BIG - 1.0, side="left")
-        found = order[np.minimum(at, len(order) - 1)]
-        hit = (at < len(order)) & (occupants.row[found] == row) & (occupants.owner[found] != me[open_])
-        which = found[hit]
-        gap[open_[hit]] = offset[hit] + occupants.rear[which] - front[open_[hit]]
-        speed[open_[hit]] = occupants.speed[which]
+            at = positions.searchsorted(row * BIG - 1.0, side="left")
+        occupant = order[np.minimum(at, len(order) - 1)]
+        hit = (at < len(order)) & (occupants.row[occupant] == row) & (occupants.owner[occupant] != me[open_])
+        hits = occupant[hit]
+        gap[open_[hit]] = offset[hit] + occupants.rear[hits] - front[open_[hit]]
+        speed[open_[hit]] = occupants.speed[hits]
         offset = offset + lanes.length[row]
         open_, offset = open_[~hit], offset[~hit]
     return Leaders(gap, speed)
@@ -137,16 +137,16 @@ def find_followers(
     gap, number = np.full(count, np.inf), np.full(count, -1)
     if not len(occupants.row) or not count:
         return Followers(gap, number)
-    order, place = occupants.order
+    order, positions = occupants.order
     open_, offset, at_row = np.arange(count), progress.copy(), row
     for d in range(LOOK_BACK + 1):
         limit = at_row * BIG + (progress[open_] if d == 0 else lanes.length[at_row] + 1.0)
-        at = place.searchsorted(limit, side="left" if d == 0 else "right") - 1
-        found = order[np.maximum(at, 0)]
-        hit = (at >= 0) & (occupants.row[found] == at_row) & (occupants.owner[found] != own[open_])
-        which = found[hit]
-        gap[open_[hit]] = offset[hit] + rear[open_[hit]] - occupants.front[which]
-        number[open_[hit]] = which
+        at = positions.searchsorted(limit, side="left" if d == 0 else "right") - 1
+        occupant = order[np.maximum(at, 0)]
+        hit = (at >= 0) & (occupants.row[occupant] == at_row) & (occupants.owner[occupant] != own[open_])
+        hits = occupant[hit]
+        gap[open_[hit]] = offset[hit] + rear[open_[hit]] - occupants.front[hits]
+        number[open_[hit]] = hits
         at_row = lanes.backward[at_row]
         going = ~hit & (at_row >= 0) & (offset < LOOK_AHEAD)
         open_, at_row = open_[going], at_row[going]

@@ -93,8 +93,8 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     vx, vy = view.velocity[rows, :2].T.take(point // len(OUTLINE), axis=1)
     speed = np.maximum((vx * np.cos(heading) + vy * np.sin(heading)) * lanes.direction[row], 0.0)
     moving = np.hypot(vx, vy) > STANDING
-    found = Occupants(row, progress, progress, progress, speed, np.full(len(row), FOREIGN))
-    return found, set(row[moving].tolist())
+    owner = np.full(len(row), FOREIGN)
+    return Occupants(row, progress, progress, progress, speed, owner), set(row[moving].tolist())
 
 
 class Occupancy:

@@ -39,16 +39,16 @@ class StopLines:
         self._lanes = lanes
         self._must_stop = must_stop
         self._signals: list[str] = []
-        found: list[tuple[int, float, int]] = []
+        lines: list[tuple[int, float, int]] = []
         for signal in lanes.roads.signals.values():
             if not signal.dynamic:
                 continue
             for place in (signal.place, *signal.references):
-                found += [(row, progress, len(self._signals)) for row, progress in self._on_lanes(place)]
+                lines += [(row, progress, len(self._signals)) for row, progress in self._on_lanes(place)]
             self._signals.append(signal.id)
-        self._row = np.array([row for row, _, _ in found], dtype=np.int64)
-        self._progress = np.array([progress for _, progress, _ in found])
-        self._signal = np.array([signal for _, _, signal in found], dtype=np.int64)
+        self._row = np.array([row for row, _, _ in lines], dtype=np.int64)
+        self._progress = np.array([progress for _, progress, _ in lines])
+        self._signal = np.array([signal for _, _, signal in lines], dtype=np.int64)
         self._shown: tuple[bool, ...] = ()
         self._closed = no_occupants()
 
@@ -58,12 +58,12 @@ class StopLines:
         if road is None:
             return []
         section = road.section_at(place.s)
-        found = []
+        positions = []
         for number in lanes.roads.signal_lanes(place):
             row = lanes.row[LaneKey(road.id, section.index, number)]
             progress = float(lanes.progress(np.array([row]), np.array([place.s]))[0])
-            found.append((row, 0.0 if road.junction_id is not None else progress))
-        return found
+            positions.append((row, 0.0 if road.junction_id is not None else progress))
+        return positions
 
     def closed(self) -> Occupants:
         """Return the stop lines at which traffic has to stop now as occupants."""
@@ -120,11 +120,10 @@ class Crossings:
 
     def meeting(self, row: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
-        known = self._meeting.get(row)
-        if known is not None:
-            return known
+        if row in self._meeting:
+            return self._meeting[row]
         lines, low, high = self._lines
-        found: dict[int, bool] = {}
+        conflicts: dict[int, bool] = {}
         mine = lines[row]
         points = NearestPoints(mine)
         for other in self.junction_lanes(row):
@@ -136,9 +135,9 @@ class Crossings:
             together = np.hypot(*(line[0] - mine[0])) < 1.0
             near = np.flatnonzero(points.nearest(line)[0] < (CLEARANCE if together else reach))
             if near.size:
-                found[other] = bool(together and near.max() * SAMPLE < 2.0 * FORK)
-        self._meeting[row] = found
-        return found
+                conflicts[other] = bool(together and near.max() * SAMPLE < 2.0 * FORK)
+        self._meeting[row] = conflicts
+        return conflicts
 
     @cached_property
     def _swings(self) -> Array:
@@ -278,12 +277,12 @@ class RightOfWay:
     def _passage(self, cars: Cars, index: int) -> list[int]:
         """Return the lanes of the next junction that a car may not enter yet, up to its last connecting road."""
         lanes = self._lanes
-        found: list[int] = []
+        passage: list[int] = []
         for row, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):
             if row >= 0 and lanes.in_junction[row] and not granted:
-                found.append(row)
-            elif found:
-                return found
-        while (ways := lanes.following(found[-1])) and lanes.road[ways[0]] == lanes.road[found[-1]]:
-            found.append(ways[0])
-        return found
+                passage.append(row)
+            elif passage:
+                return passage
+        while (ways := lanes.following(passage[-1])) and lanes.road[ways[0]] == lanes.road[passage[-1]]:
+            passage.append(ways[0])
+        return passage

@@ -169,7 +169,7 @@ class TrafficMix:
         if not isinstance(entity, model.Vehicle | model.Pedestrian):
             message = f"background traffic cannot contain a {type(entity).__name__}"
             raise ScenarioError(Diagnostic.at(template, message, "give a Vehicle or a Pedestrian"))
-        settings = next((self._settings(one) for one in template.object_controller), DriverSettings())
+        settings = next((self._settings(controller) for controller in template.object_controller), DriverSettings())
         return _participant(actor_spec(entity.name, entity), settings)
 
     def _settings(self, holder: model.ControllerDistributionEntry | model.ObjectController) -> DriverSettings:

@@ -120,15 +120,15 @@ def sites_within_radius(
     If there is none, return the nearest site within `REACH`.
     """
     distance = np.hypot(sites.x - x, sites.y - y)
-    found = sites.subset(distance <= radius)
+    near = sites.subset(distance <= radius)
     if location is not None:
         row, progress = lanes.of(location)
         if np.any(sites.row == row):
             here = SpawnSites.at(lanes, np.array([row]), np.array([progress]))
-            return found.concatenate(here)
-    if not len(found) and len(sites) and distance.min() <= REACH:
+            return near.concatenate(here)
+    if not len(near) and len(sites) and distance.min() <= REACH:
         return sites.subset(np.array([int(np.argmin(distance))]))
-    return found
+    return near
 
 
 def is_wide_enough(sites: SpawnSites, participant: Participant) -> Bools:
@@ -154,9 +154,9 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))
     braking = own.response(speed, np.maximum(speed, 1.0), leaders.gap, speed - leaders.speed)
     behind = followers.number
-    known = (behind >= 0) & (occupants.owner[behind] > FOREIGN) if len(occupants.row) else behind >= 0
+    own_driver = (behind >= 0) & (occupants.owner[behind] > FOREIGN) if len(occupants.row) else behind >= 0
     table = np.repeat(Drivers.of([fleet.driver]).table, count, axis=0)
-    table[known] = fleet.drivers.table[occupants.owner[behind[known]]]
+    table[own_driver] = fleet.drivers.table[occupants.owner[behind[own_driver]]]
     v = np.where(behind >= 0, occupants.speed[behind], 0.0) if len(occupants.row) else np.zeros(count)
     pressed = Drivers(table).response(v, np.maximum(v, 1.0), followers.gap, v - speed)
     fit = is_wide_enough(sites, participant) & (braking >= -driver.deceleration) & (leaders.gap > driver.standstill_gap)
@@ -209,12 +209,12 @@ def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers
     """Return a test whether sites are on one of several parts of roads."""
 
     def covers(sites: SpawnSites) -> Bools:
-        found = np.zeros(len(sites), dtype=bool)
+        covered = np.zeros(len(sites), dtype=bool)
         s, road, number = lanes.s(sites.row, sites.progress), lanes.road[sites.row], lanes.tables.lane_id[sites.row]
         for stretch in stretches:
             here = (road == lanes.tables.index[stretch.road]) & (s >= stretch.low) & (s <= stretch.high)
-            found |= here & np.isin(number, stretch.lanes) if stretch.lanes else here
-        return found
+            covered |= here & np.isin(number, stretch.lanes) if stretch.lanes else here
+        return covered
 
     return covers
 
@@ -228,48 +228,52 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
     """
     ends = _links(roads)
     parts: list[tuple[Stretch, bool]] = []
-    for number, (one, two) in enumerate(pairwise(cursors)):
-        first, last = roads.road(one.road).length, roads.road(two.road).length
-        here = one.s if one.s is not None else 0.0 if number == 0 else first
-        there = two.s if two.s is not None else last
-        if one.road == two.road:
-            parts.append((Stretch(one.road, min(here, there), max(here, there), one.lanes), there >= here))
+    for number, (cursor, onward) in enumerate(pairwise(cursors)):
+        first, last = roads.road(cursor.road).length, roads.road(onward.road).length
+        here = cursor.s if cursor.s is not None else 0.0 if number == 0 else first
+        there = onward.s if onward.s is not None else last
+        if cursor.road == onward.road:
+            parts.append((Stretch(cursor.road, min(here, there), max(here, there), cursor.lanes), there >= here))
             continue
-        chain = _chain(ends, one.road, two.road)
+        chain = _chain(ends, cursor.road, onward.road)
         leaving, *between, entering = chain
         forward = leaving.side > 0
-        if one.s is None and number == 0 and not forward:
+        if cursor.s is None and number == 0 and not forward:
             here = first
-        parts.append((Stretch(one.road, here if forward else 0.0, first if forward else here, one.lanes), forward))
+        parts.append(
+            (Stretch(cursor.road, here if forward else 0.0, first if forward else here, cursor.lanes), forward)
+        )
         for entry in between[::2]:
             whole = roads.road(entry.road).length
             parts.append((Stretch(entry.road, 0.0, whole), entry.side < 0))
         forward = entering.side < 0
-        if two.s is None and number == len(cursors) - 2 and not forward:
+        if onward.s is None and number == len(cursors) - 2 and not forward:
             there = 0.0
-        parts.append((Stretch(two.road, 0.0 if forward else there, there if forward else last, two.lanes), forward))
+        parts.append(
+            (Stretch(onward.road, 0.0 if forward else there, there if forward else last, onward.lanes), forward)
+        )
     return _cut(parts, length)
 
 
 def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[Stretch]:
-    found, left = [], np.inf if length is None else length
+    cut, left = [], np.inf if length is None else length
     for stretch, forward in parts:
         span = min(stretch.high - stretch.low, left)
         low = stretch.low if forward else stretch.high - span
-        found.append(Stretch(stretch.road, low, low + span, stretch.lanes))
+        cut.append(Stretch(stretch.road, low, low + span, stretch.lanes))
         left -= span
         if left <= 0.0:
             break
-    return found
+    return cut
 
 
 def _links(roads: RoadNetwork) -> Mapping[RoadEnd, list[RoadEnd]]:
     """Return the connected ends of roads by the links of lanes."""
     links: dict[RoadEnd, list[RoadEnd]] = {}
-    for one, two, edge in roads.graph.edges(data=True):
-        if edge["kind"] == "successor" and one.road != two.road:
-            leaving = RoadEnd(one.road, roads.driving_direction(one.road, one.lane))
-            entering = RoadEnd(two.road, -roads.driving_direction(two.road, two.lane))
+    for lane, successor, edge in roads.graph.edges(data=True):
+        if edge["kind"] == "successor" and lane.road != successor.road:
+            leaving = RoadEnd(lane.road, roads.driving_direction(lane.road, lane.lane))
+            entering = RoadEnd(successor.road, -roads.driving_direction(successor.road, successor.lane))
             for a, b in ((leaving, entering), (entering, leaving)):
                 if b not in links.setdefault(a, []):
                     links[a].append(b)
