@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector, Location
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.reading.parsing import LIMITS, Document, open_document
-from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
+from eidrive_scenario.openscenario.reading.reader import Reader, ReferenceUse
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope
@@ -43,12 +43,12 @@ class CatalogFiles(msgspec.Struct, frozen=True):
         return self.folders == folders and all(_digest(path) == digest for path, digest in self.digests.items())
 
 
-def listing_of(place: Path) -> Listing:
+def listing_of(location: Path) -> Listing:
     """Return what is at the location of catalogs."""
     try:
-        return tuple(sorted(os.listdir(place)))
+        return tuple(sorted(os.listdir(location)))
     except OSError:
-        return os.path.lexists(place)
+        return os.path.lexists(location)
 
 
 def _digest(path: Path) -> str:
@@ -97,17 +97,17 @@ class CatalogLibrary:
                     word.capitalize() for word in name.removesuffix("_catalog").split("_")
                 )  # As `MiscObject`
                 self._places[kind] = resolve_path(location.directory.path, folder)
-        self.folders: dict[Path, Listing] = {place: listing_of(place) for place in self._places.values()}
+        self.folders: dict[Path, Listing] = {path: listing_of(path) for path in self._places.values()}
         """Locations of catalogs with their listings, before any file in them is read."""
         self._is_complete = True
         self._circular: set[model.CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
         self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
 
-    def resolve(self, found: Iterable[FoundReference], active: tuple[tuple[str, str], ...] = ()) -> None:
+    def resolve(self, uses: Iterable[ReferenceUse], active: tuple[tuple[str, str], ...] = ()) -> None:
         """Read the referenced entries, and recursively those to which they refer."""
-        for one in found:
-            reference = one.reference
+        for use in uses:
+            reference = use.reference
             names = (reference.catalog_name, reference.entry_name)
             if not all(isinstance(name, str) for name in names):
                 continue
@@ -123,10 +123,10 @@ class CatalogLibrary:
                 self._circular.add(reference)
                 continue
             if reference not in self.entries:
-                entry = self._entry(one, (*active, names))
+                entry = self._entry(use, (*active, names))
                 if entry is not None and reference not in self._circular:
                     self.entries[reference] = entry
-            self._check_kind(one)
+            self._check_kind(use)
 
     @property
     def digests(self) -> dict[str, str]:
@@ -143,9 +143,9 @@ class CatalogLibrary:
             return None
         return CatalogFiles(self.folders, {path: catalog.document.digest for path, catalog in catalogs.items()})
 
-    def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> model.Element | None:
-        reference = found.reference
-        catalog = self._catalog(found)
+    def _entry(self, use: ReferenceUse, active: tuple[tuple[str, str], ...]) -> model.Element | None:
+        reference = use.reference
+        catalog = self._catalog(use)
         if catalog is None:
             return None
         node = catalog.entries.get(reference.entry_name)
@@ -181,24 +181,24 @@ class CatalogLibrary:
         self.resolve(reader.references, active)
         return entry
 
-    def _check_kind(self, found: FoundReference) -> None:
-        entry = self.entries.get(found.reference)
-        if entry is not None and not isinstance(entry, found.kinds):
-            expected = " or ".join(kind.__name__ for kind in found.kinds)
+    def _check_kind(self, use: ReferenceUse) -> None:
+        entry = self.entries.get(use.reference)
+        if entry is not None and not isinstance(entry, use.kinds):
+            expected = " or ".join(kind.__name__ for kind in use.kinds)
             self._error(
-                found.reference,
-                f"catalog entry {quoted(found.reference.entry_name)} is a {type(entry).__name__}",
+                use.reference,
+                f"catalog entry {quoted(use.reference.entry_name)} is a {type(entry).__name__}",
                 f"expected {expected}",
             )
 
-    def _catalog(self, found: FoundReference) -> CatalogFile | None:
+    def _catalog(self, use: ReferenceUse) -> CatalogFile | None:
         """Return the catalog of that name: first in a file of that name, then in any other file."""
-        name = found.reference.catalog_name
-        places = self._ordered_places(found.kinds)
+        name = use.reference.catalog_name
+        places = self._ordered_places(use.kinds)
         if not places:
-            expected = " or ".join(f"{kind.__name__}Catalog" for kind in found.kinds)
+            expected = " or ".join(f"{kind.__name__}Catalog" for kind in use.kinds)
             message = f"catalog {quoted(name)} has no location in CatalogLocations"
-            self._error(found.reference, message, f"add {expected}")
+            self._error(use.reference, message, f"add {expected}")
             return None
         catalogs: dict[Path, CatalogFile] = {}
         unreadable: list[Diagnostic] = []
@@ -221,14 +221,14 @@ class CatalogLibrary:
                 return catalog
         beside = self._beside(name)
         if beside is not None:
-            place = Path(beside.document.name).parent
+            parent = Path(beside.document.name).parent
             self._collector.warning(
-                f"catalog {quoted(name)} is not in the given folders, but in {place}",
-                f"specify the folder {place}",
-                at=found.reference,
+                f"catalog {quoted(name)} is not in the given folders, but in {parent}",
+                f"specify the folder {parent}",
+                at=use.reference,
             )
             return beside
-        self._error(found.reference, *_missing_catalog(name, places, {catalog.name for catalog in catalogs.values()}))
+        self._error(use.reference, *_missing_catalog(name, places, {catalog.name for catalog in catalogs.values()}))
         return None
 
     def _beside(self, name: str) -> CatalogFile | None:
@@ -236,9 +236,9 @@ class CatalogLibrary:
         self._is_complete = False
         folders = {
             folder
-            for place in self._places.values()
-            if is_folder(place)
-            for folder in _listing(place.parent)
+            for location in self._places.values()
+            if is_folder(location)
+            for folder in _listing(location.parent)
             if is_folder(folder) and folder not in self._places.values()
         }
         for folder in sorted(folders):
@@ -311,32 +311,32 @@ def duplicate_entries(catalog: etree._Element, source: str) -> dict[str, Diagnos
     return entries
 
 
-def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:
+def _missing_catalog(name: str, places: Iterable[Path], names: set[str]) -> tuple[str, str]:
     """Return message and hint for a catalog that is not in the given folders."""
-    missing = [shortened(str(place), 300) for place in places if not os.path.exists(place)]
-    message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(place), 300) for place in places)
+    missing = [shortened(str(location), 300) for location in places if not os.path.exists(location)]
+    message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(location), 300) for location in places)
     if missing:
         hint = "correct the Directory"
         if is_regular_file(library_path() / CATALOGS / f"{name}.xosc"):
             hint += f"; that of the library is {LIBRARY_FOLDER}/{CATALOGS}"
         return f"{message}; {', '.join(missing)} {'does' if len(missing) == 1 else 'do'} not exist", hint
-    return message, suggestion(name, known)
+    return message, suggestion(name, names)
 
 
 def _assignments(reference: model.CatalogReference) -> dict[str, Assignment]:
     assignments = reference.parameter_assignments
     return {
-        one.parameter_ref: Assignment(one.value, Location.of(one))
-        for one in (assignments.parameter_assignment if assignments else ())
-        if isinstance(one.parameter_ref, str) and isinstance(one.value, str)
+        assignment.parameter_ref: Assignment(assignment.value, Location.of(assignment))
+        for assignment in (assignments.parameter_assignment if assignments else ())
+        if isinstance(assignment.parameter_ref, str) and isinstance(assignment.value, str)
     }
 
 
 def _candidates(places: Iterable[Path], name: str) -> Iterator[Path]:
     """Yield files that may contain a catalog of that name, those with this file name first."""
-    for place in places:
-        if is_regular_file(place):
-            yield place
-        elif is_folder(place):
-            files = sorted(place.glob("*.xosc"))
+    for location in places:
+        if is_regular_file(location):
+            yield location
+        elif is_folder(location):
+            files = sorted(location.glob("*.xosc"))
             yield from sorted(files, key=lambda file: file.stem != name)

@@ -65,9 +65,9 @@ def _map_folders() -> list[Path]:
 def _hint(logic: model.File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
-    known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{ROADS_SUFFIX}")}
-    if known:
-        return suggestion(named.name.removesuffix(ROADS_SUFFIX), known)
+    maps = {file.stem for directory in places if is_folder(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")}
+    if maps:
+        return suggestion(named.name.removesuffix(ROADS_SUFFIX), maps)
     return f"check LogicFile, or set {MAPS} to the folders of the maps"
 
 
@@ -133,7 +133,7 @@ class Scenario:
     @cached_property
     def custom_commands(self) -> tuple[model.CustomCommandAction, ...]:
         """Return all CustomCommandActions of the storyboard in the order of the file."""
-        return tuple(one for one in self.storyboard.walk() if isinstance(one, model.CustomCommandAction))
+        return tuple(element for element in self.storyboard.walk() if isinstance(element, model.CustomCommandAction))
 
     @cached_property
     def entities_by_type(self) -> Mapping[model.ObjectType, tuple[str, ...]]:
@@ -185,9 +185,9 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         document=root,
         parameters=_values(root.parameter_declarations),
         variables=_values(root.variable_declarations),
-        entities={one.name: found for one, body in objects if (found := _body(one, body)) is not None},
-        external={one.name: body for one, body in objects if isinstance(body, model.ExternalObjectReference)},
-        controllers={one.name: _controllers(one, library.entries) for one, _ in objects},
+        entities={entity.name: body for entity, given in objects if (body := _body(entity, given)) is not None},
+        external={entity.name: body for entity, body in objects if isinstance(body, model.ExternalObjectReference)},
+        controllers={entity.name: _controllers(entity, library.entries) for entity, _ in objects},
         road_file=road_file,
         warnings=warnings,
         entries=library.entries,
@@ -201,7 +201,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     )
 
 
-def _body(one: model.ScenarioObject, body: model.Element | None) -> EntityObject | None:
+def _body(scenario_object: model.ScenarioObject, body: model.Element | None) -> EntityObject | None:
     """Return the body of an entity; an external object has a body without size."""
     if isinstance(body, model.ExternalObjectReference):
         box = model.BoundingBox(
@@ -212,8 +212,8 @@ def _body(one: model.ScenarioObject, body: model.Element | None) -> EntityObject
             mass=0.0,
             misc_object_category=model.MiscObjectCategory.NONE,
             bounding_box=box,
-            line=one.line,
-            source=one.source,
+            line=scenario_object.line,
+            source=scenario_object.source,
         )
     return body if isinstance(body, model.Vehicle | model.Pedestrian | model.MiscObject) else None
 
@@ -222,17 +222,18 @@ def _values(declarations: model.ParameterDeclarations | model.VariableDeclaratio
     if declarations is None:
         return {}
     if isinstance(declarations, model.ParameterDeclarations):
-        return {one.name: one.value for one in declarations.parameter_declaration}
-    return {one.name: one.value for one in declarations.variable_declaration}
+        return {declaration.name: declaration.value for declaration in declarations.parameter_declaration}
+    return {declaration.name: declaration.value for declaration in declarations.variable_declaration}
 
 
 def _controllers(
-    one: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
+    scenario_object: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
 ) -> tuple[model.Controller, ...]:
-    found: list[model.Element | None] = []
-    for assigned in one.object_controller:
-        found.append(entries.get(assigned.catalog_reference) if assigned.catalog_reference else assigned.controller)
-    return tuple(controller for controller in found if isinstance(controller, model.Controller))
+    controllers = (
+        entries.get(assigned.catalog_reference) if assigned.catalog_reference else assigned.controller
+        for assigned in scenario_object.object_controller
+    )
+    return tuple(controller for controller in controllers if isinstance(controller, model.Controller))
 
 
 def _other_kind(root: model.OpenScenario, name: str) -> Diagnostic:
@@ -262,7 +263,7 @@ class EntitySelections:
         entities = scenario.document.entities
         declarations = entities.entity_selection if entities is not None else ()
         self.declared: Mapping[str, model.EntitySelection] = {
-            one.name: one for one in declarations if one.name not in scenario.entities
+            selection.name: selection for selection in declarations if selection.name not in scenario.entities
         }
 
     def members(self, name: str) -> list[str]:

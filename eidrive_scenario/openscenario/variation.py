@@ -68,10 +68,10 @@ def variations(scenario: Scenario) -> Mapping[str, Distribution]:
     The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise InputError with
     file and line of every error in the commands.
     """
-    found = _known.get(scenario)
-    if found is None:
-        found = _known[scenario] = _read_variations(scenario)
-    return found
+    distributions = _known.get(scenario)
+    if distributions is None:
+        distributions = _known[scenario] = _read_variations(scenario)
+    return distributions
 
 
 def _read_variations(scenario: Scenario) -> Mapping[str, Distribution]:
@@ -81,15 +81,15 @@ def _read_variations(scenario: Scenario) -> Mapping[str, Distribution]:
         if command.type == COMMAND:
             with errors:
                 specified += _specifications(scenario, command)
-    names = {one.name for one in specified}
-    found: dict[str, Distribution] = {}
-    for one in specified:
+    names = {specification.name for specification in specified}
+    distributions: dict[str, Distribution] = {}
+    for specification in specified:
         with errors:
-            if one.name in found:
-                raise one.error(f"parameter {quoted(one.name)} is drawn twice", "remove one")
-            found[one.name] = one.distribution(scenario, names)
+            if specification.name in distributions:
+                raise specification.error(f"parameter {quoted(specification.name)} is drawn twice", "remove one")
+            distributions[specification.name] = specification.distribution(scenario, names)
     errors.raise_if_any()
-    return found
+    return distributions
 
 
 class _Specification(msgspec.Struct, frozen=True):
@@ -131,7 +131,8 @@ class _Specification(msgspec.Struct, frozen=True):
 def _specifications(scenario: Scenario, command: CustomCommandAction) -> Iterator[_Specification]:
     """Yield the parameters of a command. Raise SettingError if it is not a mapping or not in Init."""
     source, line = command.source, command.line
-    if not any(command is one.custom_command_action for one in scenario.storyboard.init.actions.user_defined_action):
+    initial = scenario.storyboard.init.actions.user_defined_action
+    if not any(command is action.custom_command_action for action in initial):
         raise SettingError(Diagnostic(f"{COMMAND} has no effect in an event", "move it to Init", source, line))
     data = load_yaml(command.content, source=source, line=line)
     if not isinstance(data, dict):

@@ -51,21 +51,21 @@ class ExternalObjects:
                 f"{scenario.external[name].name!r} is unknown",
                 "define a Vehicle, Pedestrian or MiscObject",
             )
-            for name, found in self._objects.items()
-            if found is None
+            for name, placed in self._objects.items()
+            if placed is None
         )
 
     def in_road_network(self) -> Mapping[str, PlacedObject]:
         """Return the external objects that are objects of the road network, by entity."""
-        return {name: found for name, found in self._objects.items() if found is not None}
+        return {name: placed for name, placed in self._objects.items() if placed is not None}
 
     def body(self, name: str) -> ActorSpec | None:
         """Return the body of an entity that is an object of the road network; None for other entities."""
-        found = self._objects.get(name)
-        if found is None:
+        placed = self._objects.get(name)
+        if placed is None:
             return None
         default = actor_spec(name, self._scenario.entities[name])
-        size = (found.length or default.size[0], found.width or default.size[1], found.height or default.size[2])
+        size = (placed.length or default.size[0], placed.width or default.size[1], placed.height or default.size[2])
         return replace(default, size=size, offset=(0.0, 0.0, size[2] / 2.0))
 
 
@@ -73,7 +73,9 @@ def _find(name: str, roads: RoadNetwork | None) -> PlacedObject | None:
     if roads is None:
         return None
     placed = list(placed_objects(roads)) if name else []
-    return next((one for key in ("id", "name") for one in placed if getattr(one.object, key) == name), None)
+    return next(
+        (candidate for key in ("id", "name") for candidate in placed if getattr(candidate.object, key) == name), None
+    )
 
 
 class Storyboard:
@@ -237,8 +239,8 @@ class Storyboard:
 def _check_placements(placements: Mapping[str, Placement]) -> None:
     """Raise SimulationError for the first placement that is not finite, which pybullet does not check."""
     total = 0.0
-    for place in placements.values():
-        total += place.x + place.y + place.z + place.yaw + place.speed
+    for placement in placements.values():
+        total += placement.x + placement.y + placement.z + placement.yaw + placement.speed
     if total - total == 0.0:  # neither NaN nor infinite
         return
     for name, placement in placements.items():
@@ -285,7 +287,7 @@ class RequestedRoutes:
 
         The lap that follows a closed route is no new route.
         """
-        found: dict[str, Array] = {}
+        routes: dict[str, Array] = {}
         for actor in actors:
             name = actor.name
             request: object = actor.motion.route
@@ -300,7 +302,7 @@ class RequestedRoutes:
             self._last[name] = request
             if isinstance(request, Route):
                 if not isinstance(last, Route) or last.lap is not request:
-                    found[name] = request.polyline(POINTS_APART)
+                    routes[name] = request.polyline(POINTS_APART)
             else:
-                found[name] = np.concatenate([np.array([actor.motion.pose[:3]]), request])
-        return found or NO_ROUTES
+                routes[name] = np.concatenate([np.array([actor.motion.pose[:3]]), request])
+        return routes or NO_ROUTES

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import attrgetter
 from typing import Protocol
 
 from eidrive_scenario.openscenario import model
@@ -43,19 +44,19 @@ class CartesianProduct:
     @property
     def count(self) -> int:
         """Return the number of combinations; without choices, one combination without assignments."""
-        return math.prod(one.count for one in self.choices)
+        return math.prod(choice.count for choice in self.choices)
 
     @property
     def names(self) -> Mapping[str, Location]:
         """Return the parameters with the locations of their first values."""
-        return {name: origin for one in reversed(self.choices) for name, origin in one.names.items()}
+        return {name: origin for choice in reversed(self.choices) for name, origin in choice.names.items()}
 
     def at(self, index: int) -> Assignments:
         """Return the combination of an index."""
         parts: list[Assignments] = []
-        for one in reversed(self.choices):
-            index, own = divmod(index, one.count)
-            parts.append(one.at(own))
+        for choice in reversed(self.choices):
+            index, own = divmod(index, choice.count)
+            parts.append(choice.at(own))
         return {name: assignment for part in reversed(parts) for name, assignment in part.items()}
 
 
@@ -112,23 +113,23 @@ def combinations_of(deterministic: model.Deterministic, collector: DiagnosticCol
         *deterministic.deterministic_multi_parameter_distribution,
         *deterministic.deterministic_single_parameter_distribution,
     ]
-    found: list[ValueSource] = []
-    for distribution in sorted(distributions, key=lambda one: one.sibling_index):
+    sources: list[ValueSource] = []
+    for distribution in sorted(distributions, key=attrgetter("sibling_index")):
         if isinstance(distribution, model.DeterministicMultiParameterDistribution):
-            found.append(_value_sets(distribution, collector))
+            sources.append(_value_sets(distribution, collector))
         else:
             choices = _single(distribution, collector)
             if choices is not None:
-                found.append(choices)
-    varied_once(((name, origin) for one in found for name, origin in one.names.items()), collector)
-    magnitude = sum(math.log10(one.count) for one in found if one.count)
+                sources.append(choices)
+    varied_once(((name, origin) for source in sources for name, origin in source.names.items()), collector)
+    magnitude = sum(math.log10(source.count) for source in sources if source.count)
     if magnitude > math.log10(sys.maxsize):
         count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
         message = f"the distribution expands to {count} runs"
         hint = "use larger steps in its ranges"
         collector.error(message, hint, at=deterministic)
         return CartesianProduct(())
-    return CartesianProduct(tuple(found))
+    return CartesianProduct(tuple(sources))
 
 
 def varied_once(names: Iterable[tuple[str, Location]], collector: DiagnosticCollector) -> None:
@@ -147,10 +148,12 @@ def _value_sets(
     choices = []
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
-        for one in value_set.parameter_assignment:
-            if one.parameter_ref in choice:
-                collector.error(f"ParameterValueSet assigns {one.parameter_ref!r} twice", "remove one", at=one)
-            choice[one.parameter_ref] = Assignment(one.value, Location.of(one))
+        for assignment in value_set.parameter_assignment:
+            if assignment.parameter_ref in choice:
+                collector.error(
+                    f"ParameterValueSet assigns {assignment.parameter_ref!r} twice", "remove one", at=assignment
+                )
+            choice[assignment.parameter_ref] = Assignment(assignment.value, Location.of(assignment))
         choices.append(choice)
     return ListedValues(tuple(choices))
 
@@ -161,7 +164,7 @@ def _single(
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
         elements = distribution.distribution_set.element
-        return ListedValues(tuple({name: Assignment(one.value, Location.of(one))} for one in elements))
+        return ListedValues(tuple({name: Assignment(element.value, Location.of(element))} for element in elements))
     if distribution.distribution_range is not None:
         return _steps(name, distribution.distribution_range, collector)
     reject_user_defined(distribution, name, "DistributionSet or DistributionRange", collector)

@@ -86,13 +86,13 @@ def draws_of(stochastic: model.Stochastic, seed: float, collector: DiagnosticCol
         message = f"Stochastic has numberOfTestRuns {stochastic.number_of_test_runs}"
         collector.error(message, "specify a number above zero", at=stochastic)
     distributions = stochastic.stochastic_distribution
-    varied_once(((one.parameter_name, Location.of(one)) for one in distributions), collector)
-    found = {one.parameter_name: quantile_of(one, collector) for one in distributions}
+    varied_once(((distribution.parameter_name, Location.of(distribution)) for distribution in distributions), collector)
+    quantiles = {distribution.parameter_name: quantile_of(distribution, collector) for distribution in distributions}
     return StochasticSampler(
         stochastic.number_of_test_runs,
         float(seed if stochastic.random_seed is None else stochastic.random_seed),
-        {name: quantile for name, quantile in found.items() if quantile is not None},
-        {one.parameter_name: Location.of(one) for one in distributions},
+        {name: quantile for name, quantile in quantiles.items() if quantile is not None},
+        {distribution.parameter_name: Location.of(distribution) for distribution in distributions},
     )
 
 
@@ -217,16 +217,16 @@ def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
 
 
 def _histogram(given: model.Histogram, collector: DiagnosticCollector) -> Quantile:
-    if all([valid_range(one.range, collector, finite=True) for one in given.bin]):
+    if all([valid_range(part.range, collector, finite=True) for part in given.bin]):
         _check_overlap(given.bin, collector)
-    limits = tuple((one.range.lower_limit, one.range.upper_limit) for one in given.bin)
+    limits = tuple((part.range.lower_limit, part.range.upper_limit) for part in given.bin)
     return partial(_from_histogram, limits, _accumulated(given, given.bin, collector))
 
 
 def _check_overlap(bins: tuple[model.HistogramBin, ...], collector: DiagnosticCollector) -> None:
-    for before, after in pairwise(sorted(bins, key=lambda one: (one.range.lower_limit, one.range.upper_limit))):
+    for before, after in pairwise(sorted(bins, key=lambda part: (part.range.lower_limit, part.range.upper_limit))):
         if after.range.lower_limit < before.range.upper_limit:
-            later = max(before, after, key=lambda one: one.line or 0)
+            later = max(before, after, key=lambda part: part.line or 0)
             _report(later, "overlaps another bin", "specify disjoint ranges", collector)
 
 
@@ -236,7 +236,7 @@ def _from_histogram(limits: tuple[tuple[float, float], ...], accumulated: tuple[
 
 
 def _value_set(given: model.ProbabilityDistributionSet, collector: DiagnosticCollector) -> Quantile:
-    values = tuple(one.value for one in given.element)
+    values = tuple(element.value for element in given.element)
     return partial(_from_values, values, _accumulated(given, given.element, collector))
 
 
@@ -250,11 +250,11 @@ def _accumulated(
     collector: DiagnosticCollector,
 ) -> tuple[float, ...]:
     """Return the cumulative weights; report invalid ones."""
-    for one in parts:
-        if not 0 <= one.weight < math.inf:
-            _report(one, f"has the weight {format_value(one.weight)}", "specify a number of at least zero", collector)
-    sums = tuple(accumulate(one.weight for one in parts))
-    if not 0 < sums[-1] < math.inf and all(0 <= one.weight < math.inf for one in parts):
+    for part in parts:
+        if not 0 <= part.weight < math.inf:
+            _report(part, f"has the weight {format_value(part.weight)}", "specify a number of at least zero", collector)
+    sums = tuple(accumulate(part.weight for part in parts))
+    if not 0 < sums[-1] < math.inf and all(0 <= part.weight < math.inf for part in parts):
         _report(given, f"has weights with the sum {format_value(sums[-1])}", "specify weights above zero", collector)
     return sums
 

@@ -224,5 +224,5 @@ def has_times(shape: Element) -> bool:
 
 
 def _ascend(times: Sequence[float | None]) -> bool:
-    known = [time for time in times if time is not None]
-    return len(known) == len(times) and len(known) > 1 and known[-1] > known[0]
+    given = [time for time in times if time is not None]
+    return len(given) == len(times) and len(given) > 1 and given[-1] > given[0]

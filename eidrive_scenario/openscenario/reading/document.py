@@ -12,7 +12,7 @@ from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, Location
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.reading.parsing import Document, Source, open_document
-from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
+from eidrive_scenario.openscenario.reading.reader import Reader, ReferenceUse
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter
 from eidrive_scenario.openscenario.values.scalars import Version
@@ -27,7 +27,7 @@ class ReadDocument(msgspec.Struct, frozen=True):
 
     root: OpenScenario
     version: Version
-    references: tuple[FoundReference, ...]
+    references: tuple[ReferenceUse, ...]
     parameters: dict[str, Parameter]
 
 
@@ -100,8 +100,8 @@ def _revision(
     version = (numbers[0], numbers[1])
     if version in VERSIONS:
         return version
-    known = "known: " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
+    supported = "known: " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
     report = collector.warning if older and version < older else collector.error
     message = f"FileHeader has the version {version[0]}.{version[1]}"
-    report(message, known, at=Location(document.name, line_of(header)))
+    report(message, supported, at=Location(document.name, line_of(header)))
     return older if older and version < older else None

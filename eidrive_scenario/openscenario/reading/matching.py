@@ -104,7 +104,7 @@ class _Builder:
     def piece(self, part: Leaf | Group) -> _Piece:
         if isinstance(part, Leaf):
             return self._leaf(part)
-        pieces = [self.piece(one) for one in part.parts]
+        pieces = [self.piece(member) for member in part.parts]
         group = self._alternatives(pieces) if part.exclusive else self._chain(pieces)
         if part.repeated:
             self._link(group.last, group.first)

@@ -31,11 +31,11 @@ class KeptFiles(Generic[K, V]):
 
     def get(self, key: K) -> V | None:
         """Return the value of a key, or None."""
-        found = self._kept.get(key)
-        if found is None:
+        kept = self._kept.get(key)
+        if kept is None:
             return None
         self._kept.move_to_end(key)
-        return found[0]
+        return kept[0]
 
     def put(self, key: K, value: V, size: int) -> None:
         """Store the value of a file of this size [byte]. Larger files than the maximum are not kept."""

@@ -28,14 +28,14 @@ _WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
 _WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
 
 
-class FoundReference(msgspec.Struct, frozen=True):
+class ReferenceUse(msgspec.Struct, frozen=True):
     """Catalog reference and the kinds of entries that are allowed for it."""
 
     reference: model.CatalogReference
     kinds: tuple[type[model.Element], ...]
 
 
-ReadElement = tuple[model.Element, tuple[FoundReference, ...]]
+ReadElement = tuple[model.Element, tuple[ReferenceUse, ...]]
 """Element and the catalog references in it."""
 
 
@@ -59,7 +59,7 @@ class Reader:
         self.source = source
         self.version = version
         self.collector = collector
-        self.references: list[FoundReference] = []
+        self.references: list[ReferenceUse] = []
         self.declared: Scope | None = None
         """Parameters that the root element declares."""
         self._error_count = 0
@@ -94,10 +94,10 @@ class Reader:
         """Return the element of an earlier reading, or read it."""
         if self._read is None:
             return self._element(node, cls, scope, assignments)
-        known = self._read.get(node)
-        if known is not None and type(known[0]) is cls:
-            self.references += known[1]
-            return known[0]
+        earlier = self._read.get(node)
+        if earlier is not None and type(earlier[0]) is cls:
+            self.references += earlier[1]
+            return earlier[0]
         before = self._scope_uses, self.collector.count
         first_reference = len(self.references)
         element = self._element(node, cls, scope, assignments)
@@ -108,47 +108,49 @@ class Reader:
     def _element(
         self, node: etree._Element, cls: type[model.Element], scope: Scope, assignments: dict[str, Assignment]
     ) -> model.Element:
-        known = rules(cls, self.version)
+        content = rules(cls, self.version)
         values: dict[str, Any] = {"line": line_of(node), "source": self.source}
         if "sibling_index" in cls.field_defaults:
             values["sibling_index"] = cast(etree._Element, node.getparent()).index(node)
         children = list(node.iterchildren(etree.Element))
-        if "ParameterDeclarations" in known.children:
+        if "ParameterDeclarations" in content.children:
             declarations = next((child for child in children if child.tag == "ParameterDeclarations"), None)
             if declarations is not None:
                 self._scope_uses += 1
                 scope = scope.inner()
                 self.declared = self.declared or scope
                 values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
-        self._attributes(node, known, scope, values)
-        self._text(node, known, values)
+        self._attributes(node, content, scope, values)
+        self._text(node, content, values)
         if cls is model.Property or cls is model.CustomCommandAction:
             self._keep_scope(node, scope, values)
         repeated: dict[str, list[model.Element]] = {}
         for child in children:
-            self._child(node, child, known, scope, values, repeated)
-        values.update((name, tuple(found)) for name, found in repeated.items())
-        if children or known.children:
-            check_children(node, children, known, self.version, self._error)
-        if known.choice and not any(one.tag in known.choice or one.tag not in known.children for one in children):
-            self._report_empty(node, cls, known)
+            self._child(node, child, content, scope, values, repeated)
+        values.update((name, tuple(elements)) for name, elements in repeated.items())
+        if children or content.children:
+            check_children(node, children, content, self.version, self._error)
+        if content.choice and not any(
+            child.tag in content.choice or child.tag not in content.children for child in children
+        ):
+            self._report_empty(node, cls, content)
         for name in ("catalog_reference", "catalog_references"):
             if name in values:
-                self._note_references(known, values[name])
+                self._note_references(content, values[name])
         return incomplete_element(cls, values)
 
-    def _attributes(self, node: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]) -> None:
+    def _attributes(self, node: etree._Element, content: Rules, scope: Scope, values: dict[str, Any]) -> None:
         present = set()
         for name, text in cast(list[tuple[str, str]], node.items()):
-            rule = known.attributes.get(name)
+            rule = content.attributes.get(name)
             if rule is not None:
                 present.add(name)
                 values[rule.field] = self._value(node, name, text, rule, scope)
             elif name not in _IGNORED:
-                usage = known.other_attributes.get(name)
-                hint = availability(usage, self.version) if usage else suggestion(name, known.attributes)
+                usage = content.other_attributes.get(name)
+                hint = availability(usage, self.version) if usage else suggestion(name, content.attributes)
                 self._error(f"{node.tag} has no attribute {name!r}", hint, node)
-        for name, rule in known.attributes.items():
+        for name, rule in content.attributes.items():
             if rule.required and name not in present:
                 self._error(f"{node.tag} lacks the attribute {name!r}", f"expected {rule.scalar.name}", node)
 
@@ -197,12 +199,12 @@ class Reader:
             self._scope_uses += 1
             values["scope"] = scope
 
-    def _text(self, node: etree._Element, known: Rules, values: dict[str, Any]) -> None:
-        if known.text_field:
-            values[known.text_field] = "".join(cast(list[str], node.xpath("text()")))
+    def _text(self, node: etree._Element, content: Rules, values: dict[str, Any]) -> None:
+        if content.text_field:
+            values[content.text_field] = "".join(cast(list[str], node.xpath("text()")))
         elif node in self._with_text:
             self._error(f"{node.tag} contains text; only elements are allowed", "remove the text", node)
-        elif not known.children and node in self._with_space:
+        elif not content.children and node in self._with_space:
             self.collector.warning(
                 f"{node.tag} contains white space; the schema allows no content",
                 f"write <{node.tag} …/>",
@@ -213,12 +215,12 @@ class Reader:
         self,
         node: etree._Element,
         child: etree._Element,
-        known: Rules,
+        content: Rules,
         scope: Scope,
         values: dict[str, Any],
         repeated: dict[str, list[model.Element]],
     ) -> None:
-        rule = known.children.get(child.tag)
+        rule = content.children.get(child.tag)
         if rule is None:
             return
         if rule.deprecated:
@@ -231,23 +233,23 @@ class Reader:
         else:
             values.setdefault(rule.field, element)
 
-    def _report_empty(self, node: etree._Element, cls: type[model.Element], known: Rules) -> None:
+    def _report_empty(self, node: etree._Element, cls: type[model.Element], content: Rules) -> None:
         """Report an empty choice, which the schemas up to 1.2 allow; a warning for classes that files leave empty."""
         report = self.collector.warning if cls in _MAY_BE_EMPTY else self.collector.error
-        hint = "it contains one of " + ", ".join(known.choice)
+        hint = "it contains one of " + ", ".join(content.choice)
         report(f"{node.tag} is empty", hint, at=Location(self.source, line_of(node)))
 
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> model.Element:
         """Read declarations in their order, so that each may use those before it."""
-        known = rules(model.ParameterDeclarations, self.version)
+        content = rules(model.ParameterDeclarations, self.version)
         values: dict[str, Any] = {"line": line_of(node), "source": self.source}
         children = list(node.iterchildren(etree.Element))
-        self._attributes(node, known, scope, values)
-        self._text(node, known, values)
-        check_children(node, children, known, self.version, self._error)
+        self._attributes(node, content, scope, values)
+        self._text(node, content, values)
+        check_children(node, children, content, self.version, self._error)
         declared = []
         for child in children:
-            if child.tag in known.children:
+            if child.tag in content.children:
                 errors_before = self._error_count
                 declaration = self._element(child, model.ParameterDeclaration, scope, {})
                 is_valid = self._error_count == errors_before
@@ -283,11 +285,11 @@ class Reader:
             hint = suggestion(name, declared)
             self.collector.error(f"unknown parameter {name!r}", hint, at=origin)
 
-    def _note_references(self, known: Rules, value: Any) -> None:
+    def _note_references(self, content: Rules, value: Any) -> None:
         entries = {child.cls for child in rules(model.Catalog, self.version).children.values()}
-        kinds = tuple(child.cls for child in known.children.values() if child.cls in entries)
+        kinds = tuple(child.cls for child in content.children.values() if child.cls in entries)
         references = value if isinstance(value, tuple) else (value,)
-        self.references.extend(FoundReference(reference, kinds) for reference in references)
+        self.references.extend(ReferenceUse(reference, kinds) for reference in references)
 
     def _warn_of_python(self, name: str, node: etree._Element, text: str, effect: str, hint: str) -> None:
         """Warn of a Python literal that XML does not have; scenariogeneration 0.16 writes some."""

@@ -28,7 +28,7 @@ class Workaround(msgspec.Struct, frozen=True):
     element: str
     message: str
     hint: str
-    found: Callable[[etree._Element], bool]
+    applies: Callable[[etree._Element], bool]
     repair: Callable[[etree._Element], None]
     since: Version = (1, 0)
     before: Version = (2, 0)
@@ -38,8 +38,8 @@ def apply_workarounds(
     root: etree._Element, name: str, version: Version, collector: DiagnosticCollector
 ) -> etree._Element:
     """Return the tree itself, or a repaired copy with a warning for each deviation."""
-    by_tag = {one.element: one for one in WORKAROUNDS if one.since <= version < one.before}
-    deviating = [node for node in root.iter(*by_tag) if by_tag[str(node.tag)].found(node)]
+    by_tag = {entry.element: entry for entry in WORKAROUNDS if entry.since <= version < entry.before}
+    deviating = [node for node in root.iter(*by_tag) if by_tag[str(node.tag)].applies(node)]
     if not deviating:
         return root
     for node in deviating:
@@ -48,7 +48,7 @@ def apply_workarounds(
     repaired = copy.deepcopy(root)
     for node in list(repaired.iter(*by_tag)):
         workaround = by_tag[str(node.tag)]
-        if workaround.found(node):
+        if workaround.applies(node):
             workaround.repair(node)
     return repaired
 

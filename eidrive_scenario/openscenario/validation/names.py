@@ -22,19 +22,23 @@ def scenario_objects(
     entities: model.Entities | None, entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
     """Yield every scenario object and its body, trailers after their towing vehicles; None for an unknown body."""
-    for one in entities.scenario_object if entities else ():
-        yield from _with_trailers(one, entries)
+    for scenario_object in entities.scenario_object if entities else ():
+        yield from _with_trailers(scenario_object, entries)
 
 
 def _with_trailers(
-    one: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
+    scenario_object: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
     body: model.Element | None = (
-        one.vehicle or one.pedestrian or one.misc_object or one.external_object_reference or one.sensor
+        scenario_object.vehicle
+        or scenario_object.pedestrian
+        or scenario_object.misc_object
+        or scenario_object.external_object_reference
+        or scenario_object.sensor
     )
-    if body is None and one.catalog_reference is not None:
-        body = entries.get(one.catalog_reference)
-    yield one, body
+    if body is None and scenario_object.catalog_reference is not None:
+        body = entries.get(scenario_object.catalog_reference)
+    yield scenario_object, body
     if isinstance(body, model.Vehicle) and body.trailer is not None and body.trailer.trailer is not None:
         yield from _with_trailers(body.trailer.trailer, entries)
 
@@ -107,12 +111,12 @@ class StoryboardNames:
         level: model.StoryboardElementType | None = condition.storyboard_element_type
         if reference is None or level is None:
             return
-        found = self._references.by(reference)
-        if any(named.level is level for named in found):
+        matches = self._references.by(reference)
+        if any(named.level is level for named in matches):
             return
-        if found:
-            message = f"storyboardElementRef: {reference!r} is of the kind {found[0].level.value}, not {level.value}"
-            hint = f"write storyboardElementType={found[0].level.value!r}"
+        if matches:
+            message = f"storyboardElementRef: {reference!r} is of the kind {matches[0].level.value}, not {level.value}"
+            hint = f"write storyboardElementType={matches[0].level.value!r}"
         else:
             message = f"storyboardElementRef refers to {level.value} {reference!r}, which does not exist"
             hint = suggestion(reference, {named.path[-1] for named in self.named if named.level is level})
@@ -130,13 +134,13 @@ class ReferenceMatch(Generic[T]):
     def by(self, reference: str) -> list[T]:
         """Return the referenced elements in the order of the index."""
         last = [name for name in SEPARATOR.split(reference) if name][-1:]
-        found = {
+        elements = {
             number: element
             for name in {reference, *last}
             for number, path, element in self._by_name.get(name, ())
             if is_suffix(reference, path)
         }
-        return [found[number] for number in sorted(found)]
+        return [elements[number] for number in sorted(elements)]
 
 
 def is_suffix(reference: str, path: tuple[str, ...]) -> bool:
@@ -206,8 +210,8 @@ def _definitions(
     root: model.OpenScenario, elements: Iterable[model.Element], entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[str, str | None, model.Element]]:
     """Yield every defined name with its kind and element; None for a name that could not be read."""
-    for one, _ in scenario_objects(root.entities, entries):
-        yield "entity", one.name, one
+    for scenario_object, _ in scenario_objects(root.entities, entries):
+        yield "entity", scenario_object.name, scenario_object
     for selection in root.entities.entity_selection if root.entities else ():
         yield "entity", selection.name, selection
     for element in elements:
@@ -230,16 +234,16 @@ def _has_no_trailer(trailer: model.Trailer) -> bool:
 def _check_references(
     element: model.Element,
     version: Version,
-    known: Mapping[str, Mapping[str, model.Element]],
+    defined: Mapping[str, Mapping[str, model.Element]],
     collector: DiagnosticCollector,
 ) -> None:
     for spelling, rule in rules(type(element), version).attributes.items():
         kind = rule.points_to
-        name = getattr(element, rule.field) if kind in known else None
-        if isinstance(name, str) and name not in known[kind]:
+        name = getattr(element, rule.field) if kind in defined else None
+        if isinstance(name, str) and name not in defined[kind]:
             collector.error(
                 f"{spelling} of {type(element).__name__} refers to {kind} {name!r}, which does not exist",
-                suggestion(name, known[kind]),
+                suggestion(name, defined[kind]),
                 at=element,
             )
 

@@ -26,33 +26,33 @@ def check_types(elements: Iterable[model.Element], collector: DiagnosticCollecto
     """Warn of values and calculations that contradict the declared type."""
     elements = tuple(elements)
     types: dict[tuple[str, str], set[model.ParameterType]] = {}
-    for one in elements:
-        if isinstance(one, model.VariableDeclaration):
-            types.setdefault(("variable", one.name), set()).add(one.variable_type)
-            if _misfits(one.value, one.variable_type):
-                declared = one.variable_type.value
-                message = f"variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
-                collector.warning(message, "the value is used as a text", at=one)
-        elif isinstance(one, model.ParameterDeclaration):
-            types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
-    for one in elements:
-        if isinstance(one, model.VariableAction):
-            _check_action(one, "variable", one.variable_ref, types.get(("variable", one.variable_ref)), collector)
-        elif isinstance(one, model.ParameterAction):
-            _check_action(one, "parameter", one.parameter_ref, types.get(("parameter", one.parameter_ref)), collector)
+    for element in elements:
+        if isinstance(element, model.VariableDeclaration):
+            types.setdefault(("variable", element.name), set()).add(element.variable_type)
+            if _misfits(element.value, element.variable_type):
+                declared = element.variable_type.value
+                message = f"variable {element.name!r} is declared as {declared}, but its value is {element.value!r}"
+                collector.warning(message, "the value is used as a text", at=element)
+        elif isinstance(element, model.ParameterDeclaration):
+            types.setdefault(("parameter", element.name), set()).add(element.parameter_type)
+    for element in elements:
+        if isinstance(element, model.VariableAction):
+            _check_action(element, "variable", element.variable_ref, types, collector)
+        elif isinstance(element, model.ParameterAction):
+            _check_action(element, "parameter", element.parameter_ref, types, collector)
 
 
 def _check_action(
     action: model.VariableAction | model.ParameterAction,
     kind: str,
     name: str,
-    types: set[model.ParameterType] | None,
+    types: Mapping[tuple[str, str], set[model.ParameterType]],
     collector: DiagnosticCollector,
 ) -> None:
     """Check one action; the type is unknown if a name has several declarations with different types."""
-    if types is None or len(types) != 1:
+    if len(types.get((kind, name), ())) != 1:
         return
-    (declared,) = types
+    (declared,) = types[kind, name]
     setting = action.set_action
     if setting is not None and _misfits(setting.value, declared):
         message = f"{kind} {name!r} is declared as {declared.value}, but set to {setting.value!r}"
@@ -151,8 +151,8 @@ def unusable(element: model.Element, version: Version) -> str:
         elif value < MIN_POSITIVE and name in POSITIVE.get(kind, ()):
             message = f"is {_format(value)}; a number of at least {MIN_POSITIVE:g} is expected"
         if message:
-            known = rules(kind, version).attributes.items()
-            spelling = next((spelling for spelling, rule in known if rule.field == name), name)
+            attributes = rules(kind, version).attributes.items()
+            spelling = next((spelling for spelling, rule in attributes if rule.field == name), name)
             return f"{spelling} of {kind.__name__} {message}"
     return ""
 
@@ -272,7 +272,9 @@ _CHECKS: Mapping[type[model.Element], Callable[[Any], str]] = {
     model.AbsoluteTargetLane: _layer,
     model.Clothoid: lambda curve: _descending_times([curve.start_time, curve.stop_time]),
     model.ClothoidSpline: _clothoid_spline,
-    model.Condition: lambda one: "Condition has a negative delay" if one.delay is not None and one.delay < 0 else "",
+    model.Condition: lambda condition: (
+        "Condition has a negative delay" if condition.delay is not None and condition.delay < 0 else ""
+    ),
     model.LanePosition: _layer,
     model.LongitudinalDistanceAction: _distance,
     model.Nurbs: _nurbs,

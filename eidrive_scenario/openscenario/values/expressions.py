@@ -157,8 +157,8 @@ def _check(tree: ast.Expression, text: str) -> None:
             kind = type(node).__name__
             raise ExpressionError(f"{quoted(text)} is not an expression of the standard: {kind} is not allowed")
         if isinstance(node, ast.Name) and not node.id.startswith(_PREFIX):
-            known = FUNCTIONS if id(node) in called else CONSTANTS
-            if node.id not in known:
+            names = FUNCTIONS if id(node) in called else CONSTANTS
+            if node.id not in names:
                 kind = "function" if id(node) in called else "word"
-                hint = suggestion(node.id, known) if kind == "function" else "a parameter begins with $"
+                hint = suggestion(node.id, names) if kind == "function" else "a parameter begins with $"
                 raise ExpressionError(f"unknown {kind} {node.id!r} in the expression {quoted(text)}", hint)

@@ -107,13 +107,13 @@ class Scope:
         """Return the parameter of a name. Raise ExpressionError if it is unknown or invalid."""
         scope: Scope | None = self
         while scope is not None:
-            found = scope.parameters.get(name)
-            if found is not None:
-                if not found.is_valid:
+            parameter = scope.parameters.get(name)
+            if parameter is not None:
+                if not parameter.is_valid:
                     raise ExpressionError("")
                 if scope.lent is not None:
                     scope.lent.add(name)
-                return found
+                return parameter
             scope = scope.outer
         raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
 
@@ -220,7 +220,8 @@ def declare(
         return
     if not is_allowed:
         allowed = " or ".join(
-            " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
+            " and ".join(f"{constraint.rule.value} {constraint.value}" for constraint in group.value_constraint)
+            for group in groups
         )
         collector.constraint_error(
             f"parameter {name!r} is {quoted(text)}, outside its constraints",
@@ -240,7 +241,8 @@ def fits_type(text: str, scalar: Scalar) -> bool:
 
 def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
     return all(
-        compare(value, one.rule, scalar.convert(_without_fraction(one.value, scalar))) for one in group.value_constraint
+        compare(value, constraint.rule, scalar.convert(_without_fraction(constraint.value, scalar)))
+        for constraint in group.value_constraint
     )
 
 
@@ -375,5 +377,8 @@ def hide_parameters(scope: Scope | None, names: Iterable[str]) -> Scope | None:
     hidden = set(names)
     outer = hide_parameters(scope.outer, hidden)
     return Scope(
-        outer, {name: one for name, one in scope.parameters.items() if name not in hidden}, scope.lent, scope.budget
+        outer,
+        {name: parameter for name, parameter in scope.parameters.items() if name not in hidden},
+        scope.lent,
+        scope.budget,
     )

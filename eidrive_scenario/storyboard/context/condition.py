@@ -173,8 +173,8 @@ class EntityCondition(Condition):
 
     def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the quantities of the present entities."""
-        found = [(name, self.quantity(context, name)) for name in self.entities if name in context.view]
-        return tuple(Measure(name, value, *self.threshold(), self.unit) for name, value in found if value is not None)
+        values = [(name, self.quantity(context, name)) for name in self.entities if name in context.view]
+        return tuple(Measure(name, value, *self.threshold(), self.unit) for name, value in values if value is not None)
 
     def quantity(self, context: ConditionContext, entity: str) -> float | None:
         """Return the compared quantity of a present entity; NaN if it is undefined now, None without a quantity."""

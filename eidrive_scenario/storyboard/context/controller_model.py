@@ -59,20 +59,20 @@ class ControllerModel(ABC):
 
 
 def build_controller_models(
-    actors: Mapping[str, Actor], context: ControllerContext, assignments: Mapping[str, str], known: Registry
+    actors: Mapping[str, Actor], context: ControllerContext, assignments: Mapping[str, str], registry: Registry
 ) -> list[ControllerModel]:
     """Build one model per actor whose controller is a key of `assignments`; the values are registered names.
 
     Raise SettingError if a model is not registered, RegistryError if it is not a ControllerModel.
     """
     built = []
-    models = {name: known.load(controller_model, ControllerModel) for name, controller_model in assignments.items()}
+    models = {name: registry.load(controller_model, ControllerModel) for name, controller_model in assignments.items()}
     for actor in actors.values():
         for controller in actor.controllers:
             if controller.name in models:
                 instance = construct(models[controller.name], controller, context, actor)
                 if not isinstance(instance, ControllerModel):
-                    described = known.describe(assignments[controller.name])
+                    described = registry.describe(assignments[controller.name])
                     raise RegistryError(f"{described} is not a subclass of ControllerModel")
                 built.append(instance)
     return built
@@ -110,7 +110,7 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Map
         if name in ours
     ]
     if not unassigned:
-        known = names - ours
+        assignable = names - ours
         message = "--controller: no controller is named {!r}"
-        diagnostics += [Diagnostic(message.format(name), suggestion(name, known)) for name in unmatched]
+        diagnostics += [Diagnostic(message.format(name), suggestion(name, assignable)) for name in unmatched]
     return [*diagnostics, *unassigned]

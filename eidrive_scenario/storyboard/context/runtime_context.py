@@ -73,9 +73,8 @@ class RuntimeContext:
         self.signals = Signals(network.traffic_signals if network is not None else None, roads)
         self.warnings += self.signals.warnings
         declarations = scenario.document.monitor_declarations
-        self.monitors: Mapping[str, bool] = (
-            {one.name: one.value for one in declarations.monitor_declaration} if declarations is not None else {}
-        )
+        monitors = declarations.monitor_declaration if declarations is not None else ()
+        self.monitors: Mapping[str, bool] = {monitor.name: monitor.value for monitor in monitors}
         self.appearances: Mapping[str, Appearance] = {}
         self.overrides: dict[str, dict[str, Override]] = {}
         self.environment = Environment()

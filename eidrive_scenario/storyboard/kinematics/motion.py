@@ -68,18 +68,20 @@ class Motion(MotionState):
         """Set the route, and the selector of branches at junctions that the route does not cover."""
         self._route, self._visit, self._branch_selector, self._rests = route, 0, branch_selector, False
 
-    def ahead(self, place: LaneLocation, distance: float) -> LaneLocation | None:
+    def ahead(self, location: LaneLocation, distance: float) -> LaneLocation | None:
         """Return the location at a distance along lane and route [m]; None if the lane ends before."""
         assert self.roads is not None
-        return self.roads.advance(place, distance, route=self._route, choose=self._branch_selector, visit=self._visit)
+        return self.roads.advance(
+            location, distance, route=self._route, choose=self._branch_selector, visit=self._visit
+        )
 
-    def teleport(self, place: ResolvedPosition) -> None:
+    def teleport(self, position: ResolvedPosition) -> None:
         """Teleport the actor; its speed is kept.
 
         The current step covers no distance, as the next view shows this pose.
         """
-        self._pose = place.pose
-        self._set_location(place.location)
+        self._pose = position.pose
+        self._set_location(position.location)
         self._crosses = self._location is not None and abs(math.cos(self._heading)) < ACROSS
         self._end_of_road = False
         if self._route_lanes is not None:
@@ -146,8 +148,8 @@ class Motion(MotionState):
         """
         self._crosses = self._rests = False
         hint = self._location
-        place = self.roads.locate_at(self._pose.x, self._pose.y, hint) if self.roads is not None else None
-        self._set_location(place)
+        location = self.roads.locate_at(self._pose.x, self._pose.y, hint) if self.roads is not None else None
+        self._set_location(location)
         if self._location is not None and self.roads is not None and abs(math.cos(self._heading)) < ACROSS:
             self._crosses = not self.roads.on_road(self._location)
 
@@ -255,10 +257,10 @@ class Motion(MotionState):
         assert self._route_lanes is not None
         if self._location is None or self.direction < 0 or self.roads is None:
             return None
-        found = self._route_lanes.step(self._location, distance, self._route, self._visit)
-        if found is None:
+        step = self._route_lanes.step(self._location, distance, self._route, self._visit)
+        if step is None:
             return None
-        lane, offset, done = found
+        lane, offset, done = step
         self.set_reference_lane(lane)
         way = self.roads.driving_direction(self._location.road, lane)
         return LateralStep(offset * way, heading=0.0 if done else None)
@@ -396,13 +398,13 @@ class RouteLanes:
             return []
         leading: list[frozenset[int]] = [frozenset()] * len(road.sections)
         for section in reversed(road.sections) if way > 0 else road.sections:
-            found = set()
+            leading_here = set()
             for lane in section.lanes.values():
                 if lane.id == 0 or not lane.drivable or self._roads.driving_direction(road_id, lane.id) != way:
                     continue
                 for key, _ in self._roads.links.beyond(LaneKey(road_id, section.index, lane.id), way):
                     inside = key.road == road_id and key.section == section.index + way
                     if key.lane in leading[key.section] if inside else key.road == following:
-                        found.add(lane.id)
-            leading[section.index] = frozenset(found)
+                        leading_here.add(lane.id)
+            leading[section.index] = frozenset(leading_here)
         return leading

@@ -71,10 +71,10 @@ def build_route(
         raise ScenarioError(Diagnostic.at(route, message, hint)) from error
 
 
-def faces_traffic(roads: RoadNetwork, place: ResolvedPosition) -> bool:
+def faces_traffic(roads: RoadNetwork, position: ResolvedPosition) -> bool:
     """Return True if a pose faces against the driving direction of its lane."""
-    here = place.location
-    return here is not None and math.cos(place.pose.h - roads.pose(here).h) < 0.0
+    here = position.location
+    return here is not None and math.cos(position.pose.h - roads.pose(here).h) < 0.0
 
 
 def _connect_waypoints(

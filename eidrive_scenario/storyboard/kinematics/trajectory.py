@@ -89,11 +89,11 @@ class TrajectoryCurve:
     def _directions(self) -> tuple[float, ...]:
         """Direction of each segment [rad]; one of no length has that of the next, otherwise of the previous segment."""
         _, vectors, lengths = self._segments
-        known = [
+        directions = [
             math.atan2(y, x) if length > 0.0 else None
             for (x, y), length in zip(vectors.tolist(), lengths.tolist(), strict=True)
         ]
-        return tuple(pose.h if h is None else h for h, pose in zip(fill_gaps(known), self.poses, strict=False))
+        return tuple(pose.h if h is None else h for h, pose in zip(fill_gaps(directions), self.poses, strict=False))
 
     def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
         """Return the arc length at a time [m]: at constant speed between points, or by the `speeds` at the points."""

@@ -60,13 +60,13 @@ def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[floa
     """Return the times at the samples [s]: constant speed between segments with a start time; the first starts at 0."""
     if shape.time_end is None:
         return None
-    known, begin = {0.0: 0.0}, 0.0
+    times, begin = {0.0: 0.0}, 0.0
     for segment in shape.clothoid_spline_segment:
         if segment.time_start is not None:
-            known[begin] = segment.time_start
+            times[begin] = segment.time_start
         begin += segment.length
-    known[begin] = shape.time_end
-    return tuple(np.interp(s, list(known), list(known.values())).tolist())
+    times[begin] = shape.time_end
+    return tuple(np.interp(s, list(times), list(times.values())).tolist())
 
 
 def _spiral(
@@ -189,12 +189,12 @@ def along_the_curve(poses: Sequence[Pose]) -> list[Pose]:
 
 def _unwrapped(poses: Sequence[Pose]) -> list[Pose]:
     """Return the same poses with unwrapped angles: consecutive ones differ by less than π."""
-    found = [poses[0]]
+    unwrapped = [poses[0]]
     for pose in poses[1:]:
-        before = found[-1]
+        before = unwrapped[-1]
         h, p, r = (old + wrap_angle(new - old) for old, new in zip(before[3:], pose[3:], strict=True))
-        found.append(pose._replace(h=h, p=p, r=r))
-    return found
+        unwrapped.append(pose._replace(h=h, p=p, r=r))
+    return unwrapped
 
 
 ROUNDING = 2.0
@@ -299,8 +299,8 @@ def _sampled_polyline(
 
 def _along_lines(angles: Sequence[float], spans: Sequence[float], without: float) -> list[float]:
     """Return the angles of lines [rad]; a line of no length has that of the next, otherwise of the previous line."""
-    known = [angle if span > 0.0 else None for angle, span in zip(angles, spans, strict=True)]
-    return [without if angle is None else angle for angle in fill_gaps(known)]
+    directions = [angle if span > 0.0 else None for angle, span in zip(angles, spans, strict=True)]
+    return [without if angle is None else angle for angle in fill_gaps(directions)]
 
 
 def _corner_turns(lines: Sequence[float], closed: bool) -> list[float]:

@@ -71,7 +71,7 @@ def _axis_at(context: ConditionContext, a: str, b: str, frame: str, axis: float)
         here, there = context.location(a), context.location(b)
         runs = None if here is None or there is None else roads.orientation(here, there)
         if here is not None and there is not None and runs is not None:
-            ways = [roads.driving_direction(place.road, place.lane) for place in (here, there)]
+            ways = [roads.driving_direction(location.road, location.lane) for location in (here, there)]
             is_along = math.cos(axis - roads.pose(here).h) >= 0.0
             return roads.pose(there).h + (0.0 if is_along == (ways[0] * ways[1] * runs > 0) else math.pi)
     progress = context.actors[a].progress if frame == "trajectory" else None
@@ -112,9 +112,9 @@ def _extent_on_bend(
     for along, across in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
         dx, dy = along * length, across * width
         corner = roads.locate_at(x + dx * cos - dy * sin, y + dx * sin + dy * cos, here)
-        found = None if corner is None else roads.distance(here, corner)
-        if found is not None:
-            extents.append(sign * found[0 if kind == "longitudinal" else 1])
+        distances = None if corner is None else roads.distance(here, corner)
+        if distances is not None:
+            extents.append(sign * distances[0 if kind == "longitudinal" else 1])
     return min(extents, default=0.0), max(extents, default=0.0)
 
 
@@ -177,7 +177,7 @@ def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
         here, there = context.location(a), context.location(b)
         relative_direction = None if here is None or there is None else context.roads.orientation(here, there)
         if relative_direction is not None and here is not None and there is not None:
-            headings = [context.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
+            headings = [context.roads.road_pose_at(location.road, location.s).h for location in (here, there)]
             turn += headings[0] - headings[1] + (0.0 if relative_direction > 0 else math.pi)
     return 1.0 if math.cos(turn) >= 0.0 else -1.0
 
@@ -222,12 +222,12 @@ def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float
 
 
 def _moved(
-    context: ConditionContext, place: ResolvedPosition, velocity: tuple[float, float, float], duration: float
+    context: ConditionContext, position: ResolvedPosition, velocity: tuple[float, float, float], duration: float
 ) -> ResolvedPosition:
     """Return the position after a duration [s] at this velocity."""
-    x, y = place.pose.x + velocity[0] * duration, place.pose.y + velocity[1] * duration
-    location = context.roads.locate_at(x, y, place.location) if context.roads is not None else None
-    return ResolvedPosition(place.pose._replace(x=x, y=y), location)
+    x, y = position.pose.x + velocity[0] * duration, position.pose.y + velocity[1] * duration
+    location = context.roads.locate_at(x, y, position.location) if context.roads is not None else None
+    return ResolvedPosition(position.pose._replace(x=x, y=y), location)
 
 
 def _resolved(context: ConditionContext, target: str | ResolvedPosition) -> ResolvedPosition:
@@ -259,14 +259,14 @@ def _offsets(
             return math.nan, math.nan
         if algorithm is model.RoutingAlgorithm.ASSIGNED_ROUTE:
             route = context.actors[a].motion.route
-            found = None if route is None else context.roads.distance(start, end, route=route)
+            distances = None if route is None else context.roads.distance(start, end, route=route)
         else:
-            found = context.roads.distance(start, end, ROUTE_CRITERIA.get(algorithm, "shortest"))
-        if found is None:
+            distances = context.roads.distance(start, end, ROUTE_CRITERIA.get(algorithm, "shortest"))
+        if distances is None:
             return math.nan, math.nan
         lane = context.roads.pose(start)
         sign = 1.0 if math.cos(here.h - lane.h) >= 0.0 else -1.0
-        return found[0] * sign, found[1] * sign
+        return distances[0] * sign, distances[1] * sign
     if frame == "world":
         return there.x - here.x, there.y - here.y
     progress = context.actors[a].progress if frame == "trajectory" else None

@@ -165,9 +165,9 @@ def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: f
         return None
     levels = [low]
     for step in range(1, math.ceil((high - low) / LEVEL_SEPARATION) + 1):
-        found = _surface(roads, x, y, low + step * LEVEL_SEPARATION)
-        if found is not None and found > levels[-1] + LEVEL_SEPARATION:
-            levels.append(found)
+        height = _surface(roads, x, y, low + step * LEVEL_SEPARATION)
+        if height is not None and height > levels[-1] + LEVEL_SEPARATION:
+            levels.append(height)
     level = frame.vertical_road_selection or 0
     if not 0 <= level < len(levels):
         message = "GeoPosition: the selected road level does not exist"
@@ -262,10 +262,10 @@ def relative_lane_position(
     lane = count_lanes(there.lane, frame.d_lane * sign)
     if lane not in roads.lane_ids(there.road, there.s):
         raise position_error(frame, f"unknown lane {lane} of road {there.road!r} at s = {there.s:.1f}")
-    place = in_lane(roads, there.road, lane, there.s, (frame.offset or 0.0) * sign, frame.orientation)
+    position = in_lane(roads, there.road, lane, there.s, (frame.offset or 0.0) * sign, frame.orientation)
     if frame.orientation is None and ahead < 0:
-        return place._replace(pose=place.pose.turned(math.pi))
-    return place
+        return position._replace(pose=position.pose.turned(math.pi))
+    return position
 
 
 def along_reference(

@@ -61,7 +61,7 @@ def resolve_position(position: model.Position, context: ConditionContext, actor:
     try:
         if is_nested:
             _enter(frame, cache)
-        place = RESOLVERS[type(frame)](frame, context, actor)
+        resolved = RESOLVERS[type(frame)](frame, context, actor)
     except PositionError as error:
         raise position_error(
             frame, f"not resolvable: {error.diagnostics[0].message}", error.diagnostics[0].hint
@@ -70,8 +70,8 @@ def resolve_position(position: model.Position, context: ConditionContext, actor:
         if is_nested:
             cache.depth -= 1
     if _is_static(frame, context):
-        cache.static[id(position)] = (position, place)
-    return place
+        cache.static[id(position)] = (position, resolved)
+    return resolved
 
 
 def _enter(frame: model.Element, cache: PositionCache) -> None:
@@ -145,8 +145,8 @@ def _is_static(frame: model.Element, context: ConditionContext) -> bool:
     """Whether a position is static."""
     if not isinstance(frame, model.TrajectoryPosition):
         return isinstance(frame, STATIC)
-    inner = (one for one in _trajectory_element(frame, context).walk() if isinstance(one, model.Position))
-    return all(_is_static(one.chosen(), context) for one in inner)
+    inner = (nested for nested in _trajectory_element(frame, context).walk() if isinstance(nested, model.Position))
+    return all(_is_static(nested.chosen(), context) for nested in inner)
 
 
 RESOLVERS: dict[type[model.Element], Callable[[Any, ConditionContext, str | None], ResolvedPosition]] = {

@@ -115,8 +115,8 @@ class ElementStates:
 
     def observe_element(self, kind: str, reference: str) -> ElementStateObserver | None:
         """Return an observer of the elements that a reference matches, None without one."""
-        found = self.find(kind, reference)
-        return ElementStateObserver(self, found) if found else None
+        records = self.find(kind, reference)
+        return ElementStateObserver(self, records) if records else None
 
     def names(self, kind: str) -> list[str]:
         """Return the names of all elements of one type."""
@@ -140,11 +140,11 @@ class ElementStateObserver:
 
     def passed(self, transition: ElementTransition) -> bool:
         """True if one of the elements had this transition in this tick or, unreported so far, in the previous tick."""
-        found = False
+        has_passed = False
         if self._evaluated_at != self._states.tick:
             self._evaluated_at, self._before = self._states.tick, list(self._seen)
         for index, record in enumerate(self._records):
             fresh = record.transitions[self._before[index] :]
             self._seen[index] = len(record.transitions)
-            found = found or any(kind is transition and tick >= self._states.tick - 1 for tick, kind in fresh)
-        return found
+            has_passed = has_passed or any(kind is transition and tick >= self._states.tick - 1 for tick, kind in fresh)
+        return has_passed

@@ -121,8 +121,8 @@ def _group(name: str, roads: RoadNetwork | None) -> tuple[str, ...]:
     if roads is None:
         return ()
     named = [entry for entry in roads.controllers.values() if entry.name == name]
-    found = roads.controllers.get(name) or next(iter(named), None)
-    return found.signals if found is not None else ()
+    controller = roads.controllers.get(name) or next(iter(named), None)
+    return controller.signals if controller is not None else ()
 
 
 def _diagnostic(cycle: SignalCycle, message: str, hint: str, at: model.Element | None = None) -> Diagnostic:
@@ -218,10 +218,10 @@ class Signals:
     def check_phase(self, controller: str, phase: str, element: model.Element) -> None:
         """Raise ScenarioError if the phases of a signal controller are declared without this one."""
         cycle = self.cycles.get(controller)
-        known = [phase] if cycle is None else [one.name for one in cycle.phases]
-        if phase not in known:
+        phases = [phase] if cycle is None else [entry.name for entry in cycle.phases]
+        if phase not in phases:
             message = f"{type(element).__name__}: signal controller {controller!r} has no phase {phase!r}"
-            raise ScenarioError(Diagnostic.at(element, message, suggestion(phase, known)))
+            raise ScenarioError(Diagnostic.at(element, message, suggestion(phase, phases)))
 
     def _phase_states(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
         """Return the states of a phase by signal. A group state holds for each signal of the group.
@@ -238,7 +238,10 @@ class Signals:
             for name in signals:
                 has_yellow = YELLOW in (self._colors.get(name) or DEFAULT_LAMPS)
                 states[name] = (SEMANTICS if has_yellow else WITHOUT_YELLOW)[phase.semantics]
-        return states | {self.identify(one.traffic_signal_id): one.state for one in phase.traffic_signal_state}
+        return states | {
+            self.identify(signal_state.traffic_signal_id): signal_state.state
+            for signal_state in phase.traffic_signal_state
+        }
 
     def _set_states(self, states: Mapping[str, str]) -> None:
         if any(self._states.get(name) != state for name, state in states.items()):
@@ -267,5 +270,5 @@ class Signals:
             for place in (signal.place, *signal.references):
                 pose = self._roads.signal_pose(signal, place)
                 near.append((math.hypot(pose.x - x, pose.y + y), signal.id))
-        distance, found = min(near, default=(math.inf, ""))
-        return found if distance <= SAME_PLACE else None
+        distance, nearest = min(near, default=(math.inf, ""))
+        return nearest if distance <= SAME_PLACE else None

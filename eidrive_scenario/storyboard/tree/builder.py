@@ -242,11 +242,11 @@ class Builder:
                 continue
             self.extensions.add((self._actions.kind, name))
             try:
-                one = self._selections.single(leaf)
-                for parent_element in [one] if parent is leaf else self._selections.alternatives(parent):
+                element = self._selections.single(leaf)
+                for parent_element in [element] if parent is leaf else self._selections.alternatives(parent):
                     behaviour = construct(
                         self._actions.load(name, ActionBehaviour),
-                        one,
+                        element,
                         self._context,
                         actor=actor,
                         parent=parent_element,
@@ -294,12 +294,12 @@ class Builder:
                 raise type_error
             return condition
         triggering = by_entity.triggering_entities
-        names = [one for ref in triggering.entity_ref for one in self._entities(ref.entity_ref)]
+        entities = [entity for ref in triggering.entity_ref for entity in self._entities(ref.entity_ref)]
         rule = triggering.triggering_entities_rule.value
-        conditions = [construct(make, one, names, rule) for one in self._selections.alternatives(leaf)]
-        if not all(isinstance(one, EntityCondition) for one in conditions):
+        conditions = [construct(make, member, entities, rule) for member in self._selections.alternatives(leaf)]
+        if not all(isinstance(condition, EntityCondition) for condition in conditions):
             raise type_error
-        return conditions[0] if len(conditions) == 1 else AnyMemberCondition(leaf, names, rule, conditions)
+        return conditions[0] if len(conditions) == 1 else AnyMemberCondition(leaf, entities, rule, conditions)
 
     def _known(self, name: str, registry: Registry, leaf: model.Element, otherwise: str) -> bool:
         """Whether this name is registered; if not, add a diagnostic."""

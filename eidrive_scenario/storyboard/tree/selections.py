@@ -42,9 +42,9 @@ class Selections:
 
     def single(self, element: E) -> E:
         """Return the element with the member of each selection. Raise ScenarioError unless each has one member."""
-        found = self.alternatives(element)
-        if len(found) == 1:
-            return found[0]
+        alternatives = self.alternatives(element)
+        if len(alternatives) == 1:
+            return alternatives[0]
         group = sorted(self._named_groups(element))[0]
         raise ScenarioError(
             Diagnostic.at(
@@ -120,7 +120,7 @@ def _with_names(element: E, names: Mapping[str, str]) -> E:
         if isinstance(value, model.Element):
             changed: Any = _with_names(value, names)
         elif isinstance(value, tuple):
-            changed = tuple(_with_names(one, names) if isinstance(one, model.Element) else one for one in value)
+            changed = tuple(_with_names(item, names) if isinstance(item, model.Element) else item for item in value)
         elif field.name in REFERENCES and value in names:
             changed = names[value]
         else:

@@ -25,13 +25,13 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
     time   time of the end of the run [s]
     end    reason for the end of the run
     """
-    found = list(_find_unstarted(root))
-    if not found:
+    elements = list(_find_unstarted(root))
+    if not elements:
         return []
     named = StoryboardNames(scenario.storyboard, scenario.entries).named
     definitions = {entry.path: entry.element for entry in named}
     diagnostics = []
-    for element in found[:_MAX_REPORTED]:
+    for element in elements[:_MAX_REPORTED]:
         location = definitions.get(element.record.path, Location(str(scenario.path or "")))
         skipped = sum(transition is ElementTransition.SKIP for _, transition in element.record.transitions)
         why = "its start trigger was not fulfilled" if element.start_leaf is not None else "nothing started it"
@@ -44,8 +44,8 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
                 f"eidrive run --explain {element.name!r} states the unfulfilled conditions",
             )
         )
-    if len(found) > _MAX_REPORTED:
-        remaining = len(found) - _MAX_REPORTED
+    if len(elements) > _MAX_REPORTED:
+        remaining = len(elements) - _MAX_REPORTED
         message = f"{remaining} more {'act or event' if remaining == 1 else 'acts and events'} never started"
         diagnostics.append(
             Diagnostic(message, "eidrive run --log - prints the elements that started", str(scenario.path or ""))
