@@ -42,13 +42,13 @@ def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) 
     Each row and column is used at most once. The order of the indices resolves ties. Pairs without a common row or
     column, directly or by other pairs, are assigned separately.
     """
-    found = _assign_stars(rows, columns, costs)
-    if found is not None:
-        return found
+    pairs = _assign_stars(rows, columns, costs)
+    if pairs is not None:
+        return pairs
     chosen: set[tuple[int, int]] = set()
     for part in _components(rows, columns):
-        own_rows, own_columns = [rows[place] for place in part], [columns[place] for place in part]
-        own_costs = [costs[place] for place in part]
+        own_rows, own_columns = [rows[index] for index in part], [columns[index] for index in part]
+        own_costs = [costs[index] for index in part]
         stars = _assign_stars(own_rows, own_columns, own_costs)
         chosen.update(_assign_optimally(own_rows, own_columns, own_costs) if stars is None else stars)
     return [pair for pair in zip(rows, columns, strict=True) if pair in chosen]
@@ -67,8 +67,8 @@ def _components(rows: Sequence[int], columns: Sequence[int]) -> list[list[int]]:
     for row, column in zip(rows, columns, strict=True):
         parent[root((1, column))] = root((0, row))
     parts: dict[tuple[int, int], list[int]] = {}
-    for place, row in enumerate(rows):
-        parts.setdefault(root((0, row)), []).append(place)
+    for index, row in enumerate(rows):
+        parts.setdefault(root((0, row)), []).append(index)
     return list(parts.values())
 
 
@@ -76,8 +76,8 @@ def _assign_optimally(rows: Sequence[int], columns: Sequence[int], costs: Sequen
     """Return the result of `assign` by the general method."""
     from scipy.optimize import linear_sum_assignment
 
-    row_of = {row: place for place, row in enumerate(sorted(set(rows)))}
-    column_of = {column: place for place, column in enumerate(sorted(set(columns)))}
+    row_of = {row: index for index, row in enumerate(sorted(set(rows)))}
+    column_of = {column: index for index, column in enumerate(sorted(set(columns)))}
     matrix = np.full((len(row_of), len(column_of)), OUTSIDE)
     for row, column, cost in zip(rows, columns, costs, strict=True):
         matrix[row_of[row], column_of[column]] = cost

@@ -74,8 +74,8 @@ class Drivers:
 
     def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
         """Return `IntelligentDriver.response` with the parameters of each driver."""
-        found = self.free(speed, desired_speed) - self.interaction(speed, gap, approach)
-        return np.asarray(np.maximum(found, -self.table[:, 5]))
+        acceleration = self.free(speed, desired_speed) - self.interaction(speed, gap, approach)
+        return np.asarray(np.maximum(acceleration, -self.table[:, 5]))
 
     def free(self, speed: Array, desired_speed: Array) -> Array:
         """Return the accelerations (N,) on a free road [m/s²]."""

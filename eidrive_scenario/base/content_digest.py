@@ -57,22 +57,22 @@ def content_digest(*values: object) -> bytes:
     pydantic models of them. Each field of a dataclass, named tuple or model counts. The order of mappings counts too.
     A class with a property `digest` (bytes) is represented by it. Raise TypeError for any other value.
     """
-    found = hashlib.sha256()
+    hash_ = hashlib.sha256()
     for value in values:
-        _encode(found, value)
-    return found.digest()
+        _encode(hash_, value)
+    return hash_.digest()
 
 
-def _encode(found: _Hash, value: object) -> None:
+def _encode(hash_: _Hash, value: object) -> None:
     kind: Any = type(value)
-    _encoder(kind)(found, value)
+    _encoder(kind)(hash_, value)
 
 
 @cache
 def _encoder(kind: type[Any]) -> _Encoder:
     """Return the function that adds a value of this type to a hash."""
     if hasattr(kind, "digest"):
-        return lambda found, value: found.update(b"#" + value.digest)
+        return lambda hash_, value: hash_.update(b"#" + value.digest)
     for types, encoder in _ENCODERS:
         if issubclass(kind, types):
             return encoder
@@ -85,62 +85,62 @@ def _encoder(kind: type[Any]) -> _Encoder:
     else:
         raise TypeError(f"{kind.__name__}: a value of this type has no digest")
 
-    def add_fields(found: _Hash, value: object) -> None:
-        found.update(b"C%d %b%d " % (len(name), name, len(names)))
+    def add_fields(hash_: _Hash, value: object) -> None:
+        hash_.update(b"C%d %b%d " % (len(name), name, len(names)))
         for field in names:
-            _encode(found, getattr(value, field))
+            _encode(hash_, getattr(value, field))
 
     return add_fields
 
 
-def _none(found: _Hash, value: None) -> None:
-    found.update(b"N")
+def _none(hash_: _Hash, value: None) -> None:
+    hash_.update(b"N")
 
 
-def _boolean(found: _Hash, value: bool) -> None:
-    found.update(b"T" if value else b"F")
+def _boolean(hash_: _Hash, value: bool) -> None:
+    hash_.update(b"T" if value else b"F")
 
 
-def _integer(found: _Hash, value: int) -> None:
-    found.update(b"i%d " % value)
+def _integer(hash_: _Hash, value: int) -> None:
+    hash_.update(b"i%d " % value)
 
 
-def _number(found: _Hash, value: float) -> None:
-    found.update(b"d" + _NUMBER.pack(value))
+def _number(hash_: _Hash, value: float) -> None:
+    hash_.update(b"d" + _NUMBER.pack(value))
 
 
-def _text(found: _Hash, value: str) -> None:
+def _text(hash_: _Hash, value: str) -> None:
     data = value.encode()
-    found.update(b"s%d " % len(data) + data)
+    hash_.update(b"s%d " % len(data) + data)
 
 
-def _bytes(found: _Hash, value: bytes) -> None:
-    found.update(b"b%d " % len(value) + value)
+def _bytes(hash_: _Hash, value: bytes) -> None:
+    hash_.update(b"b%d " % len(value) + value)
 
 
-def _member(found: _Hash, value: Enum) -> None:
-    _text(found, f"{type(value).__qualname__}.{value.name}")
+def _member(hash_: _Hash, value: Enum) -> None:
+    _text(hash_, f"{type(value).__qualname__}.{value.name}")
 
 
-def _array(found: _Hash, value: Any) -> None:
+def _array(hash_: _Hash, value: Any) -> None:
     array = np.asarray(value)
     if array.dtype.hasobject:
         raise TypeError("an array of objects has no digest")
-    found.update(f"a{array.dtype.str} {array.shape} ".encode())
-    found.update(array.tobytes())
+    hash_.update(f"a{array.dtype.str} {array.shape} ".encode())
+    hash_.update(array.tobytes())
 
 
-def _mapping(found: _Hash, value: Mapping[object, object]) -> None:
-    found.update(b"m%d " % len(value))
+def _mapping(hash_: _Hash, value: Mapping[object, object]) -> None:
+    hash_.update(b"m%d " % len(value))
     for key, entry in value.items():
-        _encode(found, key)
-        _encode(found, entry)
+        _encode(hash_, key)
+        _encode(hash_, entry)
 
 
-def _sequence(found: _Hash, value: tuple[object, ...] | list[object]) -> None:
-    found.update(b"q%d " % len(value))
+def _sequence(hash_: _Hash, value: tuple[object, ...] | list[object]) -> None:
+    hash_.update(b"q%d " % len(value))
     for entry in value:
-        _encode(found, entry)
+        _encode(hash_, entry)
 
 
 _ENCODERS: tuple[tuple[type | tuple[type, ...], _Encoder], ...] = (

@@ -84,8 +84,8 @@ def _distortion(settings: CameraSettings) -> _Distortion:
     pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
     until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
     same = np.eye(3)
-    found = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
-    rays = np.asarray(found, dtype=float)[:, 0]
+    undistorted = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
+    rays = np.asarray(undistorted, dtype=float)[:, 0]
     _check_convergence(rays, pixels[:, 0], lens, settings)
     low, high = rays.min(axis=0) * lens.focal - 1.0, rays.max(axis=0) * lens.focal + 1.0
     (left, top), (right, bottom) = np.floor(low), np.ceil(high)

@@ -34,10 +34,10 @@ def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array
         (cos * start[..., 1] - sin * start[..., 0], cos * ray[..., 1] - sin * ray[..., 0]),
         (start[..., 2], ray[..., 2]),
     )
-    for axis, (place, step) in enumerate(axes):
+    for axis, (begin, step) in enumerate(axes):
         half = boxes[:, None, 3 + axis] / 2.0
         step = np.where(np.abs(step) < PARALLEL, PARALLEL, step)
-        first, second = (-half - place) / step, (half - place) / step
+        first, second = (-half - begin) / step, (half - begin) / step
         enter = np.maximum(enter, np.minimum(first, second))
         leave = np.minimum(leave, np.maximum(first, second))
     return enter, leave

@@ -46,7 +46,7 @@ in the volume of a pulse if there are few (0.2 liters with less than a thousand 
 class Returns(NamedTuple):
     """Returns of rays (M,): whether there is one, distance [m], intensity in [0, 1], and whether it is of the air."""
 
-    found: NDArray[np.bool_]
+    detected: NDArray[np.bool_]
     distance: Array
     intensity: Array
     airborne: NDArray[np.bool_]
@@ -88,7 +88,7 @@ def returns(
     through = np.exp(-2.0 * fade * np.where(np.isfinite(distance), distance, 0.0))
     hard = np.where(np.isfinite(distance), brightness * through / (math.pi * reach * reach), 0.0)
     least = 0.1 / (math.pi * ten_percent_range**2)
-    found = hard >= least
+    detected = hard >= least
     where = np.where(np.isfinite(distance), distance, 0.0)
     intensity = brightness * through * np.exp(-attenuation * where)
     false = np.zeros(len(distance), dtype=bool)
@@ -99,13 +99,13 @@ def returns(
         # The distance in the air is drawn by the power from there. The air is measured if it is before the surface,
         # and stronger than the surface and the minimum of the receiver.
         strength = draws.gamma(shape, 1.0 / shape, len(distance))
-        place = ranges[np.searchsorted(np.cumsum(soft) / soft.sum(), draws.random(len(distance)))]
+        depth = ranges[np.searchsorted(np.cumsum(soft) / soft.sum(), draws.random(len(distance)))]
         peak = float(soft.max()) * strength
-        false = (peak > hard) & (peak >= least) & (place < distance)
-        found |= false
-        where = np.where(false, place, where)
-        intensity = np.where(false, np.minimum(peak * math.pi * place * place, 1.0), intensity)
-    return Returns(found, where, np.clip(intensity, 0.0, 1.0), false)
+        false = (peak > hard) & (peak >= least) & (depth < distance)
+        detected |= false
+        where = np.where(false, depth, where)
+        intensity = np.where(false, np.minimum(peak * math.pi * depth * depth, 1.0), intensity)
+    return Returns(detected, where, np.clip(intensity, 0.0, 1.0), false)
 
 
 @lru_cache(maxsize=32)
@@ -164,7 +164,7 @@ class Lidar(Sensor):
             ten_percent_range=settings.ten_percent_range,
             draws=draws,
         )
-        kept = np.flatnonzero(back.found & self._not_dropped(back.intensity, draws))
+        kept = np.flatnonzero(back.detected & self._not_dropped(back.intensity, draws))
         length = back.distance[kept]
         if settings.range_noise > 0.0:
             length = np.maximum(length + settings.range_noise * draws.standard_normal(len(kept)), 0.0)

@@ -144,7 +144,5 @@ def _pixels(points: Array, pinhole: Pinhole) -> Array:
 def _refracted_light(luminance: Floats) -> Floats:
     """Return the light (3,) that a drop refracts to the camera: that of a wide field, mainly of the sky."""
     rows = luminance[: max(luminance.shape[0] // 2, 1) : 4, ::4].reshape(-1, 3)
-    found: Floats = (np.float32(0.4) * rows.mean(axis=0) + np.float32(0.6) * np.percentile(rows, 90, axis=0)).astype(
-        np.float32
-    )
-    return found
+    light: Floats = np.float32(0.4) * rows.mean(axis=0) + np.float32(0.6) * np.percentile(rows, 90, axis=0)
+    return light.astype(np.float32)

@@ -149,11 +149,11 @@ def _meet(
                     ring += 1
                 level = nx * x + ny * y
                 while ring < last and rings[ring, 0] <= high:
-                    ahead, place = level * rings[ring, 1] + nz * rings[ring, 2], order[ring]
-                    if ahead > 0.0 and volume < ahead * distance[slot, place]:
-                        rows[slot, place] = row
-                        distance[slot, place] = volume / ahead
-                        brightness[slot, place] = reflectivity[triangle] * ahead / math.sqrt(square)
+                    ahead, column = level * rings[ring, 1] + nz * rings[ring, 2], order[ring]
+                    if ahead > 0.0 and volume < ahead * distance[slot, column]:
+                        rows[slot, column] = row
+                        distance[slot, column] = volume / ahead
+                        brightness[slot, column] = reflectivity[triangle] * ahead / math.sqrt(square)
                     ring += 1
 
 

@@ -109,10 +109,10 @@ class CameraReading:
     @classmethod
     def of(cls, exposure: DeferredImage, intrinsics: Array, pose: Array, distortion: Array) -> CameraReading:
         """Return a reading whose image is drawn when its pixels are read."""
-        found = cls.__new__(cls)
-        found._exposure = exposure
-        found.intrinsics, found.pose, found.distortion = intrinsics, pose, distortion
-        return found
+        reading = cls.__new__(cls)
+        reading._exposure = exposure
+        reading.intrinsics, reading.pose, reading.distortion = intrinsics, pose, distortion
+        return reading
 
     def at(self, pose: Array) -> CameraReading:
         """Return the same image with another pose (4, 4) of the camera."""

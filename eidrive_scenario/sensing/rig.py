@@ -36,7 +36,7 @@ class Rig:
 
     def due(self, time: float) -> dict[str, Sensor]:
         """Return the sensors to read at `time` [s]; they count as read afterwards."""
-        found = {}
+        due = {}
         for name, sensor in self._sensors.items():
             rate = sensor.settings.rate
             if rate is not None:
@@ -44,8 +44,8 @@ class Rig:
                 if self._periods.get(name, -1) >= period:
                     continue
                 self._periods[name] = period
-            found[name] = sensor
-        return found
+            due[name] = sensor
+        return due
 
 
 def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Readings]:
@@ -55,28 +55,28 @@ def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Re
     for index, rig in enumerate(rigs):
         for name, sensor in rig.due(view.time).items():
             groups.setdefault(type(sensor), []).append((index, name, sensor))
-    found: list[dict[str, dict[str, Any]]] = [{} for _ in rigs]
+    by_kind: list[dict[str, dict[str, Any]]] = [{} for _ in rigs]
     for kind, entries in groups.items():
         values = kind.read_batch(
             [sensor for _, _, sensor in entries], [rows[index] for index, _, _ in entries], scene, view
         )
         for (index, name, sensor), value in zip(entries, values, strict=True):
-            found[index].setdefault(sensor.settings.kind, {})[name] = value
-    return {rig.station: _readings(found[index], view, rows[index]) for index, rig in enumerate(rigs)}
+            by_kind[index].setdefault(sensor.settings.kind, {})[name] = value
+    return {rig.station: _readings(by_kind[index], view, rows[index]) for index, rig in enumerate(rigs)}
 
 
-def _readings(found: Mapping[str, Mapping[str, Any]], view: WorldView, row: int) -> Readings:
+def _readings(by_kind: Mapping[str, Mapping[str, Any]], view: WorldView, row: int) -> Readings:
     """Return the readings of one station from those of its sensors, by kind and name."""
-    truth, gnss, imu = (next(iter(found.get(kind, {}).values()), None) for kind in ("truth", "gnss", "imu"))
+    truth, gnss, imu = (next(iter(by_kind.get(kind, {}).values()), None) for kind in ("truth", "gnss", "imu"))
     return Readings(
         view.time,
         ego_state(view, row),
         truth,
-        found.get("camera", {}),
-        found.get("lidar", {}),
+        by_kind.get("camera", {}),
+        by_kind.get("lidar", {}),
         gnss,
         imu,
-        others={} if found.keys() <= FIELDS else {kind: found[kind] for kind in found.keys() - FIELDS},
+        others={} if by_kind.keys() <= FIELDS else {kind: by_kind[kind] for kind in by_kind.keys() - FIELDS},
     )
 
 

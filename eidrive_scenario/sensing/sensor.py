@@ -91,14 +91,14 @@ def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
 def view_sectors(sensors: Iterable[SensorSettings], spec: ActorSpec) -> tuple[ViewSector, ...]:
     """Return the sectors of sensors on a body. A sensor without a setting for its opening angle covers all directions,
     one without `range` is not limited."""
-    found = []
+    sectors = []
     for settings in sensors:
         mount = mounting(settings, spec, "front" if isinstance(settings, CameraSettings) else "roof")
         angle = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0)))
-        found.append(
+        sectors.append(
             ViewSector(mount.x, mount.y, mount.z, mount.yaw, angle / 2.0, getattr(settings, "range", math.inf))
         )
-    return tuple(found)
+    return tuple(sectors)
 
 
 Point = tuple[float, float, float]
@@ -175,9 +175,9 @@ class Sensor(ABC):
 
 def sensor_class(kind: str) -> type[Sensor]:
     """Return the class of a kind of sensor. Raise RegistryError if its `settings_type` is invalid."""
-    found: type[Sensor] = registry("sensors").load(kind, Sensor)
-    settings_type_of("sensors", kind, found, SensorSettings)
-    return found
+    sensor_type: type[Sensor] = registry("sensors").load(kind, Sensor)
+    settings_type_of("sensors", kind, sensor_type, SensorSettings)
+    return sensor_type
 
 
 def default_sensor(kind: str) -> SensorSettings:
@@ -195,6 +195,6 @@ def check_unique(sensors: Mapping[str, SensorSettings]) -> None:
     names: dict[str, list[str]] = {}
     for name, settings in sensors.items():
         names.setdefault(settings.kind, []).append(name)
-    for kind, found in names.items():
-        if len(found) > 1 and sensor_class(kind).unique:
-            raise ValueError(f"a station has at most one sensor of kind {kind!r} (got {', '.join(found)})")
+    for kind, of_kind in names.items():
+        if len(of_kind) > 1 and sensor_class(kind).unique:
+            raise ValueError(f"a station has at most one sensor of kind {kind!r} (got {', '.join(of_kind)})")

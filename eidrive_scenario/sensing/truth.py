@@ -74,9 +74,9 @@ class TruthSensor(Sensor):
         elif any(targets):
             shares = few_visibilities(sensors, rows, targets, scene, view)
         readings, start = [], 0
-        for sensor, found in zip(sensors, targets, strict=True):
-            readings.append(_reading(sensor, found, shares[start : start + len(found)], view))
-            start += len(found)
+        for sensor, seen in zip(sensors, targets, strict=True):
+            readings.append(_reading(sensor, seen, shares[start : start + len(seen)], view))
+            start += len(seen)
         return readings
 
 
@@ -120,7 +120,7 @@ def few_candidates(
 ) -> list[list[int]]:
     """Return the same as `candidates` in scalar arithmetic."""
     boxes = view.plain_boxes
-    found: list[list[int]] = []
+    candidates: list[list[int]] = []
     for sensor, station in zip(sensors, own, strict=True):
         x, y, z, _, _, _, yaw = boxes[station]
         square, half = sensor.range_squared, sensor.half_field
@@ -133,8 +133,8 @@ def few_candidates(
                 continue
             if half >= math.pi or abs(math.atan2(cos * dy - sin * dx, cos * dx + sin * dy)) <= half:
                 rows.append(row)
-        found.append(rows)
-    return found
+        candidates.append(rows)
+    return candidates
 
 
 def visibilities(

@@ -120,7 +120,7 @@ def wall_limit_error(
     frame: FrameType | None, limit: float, *, time: float | None = None, observers: Collection[object] = ()
 ) -> WallLimitError:
     """Return the error of a run that executes this frame when its limit of wall time [s] is reached."""
-    calls = [_Call(one, line) for one, line in traceback.walk_stack(frame)][::-1]
+    calls = [_Call(caller, line) for caller, line in traceback.walk_stack(frame)][::-1]
     return _wall_limit_error(calls, limit, time, observers)
 
 
@@ -128,21 +128,21 @@ def _extension_place(
     calls: Sequence[_Call], time: float | None, observers: Collection[object]
 ) -> ExtensionPlace | None:
     """Return the outermost extension of a stack, a third-party one if there is one; None without extensions."""
-    found: list[tuple[int, Registration]] = []
-    for row, call in enumerate(calls):
+    extensions: list[tuple[int, Registration]] = []
+    for index, call in enumerate(calls):
         subject = call.subject
         if any(subject is observer for observer in observers) and not is_built_in(type(subject)):
-            found.append((row, Registration("observer", type(subject).__name__, "")))
-        elif subject is not _ABSENT and (known := _registration(subject)) is not None:
-            found.append((row, known))
-    third_party = [entry for entry in found if not _is_ours(calls[entry[0]].subject)] or _by_file(calls)
-    if not third_party and not found:
+            extensions.append((index, Registration("observer", type(subject).__name__, "")))
+        elif subject is not _ABSENT and (registration := _registration(subject)) is not None:
+            extensions.append((index, registration))
+    third_party = [entry for entry in extensions if not _is_ours(calls[entry[0]].subject)] or _by_file(calls)
+    if not third_party and not extensions:
         return None
-    row, (kind, name, value) = (third_party or found)[0]
-    at = _innermost_own(calls, row)
+    index, (kind, name, value) = (third_party or extensions)[0]
+    at = _innermost_own(calls, index)
     if at is None:
-        file, line = _definition(calls[row].subject)
-        return ExtensionPlace(kind, name, value, _subject_of(calls), time, file, line, calls[row].function)
+        file, line = _definition(calls[index].subject)
+        return ExtensionPlace(kind, name, value, _subject_of(calls), time, file, line, calls[index].function)
     return ExtensionPlace(kind, name, value, _subject_of(calls), time, at.file, at.line, at.function)
 
 
@@ -162,7 +162,7 @@ def traceback_from_extension(error: ExtensionError) -> str:
     if cause is None:
         return ""
     entries = traceback.extract_tb(cause.__traceback__)
-    first = next((row for row, entry in enumerate(entries) if entry.filename == error.place.file), 0)
+    first = next((index for index, entry in enumerate(entries) if entry.filename == error.place.file), 0)
     shown = traceback.format_list(entries[first:]) + traceback.format_exception_only(type(cause), cause)
     return "".join(shown)
 
@@ -183,22 +183,22 @@ def _is_ours(subject: Any) -> bool:
 def _by_file(calls: Sequence[_Call]) -> list[tuple[int, Registration]]:
     """Return the calls in modules of third parties without an object, such as static methods, with their extensions."""
     files = third_party_files()
-    found = []
-    for row, call in enumerate(calls):
+    extensions = []
+    for index, call in enumerate(calls):
         if classes := files.get(call.file):
             owner = call.frame.f_code.co_qualname.rpartition(".")[0]
-            found.append((row, classes.get(owner) or next(iter(classes.values()))))
-    return found
+            extensions.append((index, classes.get(owner) or next(iter(classes.values()))))
+    return extensions
 
 
-def _innermost_own(calls: Sequence[_Call], row: int) -> _Call | None:
+def _innermost_own(calls: Sequence[_Call], index: int) -> _Call | None:
     """Return the last call within the package of an extension, from its first frame on."""
-    subject = calls[row].subject
-    if calls[row].file in third_party_files():
-        own = _files_of(str(calls[row].frame.f_globals.get("__name__")))
+    subject = calls[index].subject
+    if calls[index].file in third_party_files():
+        own = _files_of(str(calls[index].frame.f_globals.get("__name__")))
     else:
         own = _files_of((subject if isinstance(subject, type) else type(subject)).__module__)
-    return next((call for call in reversed(calls[row:]) if _is_within(call, own)), None)
+    return next((call for call in reversed(calls[index:]) if _is_within(call, own)), None)
 
 
 def _definition(subject: Any) -> tuple[str, int | None]:
@@ -294,9 +294,9 @@ def _extensions_at(file: str, line: int) -> Iterator[Registration]:
     """Yield third-party extensions whose class contains a line; if there is none, those of the module."""
     of_module = []
     for group in GROUPS:
-        known = registry(group)
-        for name in known:
-            value = known.value(name)
+        registered = registry(group)
+        for name in registered:
+            value = registered.value(name)
             module, _, attribute = value.partition(":")
             if _file_of(module) != file:
                 continue

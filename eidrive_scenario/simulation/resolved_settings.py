@@ -81,7 +81,7 @@ class ResolvedSettings(RunSettings):
 
     def as_json(self) -> dict[str, Any]:
         """Return the settings as JSON values."""
-        content = {one.name: _plain(getattr(self, one.name)) for one in fields(self) if one.name not in _HIDDEN}
+        content = {field.name: _plain(getattr(self, field.name)) for field in fields(self) if field.name not in _HIDDEN}
         first = {name: content[name] for name in ("scenario", "seed", "run")}
         files = [{"role": role, "name": name, "sha256": digest} for role, name, digest in self.files]
         return {**first, **content, "files": files}
@@ -113,12 +113,12 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
     profile, stations = resolved.channel_profile, dict(resolved.stations)
     later = () if settings.channel is not None else tuple(_later_channels(scenario))
     files = [*_scenario_files(scenario), *_setting_files((profile, *later, *stations.values()), scenario)]
-    declared = [one for several in setup.declared_criteria.values() for one in several]
+    declared = [declaration for of_source in setup.declared_criteria.values() for declaration in of_source]
     models = distributions(
         [
             *setup.storyboard.extensions,
             *(("controllers", name) for name in settings.controllers.values()),
-            *(("criteria", one.kind) for one in [*declared, *added]),
+            *(("criteria", declaration.kind) for declaration in [*declared, *added]),
         ]
     )
     values: dict[str, Any] = {option.name: option.form.resolved(getattr(settings, option.name)) for option in OPTIONS}
@@ -127,14 +127,14 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
         "weather": weather.name if weather is not None else None,
         "parameters": dict(scenario.parameters),
         "drive": tuple(sorted(scenario.driven)),
-        "criteria": tuple({one.kind: _without_folders(_dump(one.settings))} for one in added),
+        "criteria": tuple({declaration.kind: _without_folders(_dump(declaration.settings))} for declaration in added),
     }
     return ResolvedSettings(
         **values,
         scenario=name_of(scenario.path) if scenario.path is not None else scenario.name,
         seed=seed,
         channel_profile=_without_folders(profile),
-        later_channels=tuple(_without_folders(one) for one in later),
+        later_channels=tuple(_without_folders(channel) for channel in later),
         stations=_without_folders(stations),
         weather_profile=_without_folders(_dump(weather)),
         drawn=_drawn(scenario, seed, settings),
@@ -157,7 +157,7 @@ def _dump(model: BaseModel | None) -> dict[str, Any] | None:
 
 def _later_channels(scenario: Scenario) -> Iterator[dict[str, Any] | None]:
     """Yield the profiles of the channel commands in events."""
-    at_start = {id(one.custom_command_action) for one in scenario.storyboard.init.actions.user_defined_action}
+    at_start = {id(action.custom_command_action) for action in scenario.storyboard.init.actions.user_defined_action}
     for command in scenario.custom_commands:
         if command.type == CHANNEL and id(command) not in at_start:
             yield _dump(channel_profile(command))
@@ -177,9 +177,9 @@ def _setting_files(values: tuple[Mapping[str, Any] | None, ...], scenario: Scena
     folder = scenario.path.parent if scenario.path is not None else Path()
     for value in values:
         for name in _named_files(value):
-            place = next((path for path in (folder / name, Path(name)) if is_regular_file(path)), None)
-            if place is not None:
-                yield "setting", place.name, _digest(place)
+            file = next((path for path in (folder / name, Path(name)) if is_regular_file(path)), None)
+            if file is not None:
+                yield "setting", file.name, _digest(file)
 
 
 def _digest(path: Path) -> str:

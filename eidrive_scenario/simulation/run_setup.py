@@ -122,8 +122,8 @@ def set_up_run(
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin=option_of("weather").flag)
     errors.raise_if_any()
-    declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
-    all_criteria = [one.build() for one in declarations]
+    declarations = [*criteria, *(declaration for of_source in declared.values() for declaration in of_source), *added]
+    all_criteria = [declaration.build() for declaration in declarations]
     progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
     warnings = [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)]
     can_be_judged = bool(declarations) or any(command.type in EXITS for command in scenario.custom_commands)

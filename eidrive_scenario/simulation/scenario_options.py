@@ -39,8 +39,7 @@ def drive_entities(
     diagnostics: list[Diagnostic] = []
     controllers = dict(scenario.controllers)
     for name, source in drive.items():
-        found = list(_unsuitable(scenario, name))
-        diagnostics += found
+        diagnostics += _unsuitable(scenario, name)
         try:
             stack = _stack(scenario, name, source)
         except SettingError as error:

@@ -108,14 +108,14 @@ class Simulation:
     def _check_start(self, commands: Commands, drivers: Collection[str]) -> tuple[Diagnostic, ...]:
         """Return the warnings about the state after Init. Raise InputError with all errors of it."""
         collector = ErrorCollector()
-        found: list[Diagnostic] = []
+        warnings: list[Diagnostic] = []
         with collector:
             check_spawns(self.scenario, self.roads, self.world, drivers)
-            found += spawn_warnings(self.scenario, self.roads, self.world, drivers)
+            warnings += spawn_warnings(self.scenario, self.roads, self.world, drivers)
         with collector:
-            found += check_destinations(self.scenario, self.stack.undirected, self.world.poses(), commands)
+            warnings += check_destinations(self.scenario, self.stack.undirected, self.world.poses(), commands)
         collector.raise_if_any()
-        return tuple(found)
+        return tuple(warnings)
 
     def __enter__(self) -> Self:
         return self

@@ -44,9 +44,9 @@ def check_spawns(scenario: Scenario, roads: RoadNetwork | None, world: World, dr
         return
     view = world.poses()
     present = [name for name in scenario.entities if name in view.rows and name in drivers]
-    found = [*overlapping_spawns(scenario, view, present), *_off_road(scenario, roads, view, present)]
-    if found:
-        raise SettingError(found)
+    diagnostics = [*overlapping_spawns(scenario, view, present), *_off_road(scenario, roads, view, present)]
+    if diagnostics:
+        raise SettingError(diagnostics)
 
 
 def overlapping_spawns(
@@ -118,9 +118,9 @@ def _off_road(
         return
     x, y = np.array([view.plain_boxes[view.rows[name]][:2] for name in names]).T
     outside = roads.locate(x, y, reach=np.inf).outside.tolist()
-    for name, gap, place in zip(names, outside, zip(x.tolist(), y.tolist(), strict=True), strict=True):
+    for name, gap, start_x, start_y in zip(names, outside, x.tolist(), y.tolist(), strict=True):
         if gap > MARGIN:
-            message = f"{quoted(name)} starts at ({place[0]:.1f}, {place[1]:.1f}) m, {gap:.0f} m off the nearest road"
+            message = f"{quoted(name)} starts at ({start_x:.1f}, {start_y:.1f}) m, {gap:.0f} m off the nearest road"
             yield start_diagnostic(scenario, name, message, "give a LanePosition, or a world position on a lane")
 
 
@@ -180,30 +180,30 @@ def _gaps(roads: RoadNetwork | None, view: WorldView, names: list[str]) -> dict[
         return dict.fromkeys(names, 0.0)
     rows = [view.rows[name] for name in names]
     x, y = np.array([view.plain_boxes[row][:2] for row in rows]).T
-    found = roads.locate(x, y, reach=np.inf)
+    locations = roads.locate(x, y, reach=np.inf)
     gaps = {}
     for number, (name, row) in enumerate(zip(names, rows, strict=True)):
-        place = found.location(number)
-        if place is None:
+        location = locations.location(number)
+        if location is None:
             gaps[name] = np.inf
             continue
-        surface = roads.road_pose_at(place.road, place.s, place.t).z
+        surface = roads.road_pose_at(location.road, location.s, location.t).z
         near = abs(float(view.position[row, 2]) - surface) <= HEIGHT
-        gaps[name] = float(found.outside[number]) if near else np.inf
+        gaps[name] = float(locations.outside[number]) if near else np.inf
     return gaps
 
 
 def _on_trajectories(scenario: Scenario) -> frozenset[str]:
     """Return the entities that follow a trajectory at any time."""
-    selections, found = EntitySelections(scenario), set[str]()
+    selections, names = EntitySelections(scenario), set[str]()
     for private in scenario.storyboard.init.actions.private:
         if any(isinstance(element, model.FollowTrajectoryAction) for element in private.walk()):
-            found.update(selections.members(private.entity_ref))
+            names.update(selections.members(private.entity_ref))
     for group in _groups(scenario):
         if any(isinstance(element, model.FollowTrajectoryAction) for element in group.walk()):
             for actor in group.actors.entity_ref:
-                found.update(selections.members(actor.entity_ref))
-    return frozenset(found)
+                names.update(selections.members(actor.entity_ref))
+    return frozenset(names)
 
 
 _PLANNER = "planner"
@@ -226,11 +226,11 @@ def check_destinations(
         return ()
     moved = _moved(scenario)
     left = [name for name in waiting if name not in moved]
-    found = {name: _diagnostic(scenario, name, commands) for name in left}
-    errors = [found[name] for name in left if _planner_line(scenario, name) is not None]
+    diagnostics = {name: _diagnostic(scenario, name, commands) for name in left}
+    errors = [diagnostics[name] for name in left if _planner_line(scenario, name) is not None]
     if errors:
         raise SettingError(errors)
-    return tuple(found.values())
+    return tuple(diagnostics.values())
 
 
 def _waits(scenario: Scenario, name: str, view: WorldView, commands: Commands) -> bool:
@@ -244,14 +244,14 @@ def _waits(scenario: Scenario, name: str, view: WorldView, commands: Commands) -
 
 def _added(scenario: Scenario) -> frozenset[str]:
     """Return the entities that events add to the world."""
-    selections, found = EntitySelections(scenario), set[str]()
+    selections, names = EntitySelections(scenario), set[str]()
     for group in _groups(scenario):
         for element in _elements(scenario, group):
             if isinstance(element, model.EntityAction) and element.add_entity_action is not None:
-                found.update(selections.members(element.entity_ref))
+                names.update(selections.members(element.entity_ref))
             elif isinstance(element, model.TeleportAction):
-                found.update(_actors(scenario, selections, group))
-    return frozenset(found)
+                names.update(_actors(scenario, selections, group))
+    return frozenset(names)
 
 
 def _moved(scenario: Scenario) -> frozenset[str]:
@@ -259,14 +259,14 @@ def _moved(scenario: Scenario) -> frozenset[str]:
     own = registry("actions")
     if any(command.type in own for command in scenario.custom_commands):
         return frozenset(scenario.entities)
-    selections, found = EntitySelections(scenario), set[str]()
+    selections, names = EntitySelections(scenario), set[str]()
     for private in scenario.storyboard.init.actions.private:
         if any(map(_moves, private.private_action)):
-            found.update(selections.members(private.entity_ref))
+            names.update(selections.members(private.entity_ref))
     for group in _groups(scenario):
         if any(isinstance(element, model.PrivateAction) and _moves(element) for element in _elements(scenario, group)):
-            found.update(_actors(scenario, selections, group))
-    return frozenset(found)
+            names.update(_actors(scenario, selections, group))
+    return frozenset(names)
 
 
 def _moves(action: model.PrivateAction) -> bool:
@@ -304,7 +304,7 @@ def _actors(scenario: Scenario, selections: EntitySelections, group: model.Maneu
 
 
 def _diagnostic(scenario: Scenario, name: str, commands: Commands) -> Diagnostic:
-    controller = [one for one in scenario.controllers[name] if is_agent_controller(one)][-1]
+    controller = [*filter(is_agent_controller, scenario.controllers[name])][-1]
     entries = {entry.name: entry.value for entry in property_entries(controller)}
     goal = commands.goals.get(name)
     routed = goal is not None and (goal.path is not None or goal.waypoints is not None)
@@ -319,5 +319,5 @@ def _diagnostic(scenario: Scenario, name: str, commands: Commands) -> Diagnostic
 
 def _planner_line(scenario: Scenario, name: str) -> int | None:
     """Return the line of the property that selects the planner of a vehicle; None for the default planner."""
-    controller = [one for one in scenario.controllers[name] if is_agent_controller(one)][-1]
-    return next((one.line for one in property_entries(controller) if one.name == _PLANNER), None)
+    controller = [*filter(is_agent_controller, scenario.controllers[name])][-1]
+    return next((entry.line for entry in property_entries(controller) if entry.name == _PLANNER), None)

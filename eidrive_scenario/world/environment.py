@@ -139,10 +139,10 @@ def _sun(environment: Environment, time: float) -> dict[str, float]:
     height = math.degrees(math.remainder(elevation, 2.0 * math.pi))
     if abs(height) > 90.0:
         height = math.copysign(180.0 - abs(height), height)
-    found = {"sun_azimuth": math.degrees(environment.sun_azimuth or 0.0), "sun_elevation": height}
+    sun = {"sun_azimuth": math.degrees(environment.sun_azimuth or 0.0), "sun_elevation": height}
     given = environment.illuminance
     if given is not None and given > FULL_SUN:
-        found["sun_illuminance"] = given
+        sun["sun_illuminance"] = given
     elif given is not None:
-        found["sun_share"] = max(given, 0.0)
-    return found
+        sun["sun_share"] = max(given, 0.0)
+    return sun

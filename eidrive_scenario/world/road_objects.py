@@ -178,8 +178,8 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
 
 
 def _drivable(roads: RoadNetwork, here: LaneLocation) -> bool:
-    found = roads.roads[here.road].section_at(here.s).lanes.get(here.lane)
-    return found is not None and found.drivable
+    lane = roads.roads[here.road].section_at(here.s).lanes.get(here.lane)
+    return lane is not None and lane.drivable
 
 
 def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:
@@ -218,7 +218,7 @@ def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, floa
     polygons = outlines(roads, entry)
     if len(polygons) == 1 and len(polygons[0]) > CONVEX and _area(polygons[0]) < FILLED * box[1] * box[2]:
         corners = polygons[0]
-        return [_wall(one, two) for one, two in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+        return list(map(_wall, corners, np.roll(corners, -1, axis=0)))
     return [box]
 
 
@@ -227,8 +227,8 @@ def _area(polygon: Array) -> float:
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0)
 
 
-def _wall(one: Array, two: Array) -> tuple[Pose, float, float]:
-    (x, y, z), (dx, dy, dz) = ((one + two) / 2.0).tolist(), (two - one).tolist()
+def _wall(start: Array, end: Array) -> tuple[Pose, float, float]:
+    (x, y, z), (dx, dy, dz) = ((start + end) / 2.0).tolist(), (end - start).tolist()
     return Pose(x, y, z - abs(dz) / 2.0, math.atan2(dy, dx), 0.0, 0.0), math.hypot(dx, dy), WALL
 
 

@@ -130,7 +130,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
     if isinstance(entity, MiscObject):
         return "rsu" if "rsu" in words else "box"
     by_category = _VEHICLES[entity.vehicle_category.value]
-    named = next((shape for shape, known in _WORDS if any(word in words for word in known)), None)
+    named = next((shape for shape, names in _WORDS if any(word in words for word in names)), None)
     allowed = {
         "car": ("car", "van", "ambulance"),
         "van": ("van", "ambulance"),

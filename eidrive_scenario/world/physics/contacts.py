@@ -52,11 +52,11 @@ class Couplings:
         """Return the actors that are connected to an actor directly or by others, without the actor itself."""
         if not self.pairs:
             return frozenset()
-        found, added = {name}, {name}
+        connected, added = {name}, {name}
         while added:
-            added = {other for pair in self.pairs if pair & added for other in pair} - found
-            found |= added
-        return frozenset(found - {name})
+            added = {other for pair in self.pairs if pair & added for other in pair} - connected
+            connected |= added
+        return frozenset(connected - {name})
 
     def update(self, bodies: Mapping[str, Body]) -> None:
         """Set which bodies collide; those of a disconnected trailer and its vehicle only after they have parted."""

@@ -81,9 +81,9 @@ class FreeSpace:
     def _is_clear_of_scenery(
         self, pair: tuple[str, str], x: float, y: float, to_x: float, to_y: float, width: float
     ) -> bool:
-        known = self._gaps.get(pair)
-        if known is not None:
-            old_x, old_y, old_to_x, old_to_y, gap = known
+        checked = self._gaps.get(pair)
+        if checked is not None:
+            old_x, old_y, old_to_x, old_to_y, gap = checked
             moved = max(math.hypot(x - old_x, y - old_y), math.hypot(to_x - old_to_x, to_y - old_to_y))
             if gap - moved > width:
                 return True

@@ -51,17 +51,17 @@ class SpatialGrid(Generic[Thing]):
 
     def query(self, x: float, y: float, reach: float) -> list[Thing]:
         """Return the objects in the cells within reach of a point [m], possibly with duplicates."""
-        found: list[Thing] = []
+        near: list[Thing] = []
         if reach > _FAR:
             side = reach + SQUARE
             for (column, line), things in self._in_cell.items():
                 if abs((column + 0.5) * SQUARE - x) <= side and abs((line + 0.5) * SQUARE - y) <= side:
-                    found += things
+                    near += things
         elif self._in_cell:
             for cell in grid_cells(x, y, reach):
                 if cell in self._in_cell:
-                    found += self._in_cell[cell]
-        return found
+                    near += self._in_cell[cell]
+        return near
 
 
 def grid_cells(x: float, y: float, reach: float) -> list[Cell]:

@@ -145,7 +145,7 @@ def test_returns_end_at_ten_percent_range() -> None:
     back = returns(
         distance, brightness, clear, attenuation=0.0, ten_percent_range=100.0, draws=np.random.default_rng(1)
     )
-    assert back.found.tolist() == [True, False, True, False]
+    assert back.detected.tolist() == [True, False, True, False]
 
 
 def test_fog_attenuates_returns_and_hides_distant_objects() -> None:
@@ -157,7 +157,7 @@ def test_fog_attenuates_returns_and_hides_distant_objects() -> None:
     np.testing.assert_allclose(near.distance, 4.0)
     np.testing.assert_allclose(near.intensity, 0.8 * math.exp(-8.0 * extinction(FOG)))
     far = returns(np.full(1000, 45.0), np.full(1000, 0.45), FOG, attenuation=0.0, ten_percent_range=150.0, draws=draws)
-    assert far.found.mean() > 0.99, "the fog itself returns enough light"
+    assert far.detected.mean() > 0.99, "the fog itself returns enough light"
     assert (far.distance < 20.0).mean() > 0.99
     assert np.median(far.distance) < 6.0
 
@@ -197,7 +197,7 @@ def test_rain_causes_false_returns_and_clear_air_none() -> None:
         back = returns(
             nothing, np.zeros(20_000), weather, attenuation=0.0, ten_percent_range=150.0, draws=np.random.default_rng(7)
         )
-        return float(back.found.mean())
+        return float(back.detected.mean())
 
     drizzle, downpour = (Weather(precipitation="rain", precipitation_intensity=rate) for rate in (2.0, 50.0))
     assert share(Weather()) == 0.0
