@@ -224,8 +224,8 @@ class RoadNetwork(RoadAttributes):
             near = locate_near(self.roads, self.links, x, y, hint)
             if near is not None:
                 return near
-        found = self._locator.locate(np.array([x]), np.array([y]), None if z is None else np.array([z]), reach)
-        return found.location(0)
+        heights = None if z is None else np.array([z])
+        return self._locator.locate(np.array([x]), np.array([y]), heights, reach).location(0)
 
     def location(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> LaneLocation:
         """Return the lane location with these coordinates, including its t. Raise PositionError."""

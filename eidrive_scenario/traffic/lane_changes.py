@@ -173,8 +173,7 @@ class LaneChanges:
         table[own] = cars.drivers.table[owner[own]]
         v = occupants.speed[number]
         wish = np.where(own, desired[owner], np.maximum(v, 1.0))
-        found = Drivers(table).response(v, wish, behind, v - leader)
-        return np.where(number >= 0, found, 0.0)
+        return np.where(number >= 0, Drivers(table).response(v, wish, behind, v - leader), 0.0)
 
     @staticmethod
     def length(speed: Array) -> Array:

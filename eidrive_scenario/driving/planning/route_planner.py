@@ -189,8 +189,8 @@ class RoutePlanner(Planner):
     def _speed_limit(self, ego: EgoState, roads: RoadNetwork) -> float:
         """Return the speed limit of the lane at the vehicle [m/s], within the limit of the vehicle."""
         x, y, _ = ego.position.tolist()
-        known = self._place
-        self._place = lane_below(roads, ego) if known is None else roads.locate_at(x, y, known)
+        before = self._place
+        self._place = lane_below(roads, ego) if before is None else roads.locate_at(x, y, before)
         here = self._place
         limit = None if here is None else roads.speed_limit(here.road, here.s, here.lane)
         return min(assumed_speed(limit), self.spec.max_speed)

@@ -98,10 +98,10 @@ class Rules(msgspec.Struct, frozen=True):
 def rules(cls: type[Element], version: Version) -> Rules:
     """Return the rules of a class in a version."""
     key = (cls, version)
-    known = _KNOWN.get(key)
-    if known is None:
-        known = _KNOWN[key] = _read(cls, version)
-    return known
+    content = _KNOWN.get(key)
+    if content is None:
+        content = _KNOWN[key] = _read(cls, version)
+    return content
 
 
 def _read(cls: type[Element], version: Version) -> Rules:

@@ -95,8 +95,8 @@ class CurveTable:
 
     def _curve(self, line: Integers, s: Array) -> Integers:
         """Return the indices of the curves at s (N,) of lines (N,)."""
-        found: Integers = self._borders.searchsorted(self.base.take(line) + s, side="right")
-        return found
+        curve: Integers = self._borders.searchsorted(self.base.take(line) + s, side="right")
+        return curve
 
     def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
         k, rate, shift, scale, cosine0, sine0, sign, cos, sin = self._spiral.take(curve, axis=0).T

@@ -131,8 +131,8 @@ class PolynomialTable:
     def _piece(self, function: Integers, s: Array) -> Integers:
         if self._single:
             return function
-        found: Integers = self._borders.searchsorted(self.base.take(function) + s, side="right")
-        return found
+        piece: Integers = self._borders.searchsorted(self.base.take(function) + s, side="right")
+        return piece
 
     def value(self, function: Integers, s: Array) -> Array:
         """Return the values of functions `function` (N,) at s (N,)."""

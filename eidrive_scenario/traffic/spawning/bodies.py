@@ -154,8 +154,8 @@ class TrafficMix:
 
     def _entries(self, distribution: model.TrafficDistribution) -> list[model.TrafficDistributionEntry]:
         """Return the entries in the file and those of catalogs, whose kind the reader has checked."""
-        found = map(self._scenario.resolved, distribution.catalog_references)
-        listed = [entry for entry in found if isinstance(entry, model.TrafficDistributionEntry)]
+        referenced = map(self._scenario.resolved, distribution.catalog_references)
+        listed = [entry for entry in referenced if isinstance(entry, model.TrafficDistributionEntry)]
         return [*distribution.traffic_distribution_entry, *listed]
 
     def _group(self, entry: model.TrafficDistributionEntry) -> WeightedChoice[Participant]:

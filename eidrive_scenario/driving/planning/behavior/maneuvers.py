@@ -351,7 +351,7 @@ def _is_in_way(hypothesis: Present, half_width: float) -> bool:
 def _blocker(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
     center, slower = situation.s + body.center, situation.wanted - SLOWER
-    found = [
+    slower_ahead = [
         hypothesis
         for hypothesis in scene.present
         if hypothesis.s > center
@@ -360,7 +360,7 @@ def _blocker(situation: Situation, scene: Surroundings, body: Body) -> Present |
         and _is_in_way(hypothesis, body.half_width)
         and _is_passable(situation, hypothesis, body)
     ]
-    return min(found, key=attrgetter("s"), default=None)
+    return min(slower_ahead, key=attrgetter("s"), default=None)
 
 
 def _is_beside(situation: Situation, hypothesis: Present, body: Body) -> bool:
