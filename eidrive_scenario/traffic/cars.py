@@ -36,7 +36,7 @@ class Cars:
     slope         slope of the path against the lane, left positive
     shift         offset at the start of a lane change [m]
     shift_done, shift_length  covered and total length of the lane change [m]
-    plan          rows of the lanes ahead, the current one first, -1 beyond the end
+    plan          lanes ahead, the current one first, -1 beyond the end
     granted       whether the car may enter each of these lanes in junctions
     asked         time since which it has requested a junction [s], NaN if it has not
     turns         number of branches selected so far
@@ -94,7 +94,7 @@ class Cars:
         return len(self.specs)
 
     @property
-    def row(self) -> Integers:
+    def lane(self) -> Integers:
         """Lanes of the cars (N,)."""
         return self.plan[:, 0]
 

@@ -33,8 +33,8 @@ class Plans:
     def extend(self, cars: Cars, index: int) -> None:
         """Extend the plan of a car. Lanes of a junction that it holds already are granted."""
         lengths, name = self._lanes.lengths, cars.specs[index].name
-        plan = [row for row in cars.plan[index].tolist() if row >= 0]
-        ahead = sum(lengths[row] for row in plan[1:])
+        plan = [lane for lane in cars.plan[index].tolist() if lane >= 0]
+        ahead = sum(lengths[lane] for lane in plan[1:])
         while ahead < LOOK_AHEAD and len(plan) <= PLANNED:
             choices = self._lanes.following(plan[-1])
             if not choices:
@@ -53,7 +53,7 @@ class Plans:
         """Move cars at the end of their lane to the next one. Return the cars without a next lane."""
         lanes = self._lanes
         gone = []
-        for index in np.flatnonzero(cars.progress >= lanes.length[cars.row]).tolist():
+        for index in np.flatnonzero(cars.progress >= lanes.length[cars.lane]).tolist():
             name = cars.specs[index].name
             while cars.progress[index] >= lanes.length[cars.plan[index, 0]]:
                 if cars.plan[index, 1] < 0:
@@ -75,13 +75,13 @@ class Plans:
 
         begins  (N, D) distances from each car to the starts of its planned lanes [m]
         """
-        limit = self._lanes.limits(cars.row, cars.progress) * cars.factor
+        limit = self._lanes.limits(cars.lane, cars.progress) * cars.factor
         desired = np.where(
             np.isfinite(limit), limit, np.where(np.isinf(limit), np.maximum(FREE, cars.fallback), cars.fallback)
         )
         desired = np.minimum(np.where(np.isnan(cars.own_speed), desired, cars.own_speed), cars.top_speed)
         seen = (cars.plan >= 0) & (begins <= LOOK_AHEAD)
-        bend = self._lanes.tightest(np.where(seen, cars.plan, cars.row[:, None]))
+        bend = self._lanes.tightest(np.where(seen, cars.plan, cars.lane[:, None]))
         square = cars.drivers.lateral_acceleration[:, None] / np.maximum(bend, 1e-6)
         square = square + 2.0 * cars.drivers.deceleration[:, None] * np.maximum(begins, 0.0)
         slowest = np.sqrt(np.where(seen, square, np.inf).min(axis=1))
@@ -173,9 +173,9 @@ class Fleet:
         return self.poses[rows, 0], self.poses[rows, 1]
 
     def places(self, names: Sequence[str]) -> tuple[NDArray[np.int64], Array]:
-        """Return lane rows and progress of cars [m]."""
+        """Return lanes and progress of cars [m]."""
         rows = [self._index[name] for name in names]
-        return self._cars.row[rows], self._cars.progress[rows]
+        return self._cars.lane[rows], self._cars.progress[rows]
 
     def __contains__(self, name: str) -> bool:
         return name in self._index
@@ -196,13 +196,13 @@ class Fleet:
 
         Raise PositionError if the lane does not exist, ValueError if the name is in use.
         """
-        row, progress = self.lanes.of(location)
-        return self.add_at(spec, row, progress, speed=speed, desired_speed=desired_speed, driver=driver)
+        lane, progress = self.lanes.of(location)
+        return self.add_at(spec, lane, progress, speed=speed, desired_speed=desired_speed, driver=driver)
 
     def add_at(
         self,
         spec: ActorSpec,
-        row: int,
+        lane: int,
         progress: float,
         *,
         speed: float = 0.0,
@@ -212,7 +212,7 @@ class Fleet:
         fallback: float = FREE,
         ignores_lights: bool = False,
     ) -> Placement:
-        """Add a car by lane row and progress.
+        """Add a car by the running number of its lane and the progress there.
 
         factor          share of the speed limit that is the desired speed
         fallback        desired speed on lanes without a limit [m/s]
@@ -234,14 +234,14 @@ class Fleet:
             fallback=fallback,
             asked=math.nan,
             number=self._made,
-            walks=bool(self.lanes.walkable[row]),
+            walks=bool(self.lanes.walkable[lane]),
             ignores_lights=ignores_lights,
         )
         self._made += 1
         self._index[spec.name] = index
-        self._cars.plan[index, 0] = row
+        self._cars.plan[index, 0] = lane
         self._poses, self._until = None, 0.0
-        if self.lanes.in_junction[row] and not self.lanes.walkable[row]:
+        if self.lanes.in_junction[lane] and not self.lanes.walkable[lane]:
             self._right_of_way.take(self._cars, index)
         self._plans.extend(self._cars, index)
         return self._placement(index, teleport=True)
@@ -259,8 +259,8 @@ class Fleet:
         """Poses x y z yaw pitch roll of the reference points (N, 6) [m, rad]."""
         if self._poses is None:
             cars, lanes = self._cars, self.lanes
-            sign = lanes.direction[cars.row]
-            poses = lanes.tables.lane_poses(cars.row, lanes.s(cars.row, cars.progress), cars.offset * sign)
+            sign = lanes.direction[cars.lane]
+            poses = lanes.tables.lane_poses(cars.lane, lanes.s(cars.lane, cars.progress), cars.offset * sign)
             yaw = poses.h + np.where(sign > 0, 0.0, math.pi) + np.arctan(cars.slope)
             self._poses = np.column_stack([poses.x, poses.y, poses.z, yaw, poses.p * sign, poses.r * sign])
         return self._poses
@@ -297,7 +297,7 @@ class Fleet:
             self._decide(dt)
         cars = self._cars
         covered, cars.speed = ballistic(cars.speed, cars.acceleration, dt)
-        cars.progress = cars.progress + covered / self.lanes.stretch(cars.row, cars.progress)
+        cars.progress = cars.progress + covered / self.lanes.stretch(cars.lane, cars.progress)
         self._changes.advance(cars, covered)
         self._poses = None
         # Move cars at the end of their lane to the next one, or remove them

@@ -92,18 +92,18 @@ class LaneChanges:
         leaders, desired  of all cars
         to_junction       (N,) distance to the next junction, inf if there is none within sight [m]
         """
-        lanes, row = self._lanes, cars.row[indices]
-        ends_in = lanes.ends_at[row] - cars.progress[indices]
+        lanes, lane = self._lanes, cars.lane[indices]
+        ends_in = lanes.ends_at[lane] - cars.progress[indices]
         room = self.length(cars.speed[indices])
         able = (
             (np.abs(cars.offset[indices]) < SETTLED)
             & ~cars.walks[indices]
-            & ~lanes.in_junction[row]
+            & ~lanes.in_junction[lane]
             & ~cars.granted[indices].any(axis=1)
         )
         able &= to_junction[indices] > room + cars.front[indices]
         able &= (cars.speed[indices] > SLOWEST) | (ends_in < LAST_CHANCE)
-        sides = [(lanes.left[row], lanes.left_hand[row]), (lanes.right[row], ~lanes.left_hand[row])]
+        sides = [(lanes.left[lane], lanes.left_hand[lane]), (lanes.right[lane], ~lanes.left_hand[lane])]
         target, slow_side = (np.concatenate(parts) for parts in zip(*sides, strict=True))
         some, room, able = np.tile(indices, 2), np.tile(room, 2), np.tile(able, 2)
         possible = np.flatnonzero(able & (target >= 0))
@@ -140,7 +140,7 @@ class LaneChanges:
         drivers, wish, length = cars.drivers.of_rows(indices), desired[indices], front - rear
         after = find_leaders(lanes, lanes.chain(target, PLANNED + 1), progress, front, occupants, own=indices)
         new = find_followers(lanes, target, progress, rear, occupants, indices)
-        old = find_followers(lanes, cars.row[indices], progress, rear, occupants, indices)
+        old = find_followers(lanes, cars.lane[indices], progress, rear, occupants, indices)
         gap, ahead = leaders.gap[indices], leaders.speed[indices]
 
         own, own_after = (
@@ -182,8 +182,8 @@ class LaneChanges:
 
     def begin(self, cars: Cars, index: int, target: int) -> None:
         """Start the change of a car. It belongs to the new lane from now on, still beside its center."""
-        rows, progress = cars.row[[index]], cars.progress[[index]]
-        apart = float(self._lanes.apart(rows, np.array([target]), progress)[0])
+        old, progress = cars.lane[[index]], cars.progress[[index]]
+        apart = float(self._lanes.apart(old, np.array([target]), progress)[0])
         cars.offset[index] -= apart
         cars.shift[index] = cars.offset[index]
         cars.shift_done[index] = 0.0
@@ -205,9 +205,9 @@ class LaneChanges:
         indices = np.flatnonzero(cars.changing)
         if not indices.size:
             return indices, indices
-        row = cars.row[indices]
-        half = 0.5 * self._lanes.width(row, cars.progress[indices])
+        old = cars.lane[indices]
+        half = 0.5 * self._lanes.width(old, cars.progress[indices])
         body = np.array([0.5 * cars.specs[n].size[1] for n in indices])
-        lane = np.where(cars.offset[indices] > 0.0, self._lanes.beside_left[row], self._lanes.beside_right[row])
-        covers = (np.abs(cars.offset[indices]) + body > half) & (lane >= 0)
-        return indices[covers], lane[covers]
+        new = np.where(cars.offset[indices] > 0.0, self._lanes.beside_left[old], self._lanes.beside_right[old])
+        covers = (np.abs(cars.offset[indices]) + body > half) & (new >= 0)
+        return indices[covers], new[covers]

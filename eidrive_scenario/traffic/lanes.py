@@ -1,4 +1,4 @@
-"""Lanes of a road network for traffic: rows with length, direction, successors and speed in bends."""
+"""Lanes of a road network for traffic, by their running numbers: length, direction, successors and speed in bends."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class TrafficLanes:
         section = tables.lane_section
         self.road = tables.section_road[section]
         self.length = tables.section_length[section]
-        self.row = dict(tables.lane_keys())
-        self.keys = list(self.row)
+        self.row_of = dict(tables.lane_keys())
+        self.keys = list(self.row_of)
         self.direction = np.array([roads.driving_direction(key.road, key.lane) for key in self.keys], dtype=np.int64)
         start = tables.section_start[section]
         self._origin = np.where(self.direction > 0, start, start + self.length)
@@ -56,27 +56,27 @@ class TrafficLanes:
         self._tightest = np.full(len(self.keys), np.nan)
         self._limit = np.full(len(self.keys), np.nan)
         self._varying = np.zeros(len(self.keys), dtype=bool)
-        for row, key in enumerate(self.keys):
+        for index, key in enumerate(self.keys):
             road = roads.roads[key.road]
-            self._varying[row] = len(road.types) > 1 or len(tables.lanes[row].speeds) > 1
+            self._varying[index] = len(road.types) > 1 or len(tables.lanes[index].speeds) > 1
 
     def _link(self) -> None:
         """Store successors by the graph: driving lanes lead to driving lanes, sidewalks to sidewalks."""
         graph, drivable = self.roads.graph, self.tables.lane_drivable
-        for row, key in enumerate(self.keys):
+        for lane, key in enumerate(self.keys):
             ways = graph[key].items() if key in graph else ()
             successors = [
                 other
                 for way, edge in ways
                 if edge["kind"] == "successor"
-                and (drivable[row], self.walkable[row]) == (drivable[other := self.row[way]], self.walkable[other])
+                and (drivable[lane], self.walkable[lane]) == (drivable[other := self.row_of[way]], self.walkable[other])
             ]
             self._ways.append(successors)
             if successors:
-                self.onward[row] = successors[0]
+                self.onward[lane] = successors[0]
             for other in successors:
                 if self.backward[other] < 0:
-                    self.backward[other] = row
+                    self.backward[other] = lane
 
     def _join_neighbors(self) -> None:
         for road in self.tables.roads:
@@ -84,8 +84,8 @@ class TrafficLanes:
                 continue
             for section in road.sections:
                 numbers = [number for number in section.lanes if number]
-                rows = [self.row[LaneKey(road.id, section.index, number)] for number in numbers]
-                for left, right in pairwise(rows):
+                neighbors = [self.row_of[LaneKey(road.id, section.index, number)] for number in numbers]
+                for left, right in pairwise(neighbors):
                     same = self.direction[left] == self.direction[right]
                     if not (same and self.tables.lane_drivable[left] and self.tables.lane_drivable[right]):
                         continue
@@ -113,87 +113,87 @@ class TrafficLanes:
         """Store the ends of lanes without a successor beside continuing lanes. Cars leave them before they are too
         narrow.
         """
-        for row in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction & (self.onward < 0)):
-            beside = [int(other) for other in (self.beside_left[row], self.beside_right[row]) if other >= 0]
+        for lane in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction & (self.onward < 0)):
+            beside = [int(other) for other in (self.beside_left[lane], self.beside_right[lane]) if other >= 0]
             if any(self.onward[other] >= 0 for other in beside):
-                progress = np.linspace(0.0, self.length[row], max(math.ceil(self.length[row] / SAMPLE), 1) + 1)
-                narrow = np.flatnonzero(self.width(np.full(len(progress), row), progress) < NARROWEST)
+                progress = np.linspace(0.0, self.length[lane], max(math.ceil(self.length[lane] / SAMPLE), 1) + 1)
+                narrow = np.flatnonzero(self.width(np.full(len(progress), lane), progress) < NARROWEST)
                 first = narrow[narrow > 0]
-                self.ends_at[row] = progress[first[0]] if first.size else self.length[row]
+                self.ends_at[lane] = progress[first[0]] if first.size else self.length[lane]
 
-    def s(self, row: Integers, progress: Array) -> Array:
+    def s(self, lane: Integers, progress: Array) -> Array:
         """Return s of the road at a progress along lanes."""
-        return self._origin[row] + self.direction[row] * progress
+        return self._origin[lane] + self.direction[lane] * progress
 
-    def progress(self, row: Integers, s: Array) -> Array:
+    def progress(self, lane: Integers, s: Array) -> Array:
         """Return the progress at which lanes pass an s of their road."""
-        return (s - self._origin[row]) * self.direction[row]
+        return (s - self._origin[lane]) * self.direction[lane]
 
-    def width(self, row: Integers, progress: Array) -> Array:
+    def width(self, lane: Integers, progress: Array) -> Array:
         """Return the width of lanes at a progress [m]."""
-        ds = self.s(row, progress) - self.tables.section_start[self.tables.lane_section[row]]
-        return self.tables.width.value(row, ds)
+        ds = self.s(lane, progress) - self.tables.section_start[self.tables.lane_section[lane]]
+        return self.tables.width.value(lane, ds)
 
-    def apart(self, row: Integers, other: Integers, progress: Array) -> Array:
-        """Return the distance of the center of `other` from that of `row` [m], left of the driving direction positive.
+    def apart(self, lane: Integers, other: Integers, progress: Array) -> Array:
+        """Return the distance of the center of `other` from that of `lane` [m], left of the driving direction positive.
 
         Both are lanes of one section.
         """
-        s = self.s(row, progress)
-        return (self.tables.lane_t(other, s)[0] - self.tables.lane_t(row, s)[0]) * self.direction[row]
+        s = self.s(lane, progress)
+        return (self.tables.lane_t(other, s)[0] - self.tables.lane_t(lane, s)[0]) * self.direction[lane]
 
     def of(self, location: LaneLocation) -> tuple[int, float]:
-        """Return row and progress of a location."""
+        """Return lane and progress of a location."""
         index = np.array([self.tables.index[location.road]])
         s = np.array([location.s])
-        row = self.tables.lane_row(index, s, np.array([location.lane]))
-        return int(row[0]), float(self.progress(row, s)[0])
+        lane = self.tables.lane_row(index, s, np.array([location.lane]))
+        return int(lane[0]), float(self.progress(lane, s)[0])
 
-    def chain(self, row: Integers, depth: int) -> Integers:
-        """Return consecutive lanes (N, depth) from rows (N,) on along first branches; -1 beyond an end."""
-        chain = np.full((len(row), depth), -1)
-        chain[:, 0] = row
+    def chain(self, lane: Integers, depth: int) -> Integers:
+        """Return consecutive lanes (N, depth) from lanes (N,) on along first branches; -1 beyond an end."""
+        chain = np.full((len(lane), depth), -1)
+        chain[:, 0] = lane
         for d in range(1, depth):
             before = chain[:, d - 1]
             chain[:, d] = np.where(before >= 0, self.onward[before], -1)
         return chain
 
-    def following(self, row: int) -> list[int]:
+    def following(self, lane: int) -> list[int]:
         """Return the successors of a lane with the same kind of users in the order of the map."""
-        return self._ways[row]
+        return self._ways[lane]
 
-    def stretch(self, row: Integers, progress: Array) -> Array:
+    def stretch(self, lane: Integers, progress: Array) -> Array:
         """Return the path length per meter of progress at the center lines of lanes."""
-        return self.tables.stretch(row, self.s(row, progress))
+        return self.tables.stretch(lane, self.s(lane, progress))
 
-    def tightest(self, row: Integers) -> Array:
-        """Return the maximum curvature of lanes [1/m] for rows of any shape."""
-        curvatures = self._tightest[row]
+    def tightest(self, lane: Integers) -> Array:
+        """Return the maximum curvature of lanes [1/m] of lanes in an array of any shape."""
+        curvatures = self._tightest[lane]
         if np.isnan(curvatures).any():
-            for fresh in np.unique(row[np.isnan(curvatures)]).tolist():
+            for fresh in np.unique(lane[np.isnan(curvatures)]).tolist():
                 count = max(math.ceil(self.length[fresh] / SAMPLE), 1) + 1
-                rows = np.full(count, fresh)
-                s = self.s(rows, np.linspace(0.0, self.length[fresh], count))
-                t, _ = self.tables.lane_t(rows, s)
-                _, _, _, curvature, _ = self.tables.curves.at(self.road[rows], s)
+                same = np.full(count, fresh)
+                s = self.s(same, np.linspace(0.0, self.length[fresh], count))
+                t, _ = self.tables.lane_t(same, s)
+                _, _, _, curvature, _ = self.tables.curves.at(self.road[same], s)
                 self._tightest[fresh] = np.max(np.abs(curvature) / np.maximum(np.abs(1.0 - curvature * t), 0.05))
-            curvatures = self._tightest[row]
+            curvatures = self._tightest[lane]
         return curvatures
 
-    def limits(self, row: Integers, progress: Array) -> Array:
+    def limits(self, lane: Integers, progress: Array) -> Array:
         """Return the speed limits at positions (N,) [m/s]; NaN if the map gives none, inf for `no limit`."""
-        limits = self._limit[row]
-        fresh = np.isnan(limits) | self._varying[row]
+        limits = self._limit[lane]
+        fresh = np.isnan(limits) | self._varying[lane]
         for n in np.flatnonzero(fresh):
-            limit = self._limit_at(int(row[n]), float(progress[n]))
+            limit = self._limit_at(int(lane[n]), float(progress[n]))
             limits[n] = limit
-            if not self._varying[row[n]]:
-                self._limit[row[n]] = limit
+            if not self._varying[lane[n]]:
+                self._limit[lane[n]] = limit
         return np.where(limits < 0.0, np.nan, limits)
 
-    def _limit_at(self, row: int, progress: float) -> float:
+    def _limit_at(self, lane: int, progress: float) -> float:
         """Return the limit at one position, -1 if the map gives none."""
-        key = self.keys[row]
-        s = float(self.s(np.array([row]), np.array([progress]))[0])
+        key = self.keys[lane]
+        s = float(self.s(np.array([lane]), np.array([progress]))[0])
         limit = self.roads.speed_limit(key.road, min(max(s, 0.0), self.roads.roads[key.road].length), key.lane)
         return -1.0 if limit is None else limit

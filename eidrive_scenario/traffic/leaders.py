@@ -24,14 +24,14 @@ FOREIGN, FIXED = -1, -2
 class Occupants:
     """Occupants of lanes.
 
-    row          (M,) lane
+    lane         (M,) running number
     key          (M,) progress that determines the order [m]
     rear, front  (M,) progress of the ends [m]
     speed        (M,) along the lane [m/s]
     owner        (M,) index of the car in the fleet, negative for others
     """
 
-    row: Integers
+    lane: Integers
     key: Array
     rear: Array
     front: Array
@@ -41,7 +41,7 @@ class Occupants:
     @cached_property
     def order(self) -> tuple[Integers, Array]:
         """Indices in the order along the axis of all lanes, and the positions on this axis."""
-        position = self.row * BIG + self.key
+        position = self.lane * BIG + self.key
         order = np.argsort(position, kind="stable")
         return order, position[order]
 
@@ -92,65 +92,65 @@ def find_leaders(
 ) -> Leaders:
     """Return the next occupant ahead of each car on its plan.
 
-    plans     (N, D) rows of the planned lanes, the current one first, -1 beyond the end
+    plans     (N, D) planned lanes, the current one first, -1 beyond the end
     progress  (N,) of the reference points
     front     (N,) distance from the reference point to the front bumper [m]
     own       (N,) indices of the cars in the fleet, by default 0, 1, 2, …
     """
     count, depth = plans.shape
     gap, speed = np.full(count, np.inf), np.zeros(count)
-    if not len(occupants.row) or not count:
+    if not len(occupants.lane) or not count:
         return Leaders(gap, speed)
     order, positions = occupants.order
     me = np.arange(count) if own is None else own
     open_, offset = np.arange(count), -progress
     for d in range(depth):
-        row = plans[open_, d]
-        going = (row >= 0) & (offset < LOOK_AHEAD)
-        open_, offset, row = open_[going], offset[going], row[going]
+        lane = plans[open_, d]
+        going = (lane >= 0) & (offset < LOOK_AHEAD)
+        open_, offset, lane = open_[going], offset[going], lane[going]
         if not open_.size:
             break
         if d == 0:
-            at = positions.searchsorted(row * BIG + progress[open_], side="right")
+            at = positions.searchsorted(lane * BIG + progress[open_], side="right")
         else:
-            at = positions.searchsorted(row * BIG - 1.0, side="left")
+            at = positions.searchsorted(lane * BIG - 1.0, side="left")
         occupant = order[np.minimum(at, len(order) - 1)]
-        hit = (at < len(order)) & (occupants.row[occupant] == row) & (occupants.owner[occupant] != me[open_])
+        hit = (at < len(order)) & (occupants.lane[occupant] == lane) & (occupants.owner[occupant] != me[open_])
         hits = occupant[hit]
         gap[open_[hit]] = offset[hit] + occupants.rear[hits] - front[open_[hit]]
         speed[open_[hit]] = occupants.speed[hits]
-        offset = offset + lanes.length[row]
+        offset = offset + lanes.length[lane]
         open_, offset = open_[~hit], offset[~hit]
     return Leaders(gap, speed)
 
 
 def find_followers(
-    lanes: TrafficLanes, row: Integers, progress: Array, rear: Array, occupants: Occupants, own: Integers
+    lanes: TrafficLanes, lane: Integers, progress: Array, rear: Array, occupants: Occupants, own: Integers
 ) -> Followers:
     """Return the next moving occupant behind positions on lanes, on the lane itself and its predecessors.
 
-    row, progress  (N,) of the reference points
+    lane, progress  (N,) of the reference points
     rear           (N,) distance from the reference point to the rear bumper, negative [m]
     own            (N,) indices of the requesting cars in the fleet
     """
-    count = len(row)
+    count = len(lane)
     gap, number = np.full(count, np.inf), np.full(count, -1)
-    if not len(occupants.row) or not count:
+    if not len(occupants.lane) or not count:
         return Followers(gap, number)
     order, positions = occupants.order
-    open_, offset, at_row = np.arange(count), progress.copy(), row
+    open_, offset, at_lane = np.arange(count), progress.copy(), lane
     for d in range(LOOK_BACK + 1):
-        limit = at_row * BIG + (progress[open_] if d == 0 else lanes.length[at_row] + 1.0)
+        limit = at_lane * BIG + (progress[open_] if d == 0 else lanes.length[at_lane] + 1.0)
         at = positions.searchsorted(limit, side="left" if d == 0 else "right") - 1
         occupant = order[np.maximum(at, 0)]
-        hit = (at >= 0) & (occupants.row[occupant] == at_row) & (occupants.owner[occupant] != own[open_])
+        hit = (at >= 0) & (occupants.lane[occupant] == at_lane) & (occupants.owner[occupant] != own[open_])
         hits = occupant[hit]
         gap[open_[hit]] = offset[hit] + rear[open_[hit]] - occupants.front[hits]
         number[open_[hit]] = hits
-        at_row = lanes.backward[at_row]
-        going = ~hit & (at_row >= 0) & (offset < LOOK_AHEAD)
-        open_, at_row = open_[going], at_row[going]
-        offset = offset[going] + lanes.length[at_row]
+        at_lane = lanes.backward[at_lane]
+        going = ~hit & (at_lane >= 0) & (offset < LOOK_AHEAD)
+        open_, at_lane = open_[going], at_lane[going]
+        offset = offset[going] + lanes.length[at_lane]
         if not open_.size:
             break
     fixed = number >= 0

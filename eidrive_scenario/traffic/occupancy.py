@@ -87,14 +87,14 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     x = (boxes[:, 0, None] + cos * corners[..., 0] - sin * corners[..., 1]).ravel()
     y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
     z = view.position[rows, 2].repeat(len(OUTLINE))
-    row, s, point = lanes.roads.overlapped_lanes(x, y, z)
-    progress = lanes.progress(row, s)
-    heading = lanes.tables.curves.heading(lanes.road[row], s)
+    lane, s, point = lanes.roads.overlapped_lanes(x, y, z)
+    progress = lanes.progress(lane, s)
+    heading = lanes.tables.curves.heading(lanes.road[lane], s)
     vx, vy = view.velocity[rows, :2].T.take(point // len(OUTLINE), axis=1)
-    speed = np.maximum((vx * np.cos(heading) + vy * np.sin(heading)) * lanes.direction[row], 0.0)
+    speed = np.maximum((vx * np.cos(heading) + vy * np.sin(heading)) * lanes.direction[lane], 0.0)
     moving = np.hypot(vx, vy) > STANDING
-    owner = np.full(len(row), FOREIGN)
-    return Occupants(row, progress, progress, progress, speed, owner), set(row[moving].tolist())
+    owner = np.full(len(lane), FOREIGN)
+    return Occupants(lane, progress, progress, progress, speed, owner), set(lane[moving].tolist())
 
 
 class Occupancy:
@@ -104,9 +104,9 @@ class Occupancy:
         self._lanes = lanes
         self._changes = changes
         self._obstacles = Obstacles(lanes)
-        row = np.flatnonzero(np.isfinite(lanes.ends_at))
-        at = lanes.ends_at[row]
-        self._ends = Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
+        lane = np.flatnonzero(np.isfinite(lanes.ends_at))
+        at = lanes.ends_at[lane]
+        self._ends = Occupants(lane, at, at, at, np.zeros(len(lane)), np.full(len(lane), FIXED))
 
     def observe(self, view: WorldView, own: frozenset[str], near: Array | None) -> None:
         """Observe the actors outside the fleet `own`; with positions `near` (K, 2) [m] only those near one of them."""
@@ -120,10 +120,10 @@ class Occupancy:
     def occupants(self, cars: Cars) -> Occupants:
         """Return all occupants: cars (also on lanes that they are leaving), other actors, lane ends."""
         own = np.arange(len(cars))
-        still, lane = self._changes.still_left(cars)
-        indices, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
+        still, left = self._changes.still_left(cars)
+        indices, lane = np.concatenate([own, still]), np.concatenate([cars.lane, left])
         key = cars.progress[indices]
-        mine = Occupants(row, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
+        mine = Occupants(lane, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
         return concatenate_occupants(mine, self._obstacles.occupants, self._ends)
 
     def leaders(self, cars: Cars, occupants: Occupants) -> Leaders:
@@ -141,4 +141,4 @@ class Occupancy:
             nearer = Leaders(gap[still], speed[still]).or_nearer(other)
             gap[still], speed[still] = nearer.gap, nearer.speed
             leaders = Leaders(gap, speed)
-        return Leaders(leaders.gap * self._lanes.stretch(cars.row, cars.progress), leaders.speed)
+        return Leaders(leaders.gap * self._lanes.stretch(cars.lane, cars.progress), leaders.speed)

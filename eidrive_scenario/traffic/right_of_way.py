@@ -44,9 +44,9 @@ class StopLines:
             if not signal.dynamic:
                 continue
             for place in (signal.place, *signal.references):
-                lines += [(row, progress, len(self._signals)) for row, progress in self._on_lanes(place)]
+                lines += [(lane, progress, len(self._signals)) for lane, progress in self._on_lanes(place)]
             self._signals.append(signal.id)
-        self._row = np.array([row for row, _, _ in lines], dtype=np.int64)
+        self._lane = np.array([lane for lane, _, _ in lines], dtype=np.int64)
         self._progress = np.array([progress for _, progress, _ in lines])
         self._signal = np.array([signal for _, _, signal in lines], dtype=np.int64)
         self._shown: tuple[bool, ...] = ()
@@ -60,9 +60,9 @@ class StopLines:
         section = road.section_at(place.s)
         positions = []
         for number in lanes.roads.signal_lanes(place):
-            row = lanes.row[LaneKey(road.id, section.index, number)]
-            progress = float(lanes.progress(np.array([row]), np.array([place.s]))[0])
-            positions.append((row, 0.0 if road.junction_id is not None else progress))
+            lane = lanes.row_of[LaneKey(road.id, section.index, number)]
+            progress = float(lanes.progress(np.array([lane]), np.array([place.s]))[0])
+            positions.append((lane, 0.0 if road.junction_id is not None else progress))
         return positions
 
     def closed(self) -> Occupants:
@@ -71,9 +71,9 @@ class StopLines:
         if shown != self._shown:
             self._shown = shown
             red = np.array(shown, dtype=bool)[self._signal]
-            row, progress = self._row[red], self._progress[red]
-            still = np.zeros(len(row))
-            self._closed = Occupants(row, progress, progress, progress, still, np.full(len(row), FIXED))
+            lane, progress = self._lane[red], self._progress[red]
+            still = np.zeros(len(lane))
+            self._closed = Occupants(lane, progress, progress, progress, still, np.full(len(lane), FIXED))
         return self._closed
 
     def ahead(self, cars: Cars) -> Leaders:
@@ -106,66 +106,66 @@ class Crossings:
         self._lanes = lanes
         self._meeting: dict[int, dict[int, bool]] = {}
         self._by_junction: dict[str, list[int]] = {}
-        for row, key in enumerate(lanes.keys):
+        for lane, key in enumerate(lanes.keys):
             junction = lanes.roads.roads[key.road].junction_id
-            if junction is not None and lanes.tables.lane_drivable[row]:
-                self._by_junction.setdefault(junction, []).append(row)
+            if junction is not None and lanes.tables.lane_drivable[lane]:
+                self._by_junction.setdefault(junction, []).append(lane)
         self.holders: dict[int, dict[str, float]] = {}
         """Cars that hold each lane of a junction, with the progress of their rear on it [m]."""
 
-    def junction_lanes(self, row: int) -> list[int]:
+    def junction_lanes(self, lane: int) -> list[int]:
         """Return all lanes of the junction that contains a lane."""
-        junction = self._lanes.roads.roads[self._lanes.keys[row].road].junction_id
+        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
         return [] if junction is None else self._by_junction.get(junction, [])
 
-    def meeting(self, row: int) -> dict[int, bool]:
+    def meeting(self, lane: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
-        if row in self._meeting:
-            return self._meeting[row]
+        if lane in self._meeting:
+            return self._meeting[lane]
         lines, low, high = self._lines
         conflicts: dict[int, bool] = {}
-        mine = lines[row]
+        mine = lines[lane]
         points = NearestPoints(mine)
-        for other in self.junction_lanes(row):
-            reach = CLEARANCE + max(self._swings[row], self._swings[other])
-            near_by = np.all(low[other] <= high[row] + reach) and np.all(low[row] <= high[other] + reach)
-            if self._lanes.road[other] == self._lanes.road[row] or not near_by:
+        for other in self.junction_lanes(lane):
+            reach = CLEARANCE + max(self._swings[lane], self._swings[other])
+            near_by = np.all(low[other] <= high[lane] + reach) and np.all(low[lane] <= high[other] + reach)
+            if self._lanes.road[other] == self._lanes.road[lane] or not near_by:
                 continue
             line = lines[other]
             together = np.hypot(*(line[0] - mine[0])) < 1.0
             near = np.flatnonzero(points.nearest(line)[0] < (CLEARANCE if together else reach))
             if near.size:
                 conflicts[other] = bool(together and near.max() * SAMPLE < 2.0 * FORK)
-        self._meeting[row] = conflicts
+        self._meeting[lane] = conflicts
         return conflicts
 
     @cached_property
     def _swings(self) -> Array:
         """Width (N,) by which the front of a van swings out farther in the bends of lanes than `CLEARANCE` permits."""
-        rows = np.arange(len(self._lanes.keys))
-        radius = 1.0 / np.maximum(self._lanes.tightest(rows), 1e-6)
+        all_lanes = np.arange(len(self._lanes.keys))
+        radius = 1.0 / np.maximum(self._lanes.tightest(all_lanes), 1e-6)
         return np.maximum(_swing(radius) - _swing(np.array(TIGHT)), 0.0)
 
     @cached_property
     def _lines(self) -> tuple[dict[int, Array], Array, Array]:
         """Center lines (K, 2) of all lanes in junctions, and the corners of their bounding boxes."""
         lanes = self._lanes
-        inside = np.array([row for group in self._by_junction.values() for row in group], dtype=np.int64)
+        inside = np.array([lane for group in self._by_junction.values() for lane in group], dtype=np.int64)
         counts = np.maximum((lanes.length[inside] / SAMPLE).astype(np.int64), 1) + 1
-        rows = np.repeat(inside, counts)
-        step = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
-        progress = lanes.length[rows] * step / np.repeat(counts - 1, counts)
-        poses = lanes.tables.lane_poses(rows, lanes.s(rows, progress), np.zeros(len(rows)))
+        lane_of = np.repeat(inside, counts)
+        step = np.arange(len(lane_of)) - np.repeat(np.cumsum(counts) - counts, counts)
+        progress = lanes.length[lane_of] * step / np.repeat(counts - 1, counts)
+        poses = lanes.tables.lane_poses(lane_of, lanes.s(lane_of, progress), np.zeros(len(lane_of)))
         points = np.column_stack([poses.x, poses.y])
         low, high = np.full((len(lanes.keys), 2), np.inf), np.full((len(lanes.keys), 2), -np.inf)
-        np.minimum.at(low, rows, points)
-        np.maximum.at(high, rows, points)
+        np.minimum.at(low, lane_of, points)
+        np.maximum.at(high, lane_of, points)
         pieces = np.split(points, np.cumsum(counts)[:-1])
         return dict(zip(inside.tolist(), pieces, strict=True)), low, high
 
-    def free(self, row: int, name: str, blocked: set[int]) -> bool:
+    def free(self, lane: int, name: str, blocked: set[int]) -> bool:
         """Return True if `name` may hold a lane: no car holds and nothing blocks a lane in conflict with it."""
-        for other, only_fork in self.meeting(row).items():
+        for other, only_fork in self.meeting(lane).items():
             if other in blocked:
                 return False
             for holder, rear in self.holders.get(other, {}).items():
@@ -173,17 +173,17 @@ class Crossings:
                     return False
         return True
 
-    def take(self, row: int, name: str) -> None:
+    def take(self, lane: int, name: str) -> None:
         """Let `name` hold a lane."""
-        self.holders.setdefault(row, {})[name] = -np.inf
+        self.holders.setdefault(lane, {})[name] = -np.inf
 
-    def holds(self, name: str, row: int) -> bool:
+    def holds(self, name: str, lane: int) -> bool:
         """Return whether `name` holds a lane."""
-        return name in self.holders.get(row, ())
+        return name in self.holders.get(lane, ())
 
-    def release(self, name: str, row: int) -> None:
+    def release(self, name: str, lane: int) -> None:
         """Release a lane that `name` has left."""
-        self.holders.get(row, {}).pop(name, None)
+        self.holders.get(lane, {}).pop(name, None)
 
     def forget(self, name: str) -> None:
         """Release all lanes that `name` holds."""
@@ -248,9 +248,9 @@ class RightOfWay:
                 )
         kept_free: set[int] = set()
         for since, _, name, index, passage in sorted(asking):
-            if all(self._crossings.free(row, name, moving | kept_free) for row in passage):
-                for row in passage:
-                    self._crossings.take(row, name)
+            if all(self._crossings.free(lane, name, moving | kept_free) for lane in passage):
+                for lane in passage:
+                    self._crossings.take(lane, name)
                 cars.granted[index] |= np.isin(cars.plan[index], passage)
                 cars.asked[index] = np.nan
             elif time - since > PATIENCE:
@@ -278,9 +278,9 @@ class RightOfWay:
         """Return the lanes of the next junction that a car may not enter yet, up to its last connecting road."""
         lanes = self._lanes
         passage: list[int] = []
-        for row, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):
-            if row >= 0 and lanes.in_junction[row] and not granted:
-                passage.append(row)
+        for lane, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):
+            if lane >= 0 and lanes.in_junction[lane] and not granted:
+                passage.append(lane)
             elif passage:
                 return passage
         while (ways := lanes.following(passage[-1])) and lanes.road[ways[0]] == lanes.road[passage[-1]]:

@@ -201,12 +201,12 @@ def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
     if is_level and _angle(roads, location, ego.yaw) <= ALIGNED:
         return location
     height = None if roads.is_level else np.array([z])
-    rows, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
+    lanes, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
     keys = [key for key, _ in roads.tables.lane_keys()]
     candidates = [
-        roads.location(keys[row].road, keys[row].lane, s)
-        for row, s in zip(rows.tolist(), along.tolist(), strict=True)
-        if roads.tables.lane_drivable[row]
+        roads.location(keys[lane].road, keys[lane].lane, s)
+        for lane, s in zip(lanes.tolist(), along.tolist(), strict=True)
+        if roads.tables.lane_drivable[lane]
     ]
     candidates = [candidate for candidate in candidates if _is_level(roads, candidate, z)]
     best = min(candidates, key=lambda candidate: _angle(roads, candidate, ego.yaw), default=location)

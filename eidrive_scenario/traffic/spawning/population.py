@@ -112,9 +112,9 @@ class Population:
         if participant.walks:
             return np.full(len(sites), WALKING)
         lanes = self.fleet.lanes
-        limit = lanes.limits(sites.row, sites.progress)
+        limit = lanes.limits(sites.lane, sites.progress)
         limit = np.where(np.isfinite(limit), limit, FREE)
-        bend = np.sqrt(participant.driver.lateral_acceleration / np.maximum(lanes.tightest(sites.row), 1e-6))
+        bend = np.sqrt(participant.driver.lateral_acceleration / np.maximum(lanes.tightest(sites.lane), 1e-6))
         return np.asarray(np.minimum(np.minimum(limit, bend), participant.spec.max_speed))
 
     def sites(self, names: list[str]) -> SpawnSites:
@@ -148,7 +148,7 @@ class Population:
         ignores = participant.ignore_lights > 0.0 and bool(rng.uniform() < participant.ignore_lights)
         placement = self.fleet.add_at(
             spec,
-            int(some.row[n]),
+            int(some.lane[n]),
             float(some.progress[n]),
             speed=float(speed[n]),
             desired_speed=WALKING * factor if participant.walks else None,

@@ -37,9 +37,9 @@ AIR = 0.5
 
 @dataclass(frozen=True)
 class SpawnSites:
-    """Sites (K,) along lanes: row and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
+    """Sites (K,): lane and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
 
-    row: Integers
+    lane: Integers
     progress: Array
     x: Array
     y: Array
@@ -47,22 +47,22 @@ class SpawnSites:
     width: Array
 
     @classmethod
-    def along(cls, lanes: TrafficLanes, rows: Integers, spacing: float = SPACING) -> SpawnSites:
+    def along(cls, lanes: TrafficLanes, selected: Integers, spacing: float = SPACING) -> SpawnSites:
         """Return equidistant sites along lanes."""
-        counts = np.maximum(np.floor(lanes.length[rows] / spacing).astype(np.int64), 1)
-        row = np.repeat(rows, counts)
-        number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return cls.at(lanes, row, (number + 0.5) * lanes.length[row] / np.repeat(counts, counts))
+        counts = np.maximum(np.floor(lanes.length[selected] / spacing).astype(np.int64), 1)
+        lane = np.repeat(selected, counts)
+        number = np.arange(len(lane)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return cls.at(lanes, lane, (number + 0.5) * lanes.length[lane] / np.repeat(counts, counts))
 
     @classmethod
-    def at(cls, lanes: TrafficLanes, row: Integers, progress: Array) -> SpawnSites:
-        """Return sites (K,) at given rows and progress."""
-        poses = lanes.tables.lane_poses(row, lanes.s(row, progress), np.zeros(len(row)))
-        heading = poses.h + np.where(lanes.direction[row] > 0, 0.0, np.pi)
-        return cls(row, progress, poses.x, poses.y, heading, lanes.width(row, progress))
+    def at(cls, lanes: TrafficLanes, lane: Integers, progress: Array) -> SpawnSites:
+        """Return sites (K,) at given lanes and progress."""
+        poses = lanes.tables.lane_poses(lane, lanes.s(lane, progress), np.zeros(len(lane)))
+        heading = poses.h + np.where(lanes.direction[lane] > 0, 0.0, np.pi)
+        return cls(lane, progress, poses.x, poses.y, heading, lanes.width(lane, progress))
 
     def __len__(self) -> int:
-        return len(self.row)
+        return len(self.lane)
 
     def subset(self, which: Integers | Bools) -> SpawnSites:
         """Return a subset of the sites."""
@@ -86,14 +86,14 @@ class SpawnAreas:
     @cached_property
     def driving(self) -> SpawnSites:
         """Sites for vehicles, without lanes that end."""
-        return SpawnSites.along(self._lanes, self._rows(walks=False))
+        return SpawnSites.along(self._lanes, self._lanes_for(walks=False))
 
     @cached_property
     def walking(self) -> SpawnSites:
         """Sites for pedestrians."""
-        return SpawnSites.along(self._lanes, self._rows(walks=True))
+        return SpawnSites.along(self._lanes, self._lanes_for(walks=True))
 
-    def _rows(self, *, walks: bool) -> Integers:
+    def _lanes_for(self, *, walks: bool) -> Integers:
         lanes = self._lanes
         fit = lanes.walkable if walks else lanes.tables.lane_drivable & np.isinf(lanes.ends_at)
         return np.flatnonzero(fit & ~lanes.in_junction)
@@ -104,7 +104,7 @@ class SpawnAreas:
         inside = sites.subset(covers(sites))
         if len(inside):
             return inside
-        sites = SpawnSites.along(self._lanes, self._rows(walks=participant.walks), FINE_SPACING)
+        sites = SpawnSites.along(self._lanes, self._lanes_for(walks=participant.walks), FINE_SPACING)
         return sites.subset(covers(sites))
 
     def for_body(self, participant: Participant) -> SpawnSites:
@@ -122,9 +122,9 @@ def sites_within_radius(
     distance = np.hypot(sites.x - x, sites.y - y)
     near = sites.subset(distance <= radius)
     if location is not None:
-        row, progress = lanes.of(location)
-        if np.any(sites.row == row):
-            here = SpawnSites.at(lanes, np.array([row]), np.array([progress]))
+        lane, progress = lanes.of(location)
+        if np.any(sites.lane == lane):
+            here = SpawnSites.at(lanes, np.array([lane]), np.array([progress]))
             return near.concatenate(here)
     if not len(near) and len(sites) and distance.min() <= REACH:
         return sites.subset(np.array([int(np.argmin(distance))]))
@@ -149,15 +149,15 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     front, rear = np.full(count, spec.offset[0] + half), np.full(count, spec.offset[0] - half)
     occupants = fleet.occupants()
     no_owner = np.full(count, -9)
-    leaders = find_leaders(lanes, lanes.chain(sites.row, PLANNED + 1), sites.progress, front, occupants, own=no_owner)
-    followers = find_followers(lanes, sites.row, sites.progress, rear, occupants, no_owner)
+    leaders = find_leaders(lanes, lanes.chain(sites.lane, PLANNED + 1), sites.progress, front, occupants, own=no_owner)
+    followers = find_followers(lanes, sites.lane, sites.progress, rear, occupants, no_owner)
     own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))
     braking = own.response(speed, np.maximum(speed, 1.0), leaders.gap, speed - leaders.speed)
     behind = followers.number
-    own_driver = (behind >= 0) & (occupants.owner[behind] > FOREIGN) if len(occupants.row) else behind >= 0
+    own_driver = (behind >= 0) & (occupants.owner[behind] > FOREIGN) if len(occupants.lane) else behind >= 0
     table = np.repeat(Drivers.of([fleet.driver]).table, count, axis=0)
     table[own_driver] = fleet.drivers.table[occupants.owner[behind[own_driver]]]
-    v = np.where(behind >= 0, occupants.speed[behind], 0.0) if len(occupants.row) else np.zeros(count)
+    v = np.where(behind >= 0, occupants.speed[behind], 0.0) if len(occupants.lane) else np.zeros(count)
     pressed = Drivers(table).response(v, np.maximum(v, 1.0), followers.gap, v - speed)
     fit = is_wide_enough(sites, participant) & (braking >= -driver.deceleration) & (leaders.gap > driver.standstill_gap)
     fit &= (behind < 0) | ((pressed >= -Drivers(table).deceleration) & (followers.gap > driver.standstill_gap))
@@ -210,7 +210,7 @@ def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers
 
     def covers(sites: SpawnSites) -> Bools:
         covered = np.zeros(len(sites), dtype=bool)
-        s, road, number = lanes.s(sites.row, sites.progress), lanes.road[sites.row], lanes.tables.lane_id[sites.row]
+        s, road, number = lanes.s(sites.lane, sites.progress), lanes.road[sites.lane], lanes.tables.lane_id[sites.lane]
         for stretch in stretches:
             here = (road == lanes.tables.index[stretch.road]) & (s >= stretch.low) & (s <= stretch.high)
             covered |= here & np.isin(number, stretch.lanes) if stretch.lanes else here

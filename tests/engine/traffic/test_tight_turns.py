@@ -32,6 +32,6 @@ def test_tight_turn_conflicts_with_the_lane_beside_its_exit(radius: float, confl
     )
     lanes = TrafficLanes(roads)
     crossings = Crossings(lanes)
-    straight, turn = (lanes.row[LaneKey(road, 0, -1)] for road in ("1", "2"))
+    straight, turn = (lanes.row_of[LaneKey(road, 0, -1)] for road in ("1", "2"))
     assert (turn in crossings.meeting(straight)) is conflict
     assert (straight in crossings.meeting(turn)) is conflict

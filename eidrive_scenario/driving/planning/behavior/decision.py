@@ -85,7 +85,7 @@ def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, t
 def _threat(options: Options, emergency: int) -> int | None:
     """Return the hypothesis for which the vehicle brakes in an emergency: that with which the first other proposal
     collides, else the one for which it brakes."""
-    others = (row for row, option in enumerate(options.options) if not option.proposal.is_emergency)
+    others = (index for index, option in enumerate(options.options) if not option.proposal.is_emergency)
     other = next(others, emergency)
     threat = int(options.evaluation.cause[other])
     if threat >= 0:
@@ -254,7 +254,7 @@ class Decider:
 
     def _with_brake(self, options: Options, best: int) -> int:
         """Return the best proposal, or emergency braking if it was active and the best one still brakes hard."""
-        emergencies = {options.options[row].proposal.deceleration: row for row in options.emergencies}
+        emergencies = {options.options[index].proposal.deceleration: index for index in options.emergencies}
         if self._braking in emergencies and not options.options[best].proposal.is_emergency:
             steps = np.diff(options.rolled.speed[best]) / np.diff(self._times)
             hardest = float(steps[: round(URGENT / self._times[1])].min())
@@ -277,9 +277,9 @@ class Decider:
         decision = self._decision(situation, certain, stop)
         return msgspec.structs.replace(decision, reason=reason, objects=situation.rows_of(owner))
 
-    def _acceleration(self, options: Options, row: int) -> float:
+    def _acceleration(self, options: Options, index: int) -> float:
         """Return the acceleration of a proposal in the first step [m/s²]."""
-        speed = options.rolled.speed[row]
+        speed = options.rolled.speed[index]
         return float(speed[1] - speed[0]) / float(self._times[1] - self._times[0])
 
     def _continued(self, situation: Situation) -> LateralProfile:

@@ -322,16 +322,16 @@ def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:
     """Return the objects that are outside the way (N, K) now and inside it later, ahead of `front` [m]."""
     entering = []
     meets: Bools = np.logical_or.reduce(way & scene.crosses, axis=1) | (np.logical_or.reduce(way, axis=1) & ~way[:, 0])
-    for row in (meets & ~scene.behind).nonzero()[0].tolist():
-        steps = np.flatnonzero(way[row])
+    for hypothesis in (meets & ~scene.behind).nonzero()[0].tolist():
+        steps = np.flatnonzero(way[hypothesis])
         first = int(steps[0])
-        crosses = bool(scene.crosses[row, steps].any())
-        run = int(np.argmin(np.append(way[row, first:], False))) + first - 1
+        crosses = bool(scene.crosses[hypothesis, steps].any())
+        run = int(np.argmin(np.append(way[hypothesis, first:], False))) + first - 1
         occupied = slice(first, run + 1)
-        if float(scene.front[row, occupied].max()) < front:
+        if float(scene.front[hypothesis, occupied].max()) < front:
             continue
-        s = float(scene.rear[row, occupied].min())
-        entering.append(Conflict(row, first, run, s, crosses))
+        s = float(scene.rear[hypothesis, occupied].min())
+        entering.append(Conflict(hypothesis, first, run, s, crosses))
     return entering
 
 
@@ -402,8 +402,8 @@ def leading(scene: Surroundings, way: Bools, conflicts: list[Conflict], center: 
     leads = way & scene.may_lead
     if proposal.precedence == "all":
         for conflict in conflicts:
-            row = conflict.hypothesis
-            is_oncoming = float(scene.speed[row, conflict.first]) < -ONCOMING_SPEED
-            if not conflict.crosses and not is_oncoming and float(scene.s[row, 0]) > center:
-                leads[row, : conflict.first] = True
+            hypothesis = conflict.hypothesis
+            is_oncoming = float(scene.speed[hypothesis, conflict.first]) < -ONCOMING_SPEED
+            if not conflict.crosses and not is_oncoming and float(scene.s[hypothesis, 0]) > center:
+                leads[hypothesis, : conflict.first] = True
     return np.asarray(leads)

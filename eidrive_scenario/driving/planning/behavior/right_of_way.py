@@ -79,13 +79,13 @@ class JunctionRules:
         heading = np.arctan2(step[:, 1], step[:, 0])
         inside: list[set[str]] = [set() for _ in points]
         covered: list[tuple[int, str, str]] = []
-        rows, _, owners = self._roads.overlapped_lanes(points[:, 0].copy(), points[:, 1].copy(), heights)
-        for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
-            junction = self._junction[row]
+        lanes, _, owners = self._roads.overlapped_lanes(points[:, 0].copy(), points[:, 1].copy(), heights)
+        for lane, owner in zip(lanes.tolist(), owners.tolist(), strict=True):
+            junction = self._junction[lane]
             if junction is not None:
                 inside[owner].add(junction)
                 if junction in self._priorities:
-                    covered.append((owner, junction, self._road[row]))
+                    covered.append((owner, junction, self._road[lane]))
         signs = list(places_along(self._lines_near(points), points, heights))
         passages = [self._passage(*run, along, heading, signs) for run in _runs(inside)]
         if not covered:

@@ -205,7 +205,7 @@ class Roller:
             if leaders[step] and (step < ROLLED or (acceleration > least and (speed > 0.0 or acceleration > 0.0))):
                 hardest, slowest, leader = NEGLIGIBLE, math.inf, FREE
                 # In the order of their rears, one that is not slower than a nearer one has no effect.
-                for rear, row, center, other in leaders[step]:
+                for rear, hypothesis, center, other in leaders[step]:
                     if other < slowest and center > s:
                         slowest = other
                         wish = speed * time_gap + speed * (speed - other) / twice_root
@@ -214,7 +214,7 @@ class Roller:
                         share = gap / (room if room > LEAST_GAP else LEAST_GAP)
                         slowing = greatest * (share * share)
                         if slowing > hardest:
-                            hardest, leader = slowing, row
+                            hardest, leader = slowing, hypothesis
                 if leader != FREE:
                     bound = desired if desired > speed else speed
                     share = speed / (bound if bound > LEAST_SPEED else LEAST_SPEED)
@@ -255,11 +255,17 @@ class _Leaders:
         leaders = self._known.get(number)
         if leaders is None:
             leaders = self._known[number] = [[] for _ in range(leads.shape[1])]
-            for row in np.logical_or.reduce(leads, axis=1).nonzero()[0].tolist():
-                columns = (leaders, leads[row].tolist(), self._rears[row], self._centers[row], self._speeds[row])
+            for hypothesis in np.logical_or.reduce(leads, axis=1).nonzero()[0].tolist():
+                columns = (
+                    leaders,
+                    leads[hypothesis].tolist(),
+                    self._rears[hypothesis],
+                    self._centers[hypothesis],
+                    self._speeds[hypothesis],
+                )
                 for ahead, leads_now, rear, center, speed in zip(*columns, strict=True):
                     if leads_now:
-                        ahead.append((rear, row, center, speed))
+                        ahead.append((rear, hypothesis, center, speed))
             for ahead in leaders:
                 if len(ahead) > 1:
                     ahead.sort()

@@ -125,15 +125,15 @@ def evaluate(
     held = waiting | refused
     may_go = any(option.profile.uses_oncoming and option.proposal.profile not in held for option in options)
     values: list[float] = score.tolist()
-    for row, option in enumerate(options):
+    for index, option in enumerate(options):
         proposal, profile = option.proposal, option.profile
         switches = profile.name not in kept
-        values[row] -= WEIGHTS.slower * (1.0 - proposal.share) + WEIGHTS.gentle * proposal.is_gentle
+        values[index] -= WEIGHTS.slower * (1.0 - proposal.share) + WEIGHTS.gentle * proposal.is_gentle
         if proposal.profile in waiting:
-            values[row] += 0.0 if may_go else WEIGHTS.view
+            values[index] += 0.0 if may_go else WEIGHTS.view
             continue
         lanes = WEIGHTS.aside * (profile.side != 0) + WEIGHTS.oncoming * profile.uses_oncoming
-        values[row] -= lanes + WEIGHTS.switch * switches + WEIGHTS.refused * (proposal.profile in refused)
+        values[index] -= lanes + WEIGHTS.switch * switches + WEIGHTS.refused * (proposal.profile in refused)
     return Evaluation(np.array(values), collision, risk, impact, cause)
 
 
@@ -278,16 +278,16 @@ class Options(msgspec.Struct, frozen=True):
     @property
     def gentle(self) -> int:
         """Index of the gentle stop."""
-        return next(row for row, option in enumerate(self.options) if option.proposal.is_gentle)
+        return next(index for index, option in enumerate(self.options) if option.proposal.is_gentle)
 
     @property
     def emergencies(self) -> list[int]:
         """Indices of emergency braking on the current course, by deceleration."""
-        return [row for row, option in enumerate(self.options) if option.proposal.is_emergency]
+        return [index for index, option in enumerate(self.options) if option.proposal.is_emergency]
 
-    def name_of(self, row: int) -> str:
+    def name_of(self, index: int) -> str:
         """Return the maneuver of an option."""
-        return self.options[row].profile.name
+        return self.options[index].profile.name
 
     def best(self, profiles: int | None = None, name: str | None = None) -> int:
         """Return the index of the option with the highest score, among those along the first `profiles` or of one
@@ -316,10 +316,10 @@ class Options(msgspec.Struct, frozen=True):
             return -1
         causes = [self.evaluation.cause[best], self.evaluation.cause[self.gentle], *self.rolled.cause[best]]
         for cause in causes:
-            row = int(cause)
-            if row <= WALL:
-                owner = self.options[best].walls[WALL - row].owner
-                row = -1 if owner is None else owner
-            if row >= 0 and not certain[row]:
-                return row
+            hypothesis = int(cause)
+            if hypothesis <= WALL:
+                owner = self.options[best].walls[WALL - hypothesis].owner
+                hypothesis = -1 if owner is None else owner
+            if hypothesis >= 0 and not certain[hypothesis]:
+                return hypothesis
         return -1
