@@ -40,7 +40,7 @@ def areas_off_road(
             if gap > MARGIN:
                 what = setting.replace("_", " ")
                 which = f"the {what}" if len(planner.areas) == 1 else f"{what} {number}"
-                source, line = _place(scenario, name, setting)
+                source, line = _source_and_line(scenario, name, setting)
                 yield Diagnostic(
                     f"{which} of {name!r} never holds a vehicle on a road: it lies {gap:.0f} m off the nearest one",
                     "give world coordinates [m] in the frame of the road network: [x0, x1, y0, y1]",
@@ -63,7 +63,7 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
     return max(0.0, nearest - reach)
 
 
-def _place(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
+def _source_and_line(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
     """Return file and line of the property with the areas of a station."""
     for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
         for entry in property_entries(controller):

@@ -86,7 +86,7 @@ class CatalogLibrary:
         self.entries: dict[model.CatalogReference, model.Element] = {}
         self._parameters = parameters
         self._collector = collector
-        self._places: dict[str, Path] = {}
+        self._locations: dict[str, Path] = {}
         for name, location in vars(locations).items() if locations else ():
             if (
                 isinstance(location, model.CatalogLocation)
@@ -96,8 +96,8 @@ class CatalogLibrary:
                 kind = "".join(
                     word.capitalize() for word in name.removesuffix("_catalog").split("_")
                 )  # As `MiscObject`
-                self._places[kind] = resolve_path(location.directory.path, folder)
-        self.folders: dict[Path, Listing] = {path: listing_of(path) for path in self._places.values()}
+                self._locations[kind] = resolve_path(location.directory.path, folder)
+        self.folders: dict[Path, Listing] = {path: listing_of(path) for path in self._locations.values()}
         """Locations of catalogs with their listings, before any file in them is read."""
         self._is_complete = True
         self._circular: set[model.CatalogReference] = set()
@@ -236,10 +236,10 @@ class CatalogLibrary:
         self._is_complete = False
         folders = {
             folder
-            for location in self._places.values()
+            for location in self._locations.values()
             if is_folder(location)
             for folder in _listing(location.parent)
-            if is_folder(folder) and folder not in self._places.values()
+            if is_folder(folder) and folder not in self._locations.values()
         }
         for folder in sorted(folders):
             path = folder / f"{name}.xosc"
@@ -251,8 +251,8 @@ class CatalogLibrary:
 
     def _ordered_places(self, kinds: Iterable[type[model.Element]]) -> list[Path]:
         """Return the folders for these kinds, then all others, as files may use one folder for several kinds."""
-        own = [self._places[kind.__name__] for kind in kinds if kind.__name__ in self._places]
-        return list(dict.fromkeys([*own, *self._places.values()]))
+        own = [self._locations[kind.__name__] for kind in kinds if kind.__name__ in self._locations]
+        return list(dict.fromkeys([*own, *self._locations.values()]))
 
     def _file(self, path: Path) -> CatalogFile | None:
         """Return the catalog in a file; None if it has none or is unreadable, with the errors in `_unreadable`."""

@@ -58,7 +58,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
     return {name: repr(distribution.draw(seed, name)) for name, distribution in variations(scenario).items()}
 
 
-_known: WeakKeyDictionary[Scenario, Mapping[str, Distribution]] = WeakKeyDictionary()
+_variations: WeakKeyDictionary[Scenario, Mapping[str, Distribution]] = WeakKeyDictionary()
 """Variations of scenarios without errors."""
 
 
@@ -68,9 +68,9 @@ def variations(scenario: Scenario) -> Mapping[str, Distribution]:
     The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise InputError with
     file and line of every error in the commands.
     """
-    distributions = _known.get(scenario)
+    distributions = _variations.get(scenario)
     if distributions is None:
-        distributions = _known[scenario] = _read_variations(scenario)
+        distributions = _variations[scenario] = _read_variations(scenario)
     return distributions
 
 

@@ -121,7 +121,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
     wanted = properties.get(SHAPE_PROPERTY)
     if wanted is not None:
         if wanted not in SHAPES:
-            line, source = _place(entity, SHAPE_PROPERTY)
+            line, source = _line_and_source(entity, SHAPE_PROPERTY)
             raise ScenarioError(Diagnostic(f"unknown shape {wanted!r}", suggestion(wanted, SHAPES), source, line))
         return wanted
     if isinstance(entity, Pedestrian):
@@ -154,12 +154,12 @@ def _color(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
     if text is None:
         return None
     if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
-        line, source = _place(entity, COLOR_PROPERTY)
+        line, source = _line_and_source(entity, COLOR_PROPERTY)
         raise ScenarioError(Diagnostic(f"color {text!r} is invalid", "write it as #rrggbb", source, line))
     red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return red, green, blue
 
 
-def _place(entity: Vehicle | Pedestrian | MiscObject, name: str) -> tuple[int, str]:
+def _line_and_source(entity: Vehicle | Pedestrian | MiscObject, name: str) -> tuple[int, str]:
     entries = (entry for entry in property_entries(entity) if entry.name == name)
     return next(((entry.line, entry.source) for entry in entries), (entity.line, entity.source))

@@ -163,11 +163,11 @@ class TrafficSourceAction(TrafficInstanceAction):
 
     def build_generator(self) -> traffic.Source:
         """Return the source. Raise ScenarioError if no lane is near."""
-        place: ResolvedPosition = resolve_position(self.action.position, self.context, None)
+        position: ResolvedPosition = resolve_position(self.action.position, self.context, None)
         lanes, ground = self.background.fleet.lanes, self.background.population.ground
-        x, y, radius = place.pose.x, place.pose.y, self.action.radius
+        x, y, radius = position.pose.x, position.pose.y, self.action.radius
         driving, walking = (
-            traffic.sites_within_radius(lanes, sites, x, y, radius, place.location)
+            traffic.sites_within_radius(lanes, sites, x, y, radius, position.location)
             for sites in (ground.driving, ground.walking)
         )
         if not len(driving) and not len(walking):
@@ -175,7 +175,6 @@ class TrafficSourceAction(TrafficInstanceAction):
         return traffic.Source(
             self.traffic_name,
             self.background.key(self.traffic_name),
-            place=(x, y),
             sites=lambda participant: walking if participant.walks else driving,
             rate=self.action.rate,
             mixture=self._traffic_mix,
@@ -203,11 +202,11 @@ class TrafficSinkAction(TrafficInstanceAction):
 
     def build_generator(self) -> traffic.Sink:
         """Return the sink."""
-        place = resolve_position(self.action.position, self.context, None)
+        position = resolve_position(self.action.position, self.context, None)
         return traffic.Sink(
             self.traffic_name,
             self.background.key(self.traffic_name),
-            place=(place.pose.x, place.pose.y),
+            position=(position.pose.x, position.pose.y),
             radius=self.action.radius,
             rate=float("inf") if self.action.rate is None else self.action.rate,
             categories=None if self._traffic_mix is None else self._traffic_mix.categories,

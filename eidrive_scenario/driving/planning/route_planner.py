@@ -104,7 +104,7 @@ class RoutePlanner(Planner):
         self._first_speed: float | None = None
         self._stops = SignalStops(roads, spec) if settings.obey_signals else None
         self._path_of_stops: PlannedPath | None = None
-        self._place: LaneLocation | None = None
+        self._location: LaneLocation | None = None
 
     def observe_signals(self, signals: Sequence[SignalReading]) -> None:
         if self._stops is not None:
@@ -189,9 +189,9 @@ class RoutePlanner(Planner):
     def _speed_limit(self, ego: EgoState, roads: RoadNetwork) -> float:
         """Return the speed limit of the lane at the vehicle [m/s], within the limit of the vehicle."""
         x, y, _ = ego.position.tolist()
-        before = self._place
-        self._place = lane_below(roads, ego) if before is None else roads.locate_at(x, y, before)
-        here = self._place
+        before = self._location
+        self._location = lane_below(roads, ego) if before is None else roads.locate_at(x, y, before)
+        here = self._location
         limit = None if here is None else roads.speed_limit(here.road, here.s, here.lane)
         return min(assumed_speed(limit), self.spec.max_speed)
 

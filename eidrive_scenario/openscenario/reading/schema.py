@@ -98,9 +98,9 @@ class Rules(msgspec.Struct, frozen=True):
 def rules(cls: type[Element], version: Version) -> Rules:
     """Return the rules of a class in a version."""
     key = (cls, version)
-    content = _KNOWN.get(key)
+    content = _RULES.get(key)
     if content is None:
-        content = _KNOWN[key] = _read(cls, version)
+        content = _RULES[key] = _read(cls, version)
     return content
 
 
@@ -241,7 +241,7 @@ def _describe_group(group: Group) -> str:
     return (" or " if group.exclusive else ", ").join(describe(part) for part in group.parts)
 
 
-_KNOWN: dict[tuple[type[Element], Version], Rules] = {}
+_RULES: dict[tuple[type[Element], Version], Rules] = {}
 """Cache of `rules`; mypy rejects classes of dataclasses as arguments of a function with functools.cache."""
 
 

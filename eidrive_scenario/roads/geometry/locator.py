@@ -241,7 +241,7 @@ class Locator:
         end = length
         open_: Integers | None = None
         """Points whose s is not found yet; None for all."""
-        found_s, found_t, found_along, last_change = s, s, s, s
+        refined_s, refined_t, refined_along, last_change = s, s, s, s
         for repetition in range(10):
             px, py, cos, sin, curvature, speed = frame if repetition == 0 else self._frame(road, s)
             dx, dy = x - px, y - py
@@ -258,9 +258,9 @@ class Locator:
             moved = np.minimum(np.maximum(s + step, 0.0), length)
             change = np.abs(moved - s)
             if open_ is None:
-                found_s, found_t, found_along, last_change = moved, t, along, change
+                refined_s, refined_t, refined_along, last_change = moved, t, along, change
             else:
-                found_s[open_], found_t[open_], found_along[open_], last_change[open_] = moved, t, along, change
+                refined_s[open_], refined_t[open_], refined_along[open_], last_change[open_] = moved, t, along, change
             going = (change > 1e-6).nonzero()[0]
             if going.size == len(s):
                 s = moved
@@ -270,11 +270,11 @@ class Locator:
             open_ = going if open_ is None else open_[going]
             road, s, x, y, length = road[going], moved[going], x[going], y[going], length[going]
         beyond = np.zeros(len(end))
-        at_end = ((found_s <= 0.0) | (found_s >= end)).nonzero()[0]
+        at_end = ((refined_s <= 0.0) | (refined_s >= end)).nonzero()[0]
         if at_end.size:
-            off = np.abs(found_along[at_end])
+            off = np.abs(refined_along[at_end])
             beyond[at_end] = np.where(off > 1e-6, off, 0.0)
-        return found_s, found_t, beyond, last_change == 0.0
+        return refined_s, refined_t, beyond, last_change == 0.0
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:

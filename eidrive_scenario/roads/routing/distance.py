@@ -25,7 +25,7 @@ class RoadDistances:
         self._roads = roads
         self._links = links
         self._speed = speed
-        self._found: dict[tuple[str, int, Chain], dict[str, tuple[float, float, int]]] = {}
+        self._reached: dict[tuple[str, int, Chain], dict[str, tuple[float, float, int]]] = {}
 
     def between(
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", only: int = 0
@@ -78,7 +78,7 @@ class RoadDistances:
 
     def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
         """Return cost, length between [m] and direction of entry of each road reached from `road` in `direction`."""
-        cached = self._found.get((road, direction, by))
+        cached = self._reached.get((road, direction, by))
         if cached is not None:
             return cached
         reached: dict[str, tuple[float, float, int]] = {}
@@ -97,7 +97,7 @@ class RoadDistances:
             for other, onward in self._links.beyond_road(number, way):
                 if (other, onward) not in done:
                     heapq.heappush(queue, (cost + self._entering(number, other, by), gap + length, other, onward))
-        self._found[road, direction, by] = reached
+        self._reached[road, direction, by] = reached
         return reached
 
 

@@ -238,7 +238,7 @@ class Builder:
         behaviours = []
         for leaf, parent in _leaves(wrapper, wrapper):
             name = _registered_name(leaf, self._actions)
-            if not self._known(name, self._actions, leaf, f"{name} is not supported"):
+            if not self._is_registered(name, self._actions, leaf, f"{name} is not supported"):
                 continue
             self.extensions.add((self._actions.kind, name))
             try:
@@ -282,7 +282,7 @@ class Builder:
         by_entity = entry.by_entity_condition
         leaf = (entry.chosen() if by_entity is None else by_entity.entity_condition).chosen()
         name = _registered_name(leaf, self._conditions)
-        if not self._known(name, self._conditions, leaf, f"{name} is not supported"):
+        if not self._is_registered(name, self._conditions, leaf, f"{name} is not supported"):
             return None
         self.extensions.add((self._conditions.kind, name))
         make = self._conditions.load(name, Condition)
@@ -301,7 +301,7 @@ class Builder:
             raise type_error
         return conditions[0] if len(conditions) == 1 else AnyMemberCondition(leaf, entities, rule, conditions)
 
-    def _known(self, name: str, registry: Registry, leaf: model.Element, otherwise: str) -> bool:
+    def _is_registered(self, name: str, registry: Registry, leaf: model.Element, otherwise: str) -> bool:
         """Whether this name is registered; if not, add a diagnostic."""
         if name in registry:
             return True

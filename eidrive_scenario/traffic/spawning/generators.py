@@ -130,13 +130,13 @@ class Swarm(MaintainedTraffic):
         if self.members:
             names = list(self.members)
             x, y = population.fleet.positions(names)
-            _, share = self._place(center, x, y)
+            _, share = self._distances(center, x, y)
             for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
                 population.despawn(name)
         self.fill(population, partial(self._spawn_one, population, center), 1 if self._filled else ATTEMPTS)
         self._filled = True
 
-    def _place(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
+    def _distances(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
         """Return the distances from the center [m] and the shares of the axes of the ellipse."""
         cos, sin = math.cos(center.heading), math.sin(center.heading)
         dx, dy = x - center.x - self.offset * cos, y - center.y - self.offset * sin
@@ -147,7 +147,7 @@ class Swarm(MaintainedTraffic):
         rng = self.rng(population)
         participant = self.mixture.draw(rng)
         sites = population.ground.for_body(participant)
-        distance, share = self._place(center, sites.x, sites.y)
+        distance, share = self._distances(center, sites.x, sites.y)
         fit = (distance >= self.inner) & (share <= 1.0)
         fit &= self._direction(rng, center, sites) & self._sector(rng, center, sites)
         speed = population.starting_speed(sites, participant)
@@ -194,7 +194,6 @@ class Source(TrafficGenerator):
     speed  initial speed [m/s], None for the speed limit
     """
 
-    place: tuple[float, float]
     sites: Callable[[Participant], SpawnSites]
     rate: float
     mixture: TrafficMix
@@ -279,7 +278,7 @@ class Sink(TrafficGenerator):
     categories  categories of the removed cars, None for all
     """
 
-    place: tuple[float, float]
+    position: tuple[float, float]
     radius: float
     rate: float
     categories: frozenset[str] | None
@@ -297,7 +296,7 @@ class Sink(TrafficGenerator):
         if not names:
             return
         x, y = population.fleet.positions(names)
-        distance = np.hypot(x - self.place[0], y - self.place[1])
+        distance = np.hypot(x - self.position[0], y - self.position[1])
         for n in np.argsort(distance, kind="stable").tolist():
             if distance[n] > self.radius or self._next > population.time + TIME_TOLERANCE:
                 return

@@ -28,7 +28,6 @@ def source(
     instance = Source(
         "source",
         scene.traffic.key("source"),
-        place=(at, -1.75),
         sites=lambda _: sites,
         rate=rate,
         mixture=scene.mixture,
@@ -75,7 +74,7 @@ def test_sink_removes_nearest_cars_at_its_rate(rate: float, gone: int) -> None:
         spec = replace(car("car"), name=f"car{k}")
         row, progress = scene.traffic.fleet.lanes.of(scene.traffic.fleet.lanes.roads.location("1", -1, 500.0 + 10 * k))
         scene.traffic.fleet.add_at(spec, row, progress, desired_speed=1e-6)
-    scene.start(Sink("sink", 1, place=(500.0, 0.0), radius=44.0, rate=rate, categories=None))
+    scene.start(Sink("sink", 1, position=(500.0, 0.0), radius=44.0, rate=rate, categories=None))
     removed: list[str] = []
     for changes in scene.run(4.5):
         removed += sorted(changes.removals)
@@ -88,7 +87,7 @@ def test_sink_removes_its_categories_only() -> None:
     for k, category in enumerate(("car", "truck")):
         spec = replace(car("car"), name=category, category=category)
         scene.traffic.fleet.add_at(spec, *lanes.of(lanes.roads.location("1", -1, 500.0 + 10 * k)), desired_speed=1e-6)
-    scene.start(Sink("sink", 1, place=(500.0, 0.0), radius=50.0, rate=math.inf, categories=frozenset({"truck"})))
+    scene.start(Sink("sink", 1, position=(500.0, 0.0), radius=50.0, rate=math.inf, categories=frozenset({"truck"})))
     assert [changes.removals for changes in scene.run(2 * DT)] == [{"truck"}, set()]
 
 

@@ -103,7 +103,7 @@ class ReferenceLine:
         step = np.diff(self.points, axis=0)
         length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
         self.along: Array = np.concatenate([[0.0], np.cumsum(length)])
-        self._places: list[float] = self.along.tolist()
+        self._distances: list[float] = self.along.tolist()
         self.spacing = float(self.along[-1]) / len(length)
         self.tangent, self.normal = _directions(self.points)
         self.heading: Array = np.unwrap(np.arctan2(self.tangent[:, 1], self.tangent[:, 0]))
@@ -111,7 +111,7 @@ class ReferenceLine:
         self._columns: Array = np.stack([*self.points.T, *self.tangent.T, self.along, self.heading])
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}
-        self._place: LaneLocation | None = None
+        self._location: LaneLocation | None = None
         self._of_direction: dict[int, LanesOfDirection] = {}
 
     @property
@@ -158,7 +158,7 @@ class ReferenceLine:
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""
-        return max(bisect_right(self._places, s) - 1, 0)
+        return max(bisect_right(self._distances, s) - 1, 0)
 
     def project(self, x: Array, y: Array, low: int, high: int) -> tuple[Array, Array, Array]:
         """Return s, d and heading of the line (…) for points (…), nearest among the points from `low` to `high`."""
@@ -182,7 +182,7 @@ class ReferenceLine:
         index = low + gaps.index(min(gaps))
         (px, py), (tx, ty) = self.points[index].tolist(), self.tangent[index].tolist()
         dx, dy = x - px, y - py
-        return self._places[index] + dx * tx + dy * ty, dy * tx - dx * ty
+        return self._distances[index] + dx * tx + dy * ty, dy * tx - dx * ty
 
     def lanes_beside(self, index: int) -> LanesBeside:
         """Return the lanes at a point of the line."""
@@ -214,7 +214,7 @@ class ReferenceLine:
         if roads is None:
             return None
         x, y = self.points[index].tolist()
-        location = self._place = roads.locate_at(x, y, self._place, reach=5.0)
+        location = self._location = roads.locate_at(x, y, self._location, reach=5.0)
         if location is None:
             return None
         road = roads.road(location.road)

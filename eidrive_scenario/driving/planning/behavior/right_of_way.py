@@ -242,11 +242,11 @@ class Course:
         beside = min(max(index + (1 if share > 0.0 else -1), 0), len(self._turns) - 1)
         turn = self._turns[index]
         heading = turn + min(abs(share), 1.0) * (self._turns[beside] - turn)
-        return self._places[index] + ahead, (y - y0) * ux - (x - x0) * uy, float(wrap_angle(heading))
+        return self._distances[index] + ahead, (y - y0) * ux - (x - x0) * uy, float(wrap_angle(heading))
 
     def can_follow(self, along: float, speed: float) -> bool:
         """Return whether a vehicle with a speed [m/s] at a distance along the course can pass the curves ahead."""
-        return speed <= self._fastest[max(bisect_right(self._places, along) - 1, 0)]
+        return speed <= self._fastest[max(bisect_right(self._distances, along) - 1, 0)]
 
     @cached_property
     def _corners(self) -> list[tuple[float, float, float, float]]:
@@ -261,9 +261,9 @@ class Course:
         return turns
 
     @cached_property
-    def _places(self) -> list[float]:
-        places: list[float] = self.along.tolist()
-        return places
+    def _distances(self) -> list[float]:
+        distances: list[float] = self.along.tolist()
+        return distances
 
     @cached_property
     def _fastest(self) -> list[float]:

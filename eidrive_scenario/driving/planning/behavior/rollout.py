@@ -244,7 +244,7 @@ class _Leaders:
 
     def __init__(self, scene: Surroundings, body: tuple[float, float]) -> None:
         front, center = body
-        self._known: dict[int, list[list[Leader]]] = {}
+        self._leaders: dict[int, list[list[Leader]]] = {}
         self._rears: list[list[float]] = (scene.rear - scene.passing_gap[:, None] - front).tolist()
         self._centers: list[list[float]] = (scene.s - center).tolist()
         self._speeds: list[list[float]] = scene.speed.tolist()
@@ -252,9 +252,9 @@ class _Leaders:
     def of(self, leads: Bools) -> tuple[int, list[list[Leader]]]:
         """Return a number of these leaders (N, K), the same for shared ones, and the leaders at each time."""
         number = id(leads)
-        leaders = self._known.get(number)
+        leaders = self._leaders.get(number)
         if leaders is None:
-            leaders = self._known[number] = [[] for _ in range(leads.shape[1])]
+            leaders = self._leaders[number] = [[] for _ in range(leads.shape[1])]
             for hypothesis in np.logical_or.reduce(leads, axis=1).nonzero()[0].tolist():
                 columns = (
                     leaders,
