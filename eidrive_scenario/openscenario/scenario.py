@@ -201,7 +201,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     )
 
 
-def _body(scenario_object: model.ScenarioObject, body: model.Element | None) -> EntityObject | None:
+def _body(entity: model.ScenarioObject, body: model.Element | None) -> EntityObject | None:
     """Return the body of an entity; an external object has a body without size."""
     if isinstance(body, model.ExternalObjectReference):
         box = model.BoundingBox(
@@ -212,8 +212,8 @@ def _body(scenario_object: model.ScenarioObject, body: model.Element | None) -> 
             mass=0.0,
             misc_object_category=model.MiscObjectCategory.NONE,
             bounding_box=box,
-            line=scenario_object.line,
-            source=scenario_object.source,
+            line=entity.line,
+            source=entity.source,
         )
     return body if isinstance(body, model.Vehicle | model.Pedestrian | model.MiscObject) else None
 
@@ -227,11 +227,11 @@ def _values(declarations: model.ParameterDeclarations | model.VariableDeclaratio
 
 
 def _controllers(
-    scenario_object: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
+    entity: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
 ) -> tuple[model.Controller, ...]:
     controllers = (
         entries.get(assigned.catalog_reference) if assigned.catalog_reference else assigned.controller
-        for assigned in scenario_object.object_controller
+        for assigned in entity.object_controller
     )
     return tuple(controller for controller in controllers if isinstance(controller, model.Controller))
 

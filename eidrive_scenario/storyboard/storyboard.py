@@ -73,9 +73,7 @@ def _find(name: str, roads: RoadNetwork | None) -> PlacedObject | None:
     if roads is None:
         return None
     placed = list(placed_objects(roads)) if name else []
-    return next(
-        (candidate for key in ("id", "name") for candidate in placed if getattr(candidate.object, key) == name), None
-    )
+    return next((entry for key in ("id", "name") for entry in placed if getattr(entry.object, key) == name), None)
 
 
 class Storyboard:

@@ -105,9 +105,8 @@ class PerceptionRegionStore:
         """
         held = self._regions.get(station)
         if held is None or held.time <= time:
-            self._regions[station] = PerceptionRegion(
-                station, time, tuple([sector.placed(*pose) for sector in sectors])
-            )
+            placed = tuple([sector.placed(*pose) for sector in sectors])
+            self._regions[station] = PerceptionRegion(station, time, placed)
 
     def add_message(self, message: Message) -> None:
         """Store the region of a CPM. Without information about the sensors of its sender it has none.

@@ -149,11 +149,10 @@ def _value_sets(
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
         for assignment in value_set.parameter_assignment:
-            if assignment.parameter_ref in choice:
-                collector.error(
-                    f"ParameterValueSet assigns {assignment.parameter_ref!r} twice", "remove one", at=assignment
-                )
-            choice[assignment.parameter_ref] = Assignment(assignment.value, Location.of(assignment))
+            name = assignment.parameter_ref
+            if name in choice:
+                collector.error(f"ParameterValueSet assigns {name!r} twice", "remove one", at=assignment)
+            choice[name] = Assignment(assignment.value, Location.of(assignment))
         choices.append(choice)
     return ListedValues(tuple(choices))
 

@@ -22,23 +22,19 @@ def scenario_objects(
     entities: model.Entities | None, entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
     """Yield every scenario object and its body, trailers after their towing vehicles; None for an unknown body."""
-    for scenario_object in entities.scenario_object if entities else ():
-        yield from _with_trailers(scenario_object, entries)
+    for entity in entities.scenario_object if entities else ():
+        yield from _with_trailers(entity, entries)
 
 
 def _with_trailers(
-    scenario_object: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
+    entity: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
     body: model.Element | None = (
-        scenario_object.vehicle
-        or scenario_object.pedestrian
-        or scenario_object.misc_object
-        or scenario_object.external_object_reference
-        or scenario_object.sensor
+        entity.vehicle or entity.pedestrian or entity.misc_object or entity.external_object_reference or entity.sensor
     )
-    if body is None and scenario_object.catalog_reference is not None:
-        body = entries.get(scenario_object.catalog_reference)
-    yield scenario_object, body
+    if body is None and entity.catalog_reference is not None:
+        body = entries.get(entity.catalog_reference)
+    yield entity, body
     if isinstance(body, model.Vehicle) and body.trailer is not None and body.trailer.trailer is not None:
         yield from _with_trailers(body.trailer.trailer, entries)
 
@@ -210,8 +206,8 @@ def _definitions(
     root: model.OpenScenario, elements: Iterable[model.Element], entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[str, str | None, model.Element]]:
     """Yield every defined name with its kind and element; None for a name that could not be read."""
-    for scenario_object, _ in scenario_objects(root.entities, entries):
-        yield "entity", scenario_object.name, scenario_object
+    for entity, _ in scenario_objects(root.entities, entries):
+        yield "entity", entity.name, entity
     for selection in root.entities.entity_selection if root.entities else ():
         yield "entity", selection.name, selection
     for element in elements:

@@ -376,9 +376,5 @@ def hide_parameters(scope: Scope | None, names: Iterable[str]) -> Scope | None:
         return None
     hidden = set(names)
     outer = hide_parameters(scope.outer, hidden)
-    return Scope(
-        outer,
-        {name: parameter for name, parameter in scope.parameters.items() if name not in hidden},
-        scope.lent,
-        scope.budget,
-    )
+    visible = {name: parameter for name, parameter in scope.parameters.items() if name not in hidden}
+    return Scope(outer, visible, scope.lent, scope.budget)

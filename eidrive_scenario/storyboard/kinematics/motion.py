@@ -68,12 +68,10 @@ class Motion(MotionState):
         """Set the route, and the selector of branches at junctions that the route does not cover."""
         self._route, self._visit, self._branch_selector, self._rests = route, 0, branch_selector, False
 
-    def ahead(self, location: LaneLocation, distance: float) -> LaneLocation | None:
+    def ahead(self, here: LaneLocation, distance: float) -> LaneLocation | None:
         """Return the location at a distance along lane and route [m]; None if the lane ends before."""
         assert self.roads is not None
-        return self.roads.advance(
-            location, distance, route=self._route, choose=self._branch_selector, visit=self._visit
-        )
+        return self.roads.advance(here, distance, route=self._route, choose=self._branch_selector, visit=self._visit)
 
     def teleport(self, position: ResolvedPosition) -> None:
         """Teleport the actor; its speed is kept.

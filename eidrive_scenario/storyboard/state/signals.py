@@ -238,10 +238,7 @@ class Signals:
             for name in signals:
                 has_yellow = YELLOW in (self._colors.get(name) or DEFAULT_LAMPS)
                 states[name] = (SEMANTICS if has_yellow else WITHOUT_YELLOW)[phase.semantics]
-        return states | {
-            self.identify(signal_state.traffic_signal_id): signal_state.state
-            for signal_state in phase.traffic_signal_state
-        }
+        return states | {self.identify(entry.traffic_signal_id): entry.state for entry in phase.traffic_signal_state}
 
     def _set_states(self, states: Mapping[str, str]) -> None:
         if any(self._states.get(name) != state for name, state in states.items()):

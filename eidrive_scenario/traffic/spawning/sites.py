@@ -228,30 +228,26 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
     """
     ends = _links(roads)
     parts: list[tuple[Stretch, bool]] = []
-    for number, (cursor, onward) in enumerate(pairwise(cursors)):
-        first, last = roads.road(cursor.road).length, roads.road(onward.road).length
-        here = cursor.s if cursor.s is not None else 0.0 if number == 0 else first
-        there = onward.s if onward.s is not None else last
-        if cursor.road == onward.road:
-            parts.append((Stretch(cursor.road, min(here, there), max(here, there), cursor.lanes), there >= here))
+    for number, (start, end) in enumerate(pairwise(cursors)):
+        first, last = roads.road(start.road).length, roads.road(end.road).length
+        here = start.s if start.s is not None else 0.0 if number == 0 else first
+        there = end.s if end.s is not None else last
+        if start.road == end.road:
+            parts.append((Stretch(start.road, min(here, there), max(here, there), start.lanes), there >= here))
             continue
-        chain = _chain(ends, cursor.road, onward.road)
+        chain = _chain(ends, start.road, end.road)
         leaving, *between, entering = chain
         forward = leaving.side > 0
-        if cursor.s is None and number == 0 and not forward:
+        if start.s is None and number == 0 and not forward:
             here = first
-        parts.append(
-            (Stretch(cursor.road, here if forward else 0.0, first if forward else here, cursor.lanes), forward)
-        )
+        parts.append((Stretch(start.road, here if forward else 0.0, first if forward else here, start.lanes), forward))
         for entry in between[::2]:
             whole = roads.road(entry.road).length
             parts.append((Stretch(entry.road, 0.0, whole), entry.side < 0))
         forward = entering.side < 0
-        if onward.s is None and number == len(cursors) - 2 and not forward:
+        if end.s is None and number == len(cursors) - 2 and not forward:
             there = 0.0
-        parts.append(
-            (Stretch(onward.road, 0.0 if forward else there, there if forward else last, onward.lanes), forward)
-        )
+        parts.append((Stretch(end.road, 0.0 if forward else there, there if forward else last, end.lanes), forward))
     return _cut(parts, length)
 
 

@@ -176,6 +176,18 @@ class _Obstacle(NamedTuple):
     end: float
     beside: list[LanesBeside]
 
+    @classmethod
+    def between(cls, begin: float, end: float, objects: list[Present], situation: Situation) -> _Obstacle:
+        """Return objects with the lanes at four places from `begin` to `end` [m]."""
+        step = (end - begin) / 3.0
+        places = (begin, begin + step, begin + 2.0 * step, end)
+        return cls(objects, begin, end, [situation.line.lanes_beside(situation.lanes_at(s)) for s in places])
+
+    @property
+    def fastest(self) -> float:
+        """Speed of the fastest object [m/s]."""
+        return max(hypothesis.speed for hypothesis in self.objects)
+
 
 def passing_profiles(
     situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, *, has_begun: bool
@@ -202,7 +214,7 @@ def passing_profiles(
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
-    moves = obstacle is not None and max(hypothesis.speed for hypothesis in obstacle.objects) > ONCOMING_SPEED
+    moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
     change = situation.change
     last = situation.end if change is None else change.begin
@@ -238,11 +250,7 @@ def extended(
     if blocker is None or blocker.rear > end + TOGETHER:
         return profile
     obstacle = _obstacle(situation, scene, settings, blocker, body)
-    if (
-        obstacle is None
-        or obstacle.end <= end
-        or max(hypothesis.speed for hypothesis in obstacle.objects) > ONCOMING_SPEED
-    ):
+    if obstacle is None or obstacle.end <= end or obstacle.fastest > ONCOMING_SPEED:
         return profile
     value = side * profile.values[-2]
     outer, every = _sides(obstacle, side)
@@ -299,10 +307,7 @@ def _meeting(situation: Situation, head_on: Present, body: Body) -> _Obstacle:
     way = gap * situation.speed / (situation.speed - head_on.speed)
     begin, end = situation.s + EARLY * way, situation.s + way + 2.0 * head_on.half_length + body.wheelbase
     end += body.rear + BEFORE_OBSTACLE
-    step = (end - begin) / 3.0
-    places = (begin, begin + step, begin + 2.0 * step, end)
-    beside = [situation.line.lanes_beside(situation.lanes_at(s)) for s in places]
-    return _Obstacle([head_on], begin, end, beside)
+    return _Obstacle.between(begin, end, [head_on], situation)
 
 
 def _behind_neighbor(
@@ -453,10 +458,7 @@ def _obstacle(
         begin -= BEFORE_MOVING * slowest
         begin += slowest * _catch_up_time(begin - situation.s, situation.speed - slowest, wanted - slowest, gain)
     end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
-    step = (end - begin) / 3.0
-    places = (begin, begin + step, begin + 2.0 * step, end)
-    beside = [situation.line.lanes_beside(situation.lanes_at(s)) for s in places]
-    return _Obstacle(objects, begin, end, beside)
+    return _Obstacle.between(begin, end, objects, situation)
 
 
 def _around(
@@ -485,8 +487,7 @@ def _around(
     if profile is None:
         return None
     border = min(_border(lanes, side, body) for lanes in obstacle.beside)
-    fastest = max(hypothesis.speed for hypothesis in obstacle.objects)
-    return msgspec.structs.replace(profile, border=border, overtakes=0.0 if stands else max(fastest, 0.0))
+    return msgspec.structs.replace(profile, border=border, overtakes=0.0 if stands else max(obstacle.fastest, 0.0))
 
 
 def _is_vulnerable(situation: Situation, obstacle: _Obstacle) -> bool:

@@ -121,6 +121,10 @@ class KnownObject(msgspec.Struct):
         x, y = self.mean_place
         return now - self.first_seen >= duration and math.hypot(self.x - x, self.y - y) <= NEARBY
 
+    def is_at(self, other: KnownObject) -> bool:
+        """Return whether it is at the place of another object."""
+        return math.hypot(other.x - self.x, other.y - self.y) < GATE and abs(other.z - self.z) < OTHER_LEVEL
+
     def keep_course(self) -> None:
         """Let an object that has just been lost move along its axis with its mean speed, if it moves about that way.
 
@@ -222,11 +226,7 @@ class ObjectMemory:
             if now - step - lost_object.seen < TIME_TOLERANCE:
                 lost_object.keep_course()
         self._note_hidden(lost, now, in_view)
-        lost = [
-            lost_object
-            for lost_object in lost
-            if self._is_kept(lost_object, now) and not _is_among(lost_object, observed)
-        ]
+        lost = [lost_object for lost_object in lost if self._is_kept(lost_object, observed, now)]
         for lost_object in lost:
             if lost_object.still_since is None:
                 lost_object.error = min(lost_object.error + SPEED_ERROR * step, LARGEST_ERROR)
@@ -264,18 +264,19 @@ class ObjectMemory:
             return
         shown = np.ones(len(lost), dtype=bool) if in_view is None else in_view(lost)
         for lost_object, is_shown in zip(lost, shown.tolist(), strict=True):
-            if is_shown and lost_object.hidden_since is not None:
+            if not is_shown and lost_object.hidden_since is None:
+                lost_object.hidden_since = now
+            elif is_shown and lost_object.hidden_since is not None:
                 lost_object.seen += now - lost_object.hidden_since
-            lost_object.hidden_since = (
-                None if is_shown else now if lost_object.hidden_since is None else lost_object.hidden_since
-            )
+                lost_object.hidden_since = None
 
-    def _is_kept(self, lost_object: KnownObject, now: float) -> bool:
-        if lost_object.existence < self._settings.min_existence:
+    def _is_kept(self, lost: KnownObject, observed: list[KnownObject], now: float) -> bool:
+        # A lost object at the place of one in view was another track of it.
+        if lost.existence < self._settings.min_existence or any(lost.is_at(other) for other in observed):
             return False
-        if lost_object.hidden_since is not None:
-            return self._settings.memory > 0.0 and now - lost_object.hidden_since <= LONGEST_HIDDEN
-        return now - lost_object.seen <= self._settings.memory
+        if lost.hidden_since is not None:
+            return self._settings.memory > 0.0 and now - lost.hidden_since <= LONGEST_HIDDEN
+        return now - lost.seen <= self._settings.memory
 
 
 def _objects_of(detections: Detections, now: float, least: float) -> list[KnownObject]:
@@ -315,14 +316,6 @@ def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:
     nearest = gap.argmin(axis=1)
     near = gap[np.arange(len(places)), nearest] < GATE
     return tuple(dict.fromkeys(nearest[near].tolist()))
-
-
-def _is_among(lost: KnownObject, observed: list[KnownObject]) -> bool:
-    """Return whether a lost object is at the place of one in view, of which it was another track."""
-    return any(
-        math.hypot(other.x - lost.x, other.y - lost.y) < GATE and abs(other.z - lost.z) < OTHER_LEVEL
-        for other in observed
-    )
 
 
 class _Shares(NamedTuple):
