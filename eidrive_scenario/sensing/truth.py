@@ -74,9 +74,9 @@ class TruthSensor(Sensor):
         elif any(targets):
             shares = few_visibilities(sensors, rows, targets, scene, view)
         readings, start = [], 0
-        for sensor, seen in zip(sensors, targets, strict=True):
-            readings.append(_reading(sensor, seen, shares[start : start + len(seen)], view))
-            start += len(seen)
+        for sensor, candidate_rows in zip(sensors, targets, strict=True):
+            readings.append(_reading(sensor, candidate_rows, shares[start : start + len(candidate_rows)], view))
+            start += len(candidate_rows)
         return readings
 
 
