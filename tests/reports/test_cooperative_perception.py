@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from eidrive_reports.cooperative_perception.receivers import Condition, moved, moved_map
+from eidrive_reports.cooperative_perception.receivers import Condition, move_detections, move_features
 from eidrive_reports.cooperative_perception.scores import (
     RANGES,
     PerceptionRecord,
     Pool,
     Tally,
     Truth,
-    range_class,
+    range_classes,
     sample_codes,
 )
 from eidrive_reports.cooperative_perception.trial import run_trial, with_properties
@@ -46,15 +46,15 @@ def detected(places: list[Place], scores: list[float]) -> Detections:
 def truth(*places: Place, hit: bool = True, hidden: bool = False) -> Truth:
     found = boxes(*places)
     every = np.ones(len(found), dtype=bool)
-    return Truth(found, range_class(found, ORIGIN), every & hit, every & hidden)
+    return Truth(found, range_classes(found, ORIGIN), every & hit, every & hidden)
 
 
 def record(*frames: tuple[Detections, Truth]) -> PerceptionRecord:
     samples = [sample_codes(found, objects, ORIGIN) for found, objects in frames]
     truths = [objects for _, objects in frames]
-    places = np.concatenate([objects.place[objects.counted] for objects in truths])
-    hit = np.concatenate([objects.place[objects.counted & objects.hit] for objects in truths])
-    hidden_places = np.concatenate([objects.place[objects.counted & objects.hidden] for objects in truths])
+    places = np.concatenate([objects.range_classes[objects.counted] for objects in truths])
+    hit = np.concatenate([objects.range_classes[objects.counted & objects.hit] for objects in truths])
+    hidden_places = np.concatenate([objects.range_classes[objects.counted & objects.hidden] for objects in truths])
     tally = Tally(
         b"".join(scores.astype("<u2").tobytes() for scores, _, _ in samples),
         b"".join(codes.astype("<u2").tobytes() for _, codes, _ in samples),
@@ -123,8 +123,8 @@ def test_farther_range_classes_are_ignored() -> None:
     within = Pool(records, NAME, 2)
     assert (within.precision(1).value, within.precision(1).objects) == (0.25, 2)
     assert within.precision_of_hit_objects().value == 0.25
-    assert (within.hidden_recall(1).found, within.hidden_recall(1).objects) == (1, 2)
-    assert (Pool(records, NAME).hidden_recall(1).found, Pool(records, NAME).hidden_recall(1).objects) == (2, 3)
+    assert (within.hidden_recall(1).detected, within.hidden_recall(1).objects) == (1, 2)
+    assert (Pool(records, NAME).hidden_recall(1).detected, Pool(records, NAME).hidden_recall(1).objects) == (2, 3)
 
 
 def test_second_truth_contains_hit_objects_only() -> None:
@@ -144,7 +144,7 @@ def test_recall_of_hidden_objects() -> None:
     found = detected([(10.0, 0.0, 0.0), (21.0, 0.0, 0.0)], [0.1, 0.9])
     pool = Pool([record((found, hidden))], NAME)
     recalls = [pool.hidden_recall(overlap) for overlap in range(3)]
-    assert [(one.found, one.objects, one.value) for one in recalls] == [(2, 2, 1.0), (2, 2, 1.0), (1, 2, 0.5)]
+    assert [(one.detected, one.objects, one.value) for one in recalls] == [(2, 2, 1.0), (2, 2, 1.0), (1, 2, 0.5)]
     assert math.isnan(Pool([record(GOLDEN[0])], NAME).hidden_recall(0).value)
 
 
@@ -190,10 +190,10 @@ def test_moved_detections_keep_their_place_relative_to_the_station() -> None:
     found = detected([(12.0, 3.0, 0.4)], [0.9])
     before = EgoState(0.0, np.array([2.0, 1.0, 0.0]), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
     after = EgoState(0.0, np.array([2.5, 0.5, 0.0]), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
-    there = moved(found, before, after)
+    there = move_detections(found, before, after)
     assert there.boxes[0, 6] == pytest.approx(0.6)
     assert np.linalg.norm(there.boxes[0, :2] - after.position[:2]) == pytest.approx(math.hypot(10.0, 2.0))
-    assert moved(there, after, before).boxes == pytest.approx(found.boxes)
+    assert move_detections(there, after, before).boxes == pytest.approx(found.boxes)
 
 
 def test_moved_features_keep_their_objects_in_the_same_cells() -> None:
@@ -202,9 +202,9 @@ def test_moved_features_keep_their_objects_in_the_same_cells() -> None:
     none = np.zeros((1, 4, 4), np.float32)
     features = FeatureMap(0.0, 2.4, 0.8, 0.0, 1.9, 0.0, 0.8, none, none, none[0])
     objects = detected([(12.0, 3.0, 0.4)], [0.9])
-    there = moved_map(features, before, after)
+    there = move_features(features, before, after)
     first, second = (Grid(one.x, one.y, one.yaw, one.cell, (4, 4)) for one in (features, there))
-    places = second.to_places(moved(objects, before, after).boxes[:, :2])
+    places = second.to_places(move_detections(objects, before, after).boxes[:, :2])
     assert places == pytest.approx(first.to_places(objects.boxes[:, :2]))
     assert (there.x, there.y, there.yaw) != (features.x, features.y, features.yaw)
 
@@ -221,7 +221,7 @@ def test_pose_error_lowers_the_precision_at_the_larger_overlap_first() -> None:
         for number in range(20):
             x, y, yaw = noise.error(0.1 * number).tolist()
             assumed = EgoState(0.0, ego.position + np.array([x, y, 0.0]), yaw, 0.0, 0.0, 0.0, 0.0, 0.0)
-            frames.append((moved(exact, ego, assumed), objects))
+            frames.append((move_detections(exact, ego, assumed), objects))
         return precision(*frames)
 
     none, small, large = at(0.0), at(0.2), at(0.6)
@@ -250,7 +250,7 @@ def trial() -> PerceptionRecord:
     """One frame of scenario 4 under few conditions."""
     arms = [Condition(arm) for arm in ("none", "average", "covariance_intersection", "early")]
     settings = RunSettings(detector="lidar", time_limit=1.0)
-    return run_trial("coop/scenario_4", 1, settings, "Ego", [*arms, *faulty("none"), *faulty("early")])[1]
+    return run_trial("coop/scenario_4", 1, settings, "Ego", [*arms, *faulty("none"), *faulty("early")])[1].record()
 
 
 @pytest.mark.exhaustive
@@ -280,11 +280,11 @@ def test_points_need_more_bytes_than_boxes_and_no_fusion_none(trial: PerceptionR
 def learned_trial() -> PerceptionRecord:
     """Two frames of scenario 4 with detections and features of the network."""
     arms = [Condition(arm) for arm in ("none", "covariance_intersection", "attention", "attention, codes")]
-    arms += [Condition("where2comm"), Condition("where2comm", loss=0.5)]
+    arms += [Condition("where2comm"), Condition("where2comm", loss=0.5), Condition("features only, 1 %")]
     arms += [Condition("none, filtered"), Condition("attention", loss=1.0)]
     arms += [Condition("none, filtered", deviation=0.4), Condition("attention", deviation=0.4, loss=1.0)]
     settings = RunSettings(detector="pillars", time_limit=1.5)
-    return run_trial("coop/scenario_4", 1, settings, "Ego", arms)[1]
+    return run_trial("coop/scenario_4", 1, settings, "Ego", arms)[1].record()
 
 
 def test_features_find_objects_hidden_to_the_ego(learned_trial: PerceptionRecord) -> None:
@@ -317,4 +317,5 @@ def test_features_need_the_bytes_of_their_frames_beside_those_of_boxes(learned_t
         ("where2comm", 1_640 + 2 * 62),
     ):
         assert volume(arm) - boxes == pytest.approx(3 * 16 * size / 1.5e6, rel=0.05)
+    assert volume("features only, 1 %") == pytest.approx(3 * 16 * (1_640 + 2 * 62) / 1.5e6, rel=0.05)
     assert volume("where2comm", loss=0.5) == pytest.approx(volume("where2comm")), "lost frames are transmitted, too"

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from eidrive_scenario.api.common import ActorSpec, Array, wrap_angle
 from eidrive_scenario.api.driving import Agent, AgentSettings, Detections, EgoState, StackContext, build_agent
 from eidrive_scenario.api.perception import Detector, FeatureMap, PoseNoise, Readings
-from eidrive_scenario.api.v2x import Message, build_channel, load_profile
+from eidrive_scenario.api.v2x import Message, ReceivedMessage, build_channel, load_profile
 
 SCAN_RATE = 10.0
 """Lidar scans of each station per second, at equal times [Hz]."""
@@ -33,21 +33,25 @@ class Arm:
     fusion       fusion method; `settings` are its settings
     cooperates   whether it receives messages
     shares       content of the messages in addition to boxes
+    boxes        whether it receives boxes
     """
 
     fusion: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     cooperates: bool = True
     shares: Literal["points", "features"] | None = None
+    boxes: bool = True
 
 
 _FILTERED = {"existence": LEAST_EXISTENCE}
 
 
-def _intermediate(fusion: str, share: float, encoding: str = "int8", *, aligned: bool = False) -> Arm:
+def _intermediate(
+    fusion: str, share: float, encoding: str = "int8", *, aligned: bool = False, boxes: bool = True
+) -> Arm:
     """Return an arm whose senders send a share of the cells of their features."""
     settings = {**_FILTERED, "share": share, "encoding": encoding, "align_poses": aligned}
-    return Arm(fusion, settings, shares="features")
+    return Arm(fusion, settings, shares="features", boxes=boxes)
 
 
 ARMS: Mapping[str, Arm] = {
@@ -66,10 +70,16 @@ ARMS: Mapping[str, Arm] = {
     "where2comm": _intermediate("where2comm", 0.01),
     "where2comm, codes": _intermediate("where2comm", 0.01, "codes"),
     "where2comm, 0.1 %": _intermediate("where2comm", 0.001),
+    "features only": _intermediate("attention", 1.0, boxes=False),
+    "features only, 5 %": _intermediate("attention", 0.05, boxes=False),
+    "features only, 1 %": _intermediate("attention", 0.01, boxes=False),
+    "features only, 0.1 %": _intermediate("attention", 0.001, boxes=False),
+    "features only, 0.02 %": _intermediate("attention", 0.0002, boxes=False),
 }
 """Arms by name. `none, filtered` applies the filter of covariance intersection to the own detections only; `aligned`
-corrects the poses of senders by shared objects. Without a share in its name, `where2comm` sends 1 % of the cells and
-other intermediate fusion sends all."""
+corrects the poses of senders by shared objects; `features only` is `attention` or `where2comm` without boxes of others,
+as in the literature. Without a share in its name, `where2comm` sends 1 % of the cells and other intermediate fusion
+sends all."""
 
 
 @dataclass(frozen=True)
@@ -122,11 +132,14 @@ class Condition:
         return {"model": "composed", "delay": {"kind": "constant", "seconds": self.latency}, "loss": loss}
 
 
+POSE_AND_LATENCY = "pose error, 0.1 s late"
+"""Axis with both faults of the noisy setting of V2XSet: 0.2 m and 0.1 s."""
 AXES: Mapping[str, tuple[str, Mapping[str, float], tuple[float, ...]]] = {
     "pose error": ("deviation", {}, (0.0, 0.2, 0.4, 0.6)),
     "pose drift": ("deviation", {"correlation": DRIFT_TIME}, (0.0, 0.2, 0.4, 0.6)),
     "latency": ("latency", {}, (0.0, 0.1, 0.2, 0.3, 0.5)),
     "loss": ("loss", {}, (0.0, 0.3, 0.6, 0.9)),
+    POSE_AND_LATENCY: ("deviation", {"latency": 0.1}, (0.0, 0.2)),
 }
 """Axes of the curves: varied field, other fields, and values. The value 0 is the condition without faults."""
 SCANS_PER_MESSAGE = (1, 2, 5)
@@ -173,19 +186,19 @@ WAIT = 0.001
 """Time that the ego waits for messages of the same scan [s]: scans are simultaneous, and no message arrives at once."""
 
 
-def moved(found: Detections, before: EgoState, after: EgoState) -> Detections:
+def move_detections(detections: Detections, before: EgoState, after: EgoState) -> Detections:
     """Return detections of a station at pose `before` as it reports them from pose `after`."""
     turn = after.yaw - before.yaw
     cos, sin = np.cos(turn), np.sin(turn)
     rotation = np.array([[cos, -sin], [sin, cos]])
-    boxes = found.boxes.copy()
+    boxes = detections.boxes.copy()
     boxes[:, :2] = (boxes[:, :2] - before.position[:2]) @ rotation.T + after.position[:2]
     boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
-    covariance = rotation @ found.covariance @ rotation.T
-    return replace(found, boxes=boxes, velocity=found.velocity @ rotation.T, covariance=covariance)
+    covariance = rotation @ detections.covariance @ rotation.T
+    return replace(detections, boxes=boxes, velocity=detections.velocity @ rotation.T, covariance=covariance)
 
 
-def moved_map(features: FeatureMap, before: EgoState, after: EgoState) -> FeatureMap:
+def move_features(features: FeatureMap, before: EgoState, after: EgoState) -> FeatureMap:
     """Return features of a station at pose `before` as it sends them from pose `after`: the grid moves as boxes do."""
     turn = after.yaw - before.yaw
     dx, dy = features.x - before.position[0], features.y - before.position[1]
@@ -197,18 +210,21 @@ def moved_map(features: FeatureMap, before: EgoState, after: EgoState) -> Featur
     )
 
 
-class KnownDetections(Detector):
+class SharedDetector(Detector):
     """Detections and features of a station that were computed for its true pose. All receivers of a run share them.
 
     The detector of the station detects objects in fused features.
+
+    fused  last fused features in which objects were detected
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
     provides_features: ClassVar[bool] = True
 
     def __init__(self, detector: Detector) -> None:
-        self.found = Detections(0.0)
+        self.detections = Detections(0.0)
         self.features: FeatureMap | None = None
+        self.fused: FeatureMap | None = None
         self.pose: EgoState | None = None
         self._detector = detector
 
@@ -217,32 +233,34 @@ class KnownDetections(Detector):
         """Codec of the detector of the station."""
         return self._detector.codec
 
-    def update(self, found: Detections, pose: EgoState) -> None:
+    def update(self, detections: Detections, pose: EgoState) -> None:
         """Store the detections of the station and its last features, at its true pose."""
-        self.found, self.features, self.pose = found, self._detector.feature_map, pose
+        self.detections, self.features, self.pose = detections, self._detector.feature_map, pose
 
     def detect(self, readings: Readings) -> Detections:
-        """Return the objects in fused features, or the known detections relative to the pose of the readings."""
+        """Return the objects in fused features, or the stored detections relative to the pose of the readings."""
         if readings.features is not None:
+            self.fused = readings.features
             return self._detector.detect(readings)
         assert self.pose is not None
         before, after = self.pose, readings.ego
         self.feature_map = self.features
         if before.yaw == after.yaw and (before.position == after.position).all():
-            return self.found
+            return self.detections
         if self.features is not None:
-            self.feature_map = moved_map(self.features, before, after)
-        return moved(self.found, before, after)
+            self.feature_map = move_features(self.features, before, after)
+        return move_detections(self.detections, before, after)
 
 
-class Crew:
-    """Stations of a run: their bodies, settings and known detections; it builds further agents of them."""
+class AgentFactory:
+    """Stations of a run: their bodies, settings and detectors. It builds further agents of them."""
 
     def __init__(self, context: StackContext, settings: Mapping[str, AgentSettings], ego: str) -> None:
         self.ego = ego
         self.seed = context.seed
+        self.roads = context.roads
         self.specs: dict[str, ActorSpec] = {}
-        self.known: dict[str, KnownDetections] = {}
+        self.detectors: dict[str, SharedDetector] = {}
         self._context = context
         self._settings = settings
 
@@ -255,23 +273,23 @@ class Crew:
     def add(self, spec: ActorSpec, detector: Detector) -> None:
         """Add a station that enters the world, with its detector."""
         self.specs[spec.name] = spec
-        self.known[spec.name] = KnownDetections(detector)
+        self.detectors[spec.name] = SharedDetector(detector)
 
     def agent(self, name: str, **changes: object) -> Agent:
         """Return an agent of a station that does not drive, with other settings."""
         settings = self._settings[name].model_copy(update={"planner": "none", **changes})
-        context, detector = self._context, self.known[name]
-        return build_agent(settings, self.specs[name], context.roads, seed=self.seed, dt=context.dt, detector=detector)
+        context, detector = self._context, self.detectors[name]
+        return build_agent(settings, self.specs[name], self.roads, seed=self.seed, dt=context.dt, detector=detector)
 
 
 class Senders:
     """Agents of all senders with one pose error, fusion method and its settings. They do not receive messages."""
 
     def __init__(
-        self, crew: Crew, pose_noise: PoseNoise | None, fusion: str, settings: Sequence[tuple[str, Any]]
+        self, factory: AgentFactory, pose_noise: PoseNoise | None, fusion: str, settings: Sequence[tuple[str, Any]]
     ) -> None:
         changes = {"fusion": fusion, "fusion_settings": dict(settings), "cooperates_with": ()}
-        self._agents = {name: crew.agent(name, pose_noise=pose_noise, **changes) for name in crew.senders}
+        self._agents = {name: factory.agent(name, pose_noise=pose_noise, **changes) for name in factory.senders}
 
     def messages(self, readings: Mapping[str, Readings], now: float) -> list[Message]:
         """Return the messages of a scan, with boxes, and with points or features."""
@@ -282,38 +300,57 @@ class Senders:
         ]
 
 
+@dataclass(frozen=True)
+class Reception:
+    """Messages that were sent and have arrived in one scan, and what the receiver makes of them.
+
+    features  fused ones; None if the receiver does not fuse features, or has not received any
+    objects   of the receiver, relative to its true pose
+    """
+
+    sent: Sequence[Message]
+    arrived: Sequence[ReceivedMessage]
+    features: FeatureMap | None
+    objects: Detections
+
+
 class Receiver:
     """Ego under one condition, with its own channel."""
 
-    def __init__(self, crew: Crew, condition: Condition) -> None:
+    def __init__(self, factory: AgentFactory, condition: Condition) -> None:
         arm = ARMS[condition.arm]
-        self._arm, self._every, self._ego = arm, condition.every, crew.ego
-        self._agent = crew.agent(
-            crew.ego,
+        self._arm, self._every, self._ego = arm, condition.every, factory.ego
+        self._detector = factory.detectors[factory.ego]
+        self._agent = factory.agent(
+            factory.ego,
             fusion=arm.fusion,
             fusion_settings=dict(arm.settings),
-            cooperates_with=tuple(crew.senders) if arm.cooperates else (),
+            cooperates_with=tuple(factory.senders) if arm.cooperates else (),
             pose_noise=condition.pose_noise,
         )
-        channel = build_channel(load_profile(condition.channel, []), crew.seed)
+        channel = build_channel(load_profile(condition.channel, []), factory.seed)
         assert channel is not None
         self._channel = channel
         self._scans = 0
 
-    def scan(self, readings: Readings, messages: Sequence[Message], *, merged: bool) -> Detections:
-        """Transmit the messages of a scan, and return the objects of the ego relative to its true pose.
+    def scan(self, readings: Readings, messages: Sequence[Message], *, merged: bool) -> Reception:
+        """Transmit the messages of a scan, and return what arrives of them with the objects of the ego.
 
         merged  whether points of the ego are merged with others and objects detected in them
         """
-        now = readings.time
+        now, sent = readings.time, list[Message]()
+        self._detector.fused = None
         if self._arm.cooperates and (self._scans + self._every // 2) % self._every == 0:
-            sent = messages if self._arm.shares else [_without_points(message) for message in messages]
+            sent = list(messages) if self._arm.shares else [_without_points(message) for message in messages]
+            if not self._arm.boxes:
+                sent = [message for message in sent if message.kind == "features"]
             self._channel.transmit([(message, [self._ego]) for message in sent], now)
         self._scans += 1
-        inbox = self._channel.deliver(self._ego, now + WAIT)
+        arrived = self._channel.deliver(self._ego, now + WAIT)
         used = readings if merged or self._arm.shares != "points" else replace(readings, lidars={})
-        step = self._agent.act(used, inbox, now, None)
-        return step.fused if step.estimate is None else moved(step.fused, step.estimate, readings.ego)
+        step = self._agent.act(used, arrived, now, None)
+        objects = step.fused if step.estimate is None else move_detections(step.fused, step.estimate, readings.ego)
+        return Reception(sent, arrived, self._detector.fused, objects)
 
     def megabytes_per_second(self, now: float) -> float:
         """Return the size of the sent messages per second."""

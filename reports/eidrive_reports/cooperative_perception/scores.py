@@ -28,7 +28,7 @@ _HIT_OVERLAP = 1
 """Index of the overlap for the second truth: bodies that any lidar hits."""
 
 _SECOND = len(OVERLAPS)
-"""Place of the second truth in a code, after the overlaps."""
+"""Variant of the second truth in a code, after the overlaps."""
 
 Codes = NDArray[np.uint16]
 
@@ -37,21 +37,21 @@ Codes = NDArray[np.uint16]
 class Truth:
     """Road users in a frame.
 
-    boxes   (M, 7) of all bodies except the ego, world frame
-    place   (M,) class of the distance from the ego; len(RANGES) beyond the last one
-    hit     (M,) whether a lidar of any station hits the body
-    hidden  (M,) whether the lidar of the ego does not hit it, and that of another station does
+    boxes          (M, 7) of all bodies except the ego, world frame
+    range_classes  (M,) class of the distance from the ego; len(RANGES) beyond the last one
+    hit            (M,) whether a lidar of any station hits the body
+    hidden         (M,) whether the lidar of the ego does not hit it, and that of another station does
     """
 
     boxes: Array
-    place: Integers
+    range_classes: Integers
     hit: Bools
     hidden: Bools
 
     @property
     def counted(self) -> Bools:
         """Whether each body is in range (M,)."""
-        return self.place < len(RANGES)
+        return self.range_classes < len(RANGES)
 
 
 class Tally(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -59,7 +59,7 @@ class Tally(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     scores    scores as 16-bit integers, best first within each frame, frames in order
     codes     16 bits per detection, see `sample_codes`
-    hidden    number of found hidden objects, by overlap and range
+    hidden    number of detected hidden objects, by overlap and range
     megabytes_per_second  sent over all links
     """
 
@@ -94,14 +94,14 @@ def true_objects(view: WorldView, ego: str, clouds: dict[str, Array]) -> Truth:
     for name, points in clouds.items():
         if name != ego:
             others |= _hits(boxes, points)
-    place = range_class(boxes, view.boxes[view.row(ego), :2])
-    return Truth(boxes, place, own | others, others & ~own)
+    classes = range_classes(boxes, view.boxes[view.row(ego), :2])
+    return Truth(boxes, classes, own | others, others & ~own)
 
 
-def range_class(boxes: Array, center: Array) -> Integers:
+def range_classes(boxes: Array, center: Array) -> Integers:
     """Return the range class (N,) of boxes by the distance of their centers."""
-    place: Integers = np.searchsorted(np.array(RANGES), np.linalg.norm(boxes[:, :2] - center, axis=1))
-    return place
+    classes: Integers = np.searchsorted(np.array(RANGES), np.linalg.norm(boxes[:, :2] - center, axis=1))
+    return classes
 
 
 def _hits(boxes: Array, points: Array) -> Bools:
@@ -114,29 +114,29 @@ def _hits(boxes: Array, points: Array) -> Bools:
     return hits
 
 
-def sample_codes(found: Detections, truth: Truth, center: Array) -> tuple[Codes, Codes, Integers]:
-    """Return scores and codes (N,) of detections in the true world frame, and the found hidden objects by overlap and
-    range.
+def sample_codes(detections: Detections, truth: Truth, center: Array) -> tuple[Codes, Codes, Integers]:
+    """Return scores and codes (N,) of detections in the true world frame, and the number of detected hidden objects by
+    overlap and range.
 
     Code: for each overlap, and then for the second truth, 1 bit for a correct detection and 2 bits for the range class,
     of the object of a correct detection or else of the detection itself. A detection beyond the last range, or of an
     object that does not count, has the class len(RANGES) and does not count.
     """
-    shares, confidence = iou_bev(found.boxes, truth.boxes), found.confidence
+    shares, confidence = iou_bev(detections.boxes, truth.boxes), detections.confidence
     order = matching_order(shares, confidence)
-    own_place = range_class(found.boxes, center)[order]
-    codes: Codes = np.zeros(len(found), dtype=np.uint16)
+    own_classes = range_classes(detections.boxes, center)[order]
+    codes: Codes = np.zeros(len(detections), dtype=np.uint16)
     hidden = np.zeros((len(OVERLAPS), len(RANGES)), dtype=np.int64)
     variants = [(least, truth.counted) for least in OVERLAPS]
     variants.append((OVERLAPS[_HIT_OVERLAP], truth.counted & truth.hit))
     for number, (least, counted) in enumerate(variants):
         matches = match_by_share(shares, confidence, ~counted, least)
         rows = matches.taken[matches.correct]
-        place = np.where(matches.counted, own_place, len(RANGES))
-        place[matches.correct] = truth.place[rows]
-        codes |= _shifted(matches.correct, 3 * number) | _shifted(place, 3 * number + 1)
+        classes = np.where(matches.counted, own_classes, len(RANGES))
+        classes[matches.correct] = truth.range_classes[rows]
+        codes |= _shifted(matches.correct, 3 * number) | _shifted(classes, 3 * number + 1)
         if number < len(OVERLAPS):
-            hidden[number] = np.bincount(truth.place[rows[truth.hidden[rows]]], minlength=len(RANGES))
+            hidden[number] = np.bincount(truth.range_classes[rows[truth.hidden[rows]]], minlength=len(RANGES))
     scores = np.rint(FULL_SCORE * np.clip(confidence[order], 0.0, 1.0)).astype(np.uint16)
     return scores, codes, hidden
 
@@ -163,12 +163,12 @@ class Precision:
 
 @dataclass(frozen=True)
 class HiddenRecall:
-    """Share of the objects hidden to the ego that are found, at any score, with its 95 % interval over the runs."""
+    """Share of the objects hidden to the ego that are detected, at any score, with its 95 % interval over the runs."""
 
     value: float
     low: float
     high: float
-    found: int
+    detected: int
     objects: int
 
 
@@ -190,22 +190,23 @@ class Pool:
         """Mean size of the sent messages per second over the runs."""
         return float(np.mean([tally.megabytes_per_second for tally in self._tallies]))
 
-    def precision(self, overlap: int, place: int | None = None) -> Precision:
+    def precision(self, overlap: int, range_class: int | None = None) -> Precision:
         """Return the average precision at an overlap of OVERLAPS, in one range class or in all."""
-        return self._precision(overlap, place, [self._total(record.objects, place) for record in self._records])
+        objects = [self._total(record.objects, range_class) for record in self._records]
+        return self._precision(overlap, range_class, objects)
 
     def precision_of_hit_objects(self) -> Precision:
         """Return the average precision at the overlap 0.5 for objects that a lidar of any station hits."""
         return self._precision(_SECOND, None, [self._total(record.hit) for record in self._records])
 
-    def _total(self, counts: Sequence[int], place: int | None = None) -> int:
-        return sum(counts[: self._reach]) if place is None else counts[place]
+    def _total(self, counts: Sequence[int], range_class: int | None = None) -> int:
+        return sum(counts[: self._reach]) if range_class is None else counts[range_class]
 
-    def _precision(self, variant: int, place: int | None, objects: Sequence[int]) -> Precision:
+    def _precision(self, variant: int, range_class: int | None, objects: Sequence[int]) -> Precision:
         """Return the average precision by the bits of a variant of the truth in the codes."""
         correct = self._codes >> (3 * variant) & 1 == 1
-        places = self._codes >> (3 * variant + 1) & 3
-        kept = places < self._reach if place is None else places == place
+        classes = self._codes >> (3 * variant + 1) & 3
+        kept = classes < self._reach if range_class is None else classes == range_class
         local = area_in_order(correct[kept], sum(objects))
         order = np.flatnonzero(kept)
         order = order[np.argsort(-self._scores[order], kind="stable")]
@@ -224,12 +225,12 @@ class Pool:
             for tally, record in zip(self._tallies, self._records, strict=True)
             if self._total(record.hidden)
         ]
-        found, total = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
+        detected, total = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
         if not total:
             return HiddenRecall(float("nan"), float("nan"), float("nan"), 0, 0)
-        value = found / total
-        left_out = [(found - part) / (total - whole) if whole < total else float("nan") for part, whole in pairs]
-        return HiddenRecall(value, *_limits(value, left_out), found, total)
+        value = detected / total
+        left_out = [(detected - part) / (total - whole) if whole < total else float("nan") for part, whole in pairs]
+        return HiddenRecall(value, *_limits(value, left_out), detected, total)
 
 
 def _limits(value: float, left_out: Sequence[float]) -> tuple[float, float]:
@@ -245,7 +246,7 @@ def _limits(value: float, left_out: Sequence[float]) -> tuple[float, float]:
         return share.low, share.high
     if min(left_out) > 0.0 and max(left_out) < 1.0:
         # On this scale the limits are nearer to symmetric, and between 0 and 1
-        logits = [math.log(one / (1.0 - one)) for one in (value, *left_out)]
+        logits = [math.log(share / (1.0 - share)) for share in (value, *left_out)]
         interval = jackknife_interval(logits[0], logits[1:])
         return _share(interval.low), _share(interval.high)
     interval = jackknife_interval(value, left_out)

@@ -10,9 +10,10 @@ from lxml import etree
 from eidrive_reports.cooperative_perception.receivers import (
     LEAST_EXISTENCE,
     SCAN_RATE,
+    AgentFactory,
     Condition,
-    Crew,
     Receiver,
+    Reception,
     Senders,
     world_points,
 )
@@ -50,58 +51,67 @@ DETECTOR_PROPERTIES: Mapping[str, Mapping[str, str]] = {
 
 
 class Measurement:
-    """Receivers under all conditions, and their detections in the measured frames."""
+    """Receivers under all conditions, and their detections in the measured frames.
 
-    def __init__(self, crew: Crew, conditions: Sequence[Condition]) -> None:
-        self.crew = crew
+    truths      road users in the measured frames
+    view        true state at the last scan; None before the first one
+    receptions  those of the last scan, by condition
+    """
+
+    def __init__(self, factory: AgentFactory, conditions: Sequence[Condition]) -> None:
+        self.factory = factory
+        self.truths: list[Truth] = []
+        self.view: WorldView | None = None
+        self.receptions: dict[Condition, Reception] = {}
         self._conditions = conditions
         self._senders: dict[object, Senders] = {}
-        self._receivers: dict[str, Receiver] = {}
-        self._samples: dict[str, list[tuple[Codes, Codes, Integers]]] = {one.name: [] for one in conditions}
-        self._truths: list[Truth] = []
-        self._now = 0.0
+        self._receivers: dict[Condition, Receiver] = {}
+        self._samples: dict[Condition, list[tuple[Codes, Codes, Integers]]] = {
+            condition: [] for condition in conditions
+        }
 
     def scan(self, view: WorldView, readings: Mapping[str, Readings]) -> None:
-        now = self._now = view.time
+        self.view, now = view, view.time
         if not self._receivers:
-            self._senders = {one.senders: Senders(self.crew, *one.senders) for one in self._conditions}
-            self._receivers = {one.name: Receiver(self.crew, one) for one in self._conditions}
+            for condition in self._conditions:
+                self._receivers[condition] = Receiver(self.factory, condition)
+                if condition.senders not in self._senders:
+                    self._senders[condition.senders] = Senders(self.factory, *condition.senders)
         sampled = now > FIRST_SAMPLE - TIME_TOLERANCE and _is_multiple(now, SAMPLE_INTERVAL)
         merged = sampled or _is_multiple(now + EARLIER_SCAN, SAMPLE_INTERVAL)
-        ego = self.crew.ego
+        ego = self.factory.ego
         truth = None
         if sampled:
             truth = true_objects(view, ego, {name: world_points(reading) for name, reading in readings.items()})
-            self._truths.append(truth)
+            self.truths.append(truth)
         center = view.boxes[view.row(ego), :2]
         messages = {key: senders.messages(readings, now) for key, senders in self._senders.items()}
-        for one in self._conditions:
-            found = self._receivers[one.name].scan(readings[ego], messages[one.senders], merged=merged)
+        for condition, receiver in self._receivers.items():
+            reception = receiver.scan(readings[ego], messages[condition.senders], merged=merged)
+            self.receptions[condition] = reception
             if truth is not None:
-                self._samples[one.name].append(sample_codes(found, truth, center))
+                self._samples[condition].append(sample_codes(reception.objects, truth, center))
 
     def record(self) -> PerceptionRecord:
         """Return the measurement of the run up to now."""
-        places = [truth.place[truth.counted] for truth in self._truths]
-        hit = [truth.place[truth.counted & truth.hit] for truth in self._truths]
-        hidden = [truth.place[truth.counted & truth.hidden] for truth in self._truths]
+        truths = self.truths
         return PerceptionRecord(
-            len(self._truths),
-            _by_range(places),
-            _by_range(hit),
-            _by_range(hidden),
-            {one.name: self._tally(one) for one in self._conditions},
+            len(truths),
+            _by_range([truth.range_classes[truth.counted] for truth in truths]),
+            _by_range([truth.range_classes[truth.counted & truth.hit] for truth in truths]),
+            _by_range([truth.range_classes[truth.counted & truth.hidden] for truth in truths]),
+            {condition.name: self._tally(condition) for condition in self._conditions},
         )
 
     def _tally(self, condition: Condition) -> Tally:
-        samples = self._samples[condition.name]
+        samples = self._samples[condition]
         scores, codes, hidden = zip(*samples, strict=True) if samples else ((), (), ())
-        receiver = self._receivers.get(condition.name)
+        receiver = self._receivers.get(condition)
         return Tally(
             b"".join(part.astype("<u2").tobytes() for part in scores),
             b"".join(part.astype("<u2").tobytes() for part in codes),
             tuple(map(tuple, np.sum(hidden, axis=0).tolist())) if samples else (),
-            0.0 if receiver is None else receiver.megabytes_per_second(self._now),
+            0.0 if receiver is None or self.view is None else receiver.megabytes_per_second(self.view.time),
         )
 
 
@@ -110,19 +120,19 @@ class MeasuredStations(Stations):
 
     def __init__(self, context: StackContext, ego: str, conditions: Sequence[Condition]) -> None:
         super().__init__(context)
-        self.measurement = Measurement(Crew(context, self.settings, ego), conditions)
+        self.measurement = Measurement(AgentFactory(context, self.settings, ego), conditions)
 
     def add(self, spec: ActorSpec) -> None:
         super().add(spec)
         if spec.name in self.settings:
-            self.measurement.crew.add(spec, self._agents[spec.name].perception.detector)
+            self.measurement.factory.add(spec, self._agents[spec.name].perception.detector)
 
     def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
         """Let the stations act, and all receivers if this is the time of a scan."""
         steps, readings = super().act(world, view, inputs), self.readings
         if readings and all(reading.lidars for reading in readings.values()):
-            for name, known in self.measurement.crew.known.items():
-                known.update(steps[name].detections, readings[name].ego)
+            for name, detector in self.measurement.factory.detectors.items():
+                detector.update(steps[name].detections, readings[name].ego)
             self.measurement.scan(view, readings)
         return steps
 
@@ -131,14 +141,14 @@ def _is_multiple(time: float, step: float) -> bool:
     return abs(time / step - round(time / step)) * step < TIME_TOLERANCE
 
 
-def _by_range(places: Sequence[Integers]) -> tuple[int, ...]:
-    counts = np.bincount(np.concatenate(places) if places else [], minlength=len(RANGES))
+def _by_range(classes: Sequence[Integers]) -> tuple[int, ...]:
+    counts = np.bincount(np.concatenate(classes) if classes else [], minlength=len(RANGES))
     return tuple(int(count) for count in counts)
 
 
 def run_trial(
     scenario: str, seed: int, settings: RunSettings, ego: str, conditions: Sequence[Condition]
-) -> tuple[RunResult, PerceptionRecord]:
+) -> tuple[RunResult, Measurement]:
     """Run a scenario of the library with lidars at all stations; return its result and the measurement."""
     stacks: list[MeasuredStations] = []
 
@@ -149,7 +159,7 @@ def run_trial(
     assert settings.detector is not None
     properties = {"detector": settings.detector, **PROPERTIES, **DETECTOR_PROPERTIES[settings.detector]}
     result = run_file(with_properties(scenario, properties), seed=seed, settings=settings, stack=build)
-    return result, stacks[-1].measurement.record()
+    return result, stacks[-1].measurement
 
 
 def with_properties(scenario: str, properties: Mapping[str, str]) -> bytes:

@@ -55,7 +55,7 @@ class EpisodeJob(Job):
     """Run of a part.
 
     digest   digest of the settings and of the code
-    counted  station whose known objects are counted at each time step; "" for none
+    counted  station whose objects after fusion are counted at each time step; "" for none
     load     number of stations that are added to the scenario
     conditions  conditions under which the perception of the ego is measured
     """
@@ -97,7 +97,8 @@ def run_episode(job: EpisodeJob) -> Episode:
     observers = (counter,) if job.counted else ()
     perception = None
     if job.conditions:
-        result, perception = run_trial(job.scenario, job.seed, job.settings, EGO, job.conditions)
+        result, measurement = run_trial(job.scenario, job.seed, job.settings, EGO, job.conditions)
+        perception = measurement.record()
     else:
         path = resolve_scenario(job.scenario)
         source = with_load(path, job.load) if job.load else path

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from eidrive_reports.paper import COUNTS, TABLE_2
 from eidrive_reports.reproduction.layout import PartReport, Row, distinct, limits, number, scenario_title
@@ -25,10 +26,10 @@ MARKERS = {"independent": "o", "bursty": "s", "radio": "^"}
 def channels_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
     """Draw success over latency and over received messages by scenario and planner, and the effects of the load."""
     faults, loads = data["channels"], data["channels_load"]
-    places = list(dict.fromkeys((str(row["scenario"]), str(row["planner"])) for row in faults))
-    figure = Figure(figsize=(3.4 * len(places) + 0.6, 8.4), layout="constrained")
-    panels = figure.subplots(3, len(places), squeeze=False)
-    for (scenario, planner), column in zip(places, panels.T, strict=True):
+    columns = list(dict.fromkeys((str(row["scenario"]), str(row["planner"])) for row in faults))
+    figure = Figure(figsize=(3.4 * len(columns) + 0.6, 8.4), layout="constrained")
+    panels = figure.subplots(3, len(columns), squeeze=False)
+    for (scenario, planner), column in zip(columns, panels.T, strict=True):
         mine = [row for row in faults if (row["scenario"], row["planner"]) == (scenario, planner)]
         _latency(column[0], mine)
         _losses(column[1], mine)
@@ -135,8 +136,8 @@ def _map(axes: Axes, rows: Sequence[Row]) -> QuadMesh:
     starts, speeds = (sorted({number(row, name) for row in rows}) for name in ("start", "speed"))
     shares = np.full((len(speeds), len(starts)), np.nan)
     for row in rows:
-        place = speeds.index(number(row, "speed")), starts.index(number(row, "start"))
-        shares[place] = number(row, "collisions") / number(row, "episodes")
+        cell = speeds.index(number(row, "speed")), starts.index(number(row, "start"))
+        shares[cell] = number(row, "collisions") / number(row, "episodes")
     return heat_cells(axes, starts, speeds, shares, colors=MAP_COLORS, scale=Normalize(0.0, 1.0), line=0.0)
 
 
@@ -155,119 +156,144 @@ def _latency_curve(axes: Axes, rows: Sequence[Row]) -> None:
     axes.tick_params(labelsize=7)
 
 
-ARM_COLORS = {
-    "none": "#6b7280",
-    "average": "#c2410c",
-    "covariance_intersection": "#0b6e99",
-    "covariance_intersection, aligned": "#38bdf8",
-    "early": "#15803d",
-    "attention": "#7e22ce",
-    "attention, aligned": "#d8b4fe",
-    "where2comm": "#be185d",
+ARM_STYLES = {
+    "none": ("#6b7280", "-"),
+    "average": ("#c2410c", "-"),
+    "covariance_intersection": ("#0b6e99", "-"),
+    "covariance_intersection, aligned": ("#0b6e99", "--"),
+    "early": ("#15803d", "-"),
+    "attention": ("#7e22ce", "-"),
+    "attention, aligned": ("#7e22ce", "--"),
+    "where2comm": ("#db2777", "-"),
 }
-"""Color of each arm."""
-UNITS = {"pose error": "pose error [m], and 1° at 0.6 m", "pose drift": "pose drift [m], and 1° at 0.6 m"}
-UNITS |= {"latency": "latency [s]", "loss": "share of lost messages"}
-OVERLAPS = (0.5, 0.7)
-HIDDEN_AXES = ("pose error", "loss")
+"""Color and style of the line of each arm."""
+AXIS_LABELS = {
+    "pose error": "pose error [m], and 1° at 0.6 m",
+    "pose drift": "pose drift [m], and 1° at 0.6 m",
+    "latency": "latency [s]",
+    "loss": "share of lost messages",
+}
+"""Axes that are drawn, in order."""
+OVERLAPS = (0.7, 0.5)
+INTERVALS = 0.25
+"""Opacity of the 95 % intervals of curves."""
 
 
 def precision_figure(data: Mapping[str, Sequence[Row]], part: str) -> Figure:
-    """Draw the curves of a part over each axis at two overlaps, then range, hidden objects and volume."""
+    """Draw the precision at two overlaps and the recall of hidden objects over each axis, then volume and ranges."""
     curves, hidden, volumes = data[part], data[f"{part}_hidden"], data[f"{part}_volume"]
-    axes_names = list(dict.fromkeys(str(row["axis"]) for row in curves))
-    figure = Figure(figsize=(3.4 * len(axes_names), 9.0), layout="constrained")
-    panels = figure.subplots(len(OVERLAPS) + 1, len(axes_names), squeeze=False)
-    for overlap, line in zip(OVERLAPS, panels, strict=False):
-        mine = [row for row in curves if row["range"] == "all" and row["iou"] == overlap]
-        top = 1.05 * max(limits(mine, "ap")[1])
-        for name, axes in zip(axes_names, line, strict=True):
-            _curves(axes, [row for row in mine if row["axis"] == name], "ap")
-            axes.set_xlabel(UNITS.get(name, name), fontsize=8)
-            axes.set_ylim(0.0, top)
-        line[0].set_ylabel(f"average precision at {overlap:g}", fontsize=8)
-    panels[0][0].legend(fontsize=7)
-    last = panels[-1]
-    _ranges(last[0], [row for row in curves if row["axis"] == "latency" and row["value"] == 0.0])
-    for name, axes in zip(HIDDEN_AXES, last[1:-1], strict=False):
-        _curves(axes, [row for row in hidden if row["axis"] == name and row["iou"] == OVERLAPS[0]], "recall")
-        axes.set_xlabel(UNITS[name], fontsize=8)
-        axes.set_ylabel("recall of hidden objects at 0.5", fontsize=8)
-        axes.set_ylim(0.0, 1.0)
-    _volumes(last[-1], volumes)
+    names = [name for name in AXIS_LABELS if name in distinct(curves, "axis")]
+    figure = Figure(figsize=(7.6, 2.0 * (len(names) + 1) + 0.7), layout="constrained")
+    panels = figure.subplots(len(names) + 1, len(OVERLAPS) + 1, squeeze=False)
+    whole = [row for row in curves if row["range"] == "all"]
+    for name, line in zip(names, panels, strict=False):
+        for overlap, axes in zip(OVERLAPS, line, strict=False):
+            _curves(axes, _on_axis(whole, name, overlap), "ap")
+        _curves(line[-1], _on_axis(hidden, name, 0.5), "recall")
+        for axes in line:
+            axes.set_xlabel(AXIS_LABELS[name], fontsize=8)
+            axes.set_ylim(0.0, 1.0)
+    for overlap, column in zip(OVERLAPS, panels.T, strict=False):
+        top = 1.05 * max(limits([row for row in whole if row["iou"] == overlap], "ap")[1])
+        for axes in column[:-1]:
+            axes.set_ylim(0.0, min(1.0, top))
+        column[0].set_title(f"average precision at {overlap:g}", fontsize=9)
+        _volumes(column[-1], volumes, overlap)
+    panels[0][-1].set_title("recall of hidden objects at 0.5", fontsize=9)
+    _ranges(panels[-1][-1], [row for row in curves if row["axis"] == "latency" and row["value"] == 0.0])
     for axes in panels.ravel():
         axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.3, lw=0.5)
+        axes.grid(axis="y", color="#e5e7eb", lw=0.5)
+    shares = {_volume_curve(row) for row in volumes}
+    styles = {**_present(curves), **{name: style for name, style in VOLUME_CURVES.items() if name in shares}}
+    handles = [
+        Line2D([], [], color=color, ls=style, marker="o", ms=3, lw=1.2, label=name)
+        for name, (color, style) in styles.items()
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
-def _present(rows: Sequence[Row]) -> dict[str, str]:
-    """Return the colors of the arms of these rows."""
-    names = set(distinct(rows, "arm"))
-    return {arm: color for arm, color in ARM_COLORS.items() if arm in names}
+def _on_axis(rows: Sequence[Row], axis: str, overlap: float) -> list[Row]:
+    """Return the rows of an axis; those of aligned poses only if poses have errors, as they do not differ otherwise."""
+    return [
+        row
+        for row in rows
+        if (row["axis"], row["iou"]) == (axis, overlap)
+        and (axis.startswith("pose") or not str(row["arm"]).endswith("aligned"))
+    ]
+
+
+def _present(rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
+    """Return color and style of the arms of these rows."""
+    names = distinct(rows, "arm")
+    return {arm: style for arm, style in ARM_STYLES.items() if arm in names}
 
 
 def _curves(axes: Axes, rows: Sequence[Row], name: str) -> None:
-    """Draw one curve per arm with its interval."""
-    for arm, color in _present(rows).items():
+    """Draw one curve per arm, with its intervals side by side."""
+    styles = _present(rows)
+    step = 0.008 * max((number(row, "value") for row in rows), default=0.0)
+    for index, (arm, (color, style)) in enumerate(styles.items()):
         mine = [row for row in rows if row["arm"] == arm]
         at, middle = ([number(row, field) for row in mine] for field in ("value", name))
-        axes.fill_between(at, *limits(mine, name), color=color, alpha=0.12, lw=0)
-        axes.plot(at, middle, "o-", color=color, ms=3, lw=1.2, label=f"{arm}, 95 %")
+        shift = step * (index - (len(styles) - 1) / 2.0)
+        axes.vlines([value + shift for value in at], *limits(mine, name), color=color, alpha=INTERVALS, lw=1.2)
+        axes.plot(at, middle, "o", ls=style, color=color, ms=2.5, lw=1.3)
 
 
 def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
-    """Draw the average precision by range and arm."""
-    mine = [row for row in rows if row["iou"] == OVERLAPS[0] and row["range"] != "all"]
-    places = list(dict.fromkeys(str(row["range"]) for row in mine))
-    colors = _present(mine)
-    width = 0.8 / len(colors)
-    for place, (arm, color) in enumerate(colors.items()):
+    """Draw the average precision by range and arm; aligned poses do not differ without errors."""
+    mine = [row for row in rows if row["range"] != "all" and row["iou"] == 0.5]
+    mine = [row for row in mine if not str(row["arm"]).endswith("aligned")]
+    ranges, styles = distinct(mine, "range"), _present(mine)
+    width = 0.8 / len(styles)
+    for index, (arm, (color, _)) in enumerate(styles.items()):
         some = [row for row in mine if row["arm"] == arm]
-        at = [places.index(str(row["range"])) + width * (place - (len(colors) - 1) / 2) for row in some]
-        values = [number(row, "ap") for row in some]
-        errors = [[abs(end - value) for value, end in zip(values, ends, strict=True)] for ends in limits(some, "ap")]
-        axes.bar(at, values, width, color=color, yerr=errors, error_kw={"lw": 0.8})
-    axes.set_xticks(range(len(places)), labels=places)
+        at = [ranges.index(str(row["range"])) + width * (index - (len(styles) - 1) / 2.0) for row in some]
+        axes.bar(at, [number(row, "ap") for row in some], width, color=color)
+        axes.vlines(at, *limits(some, "ap"), color="black", lw=0.6)
+    axes.set_xticks(range(len(ranges)), labels=ranges)
     axes.set_xlabel("distance from the ego, without faults", fontsize=8)
-    axes.set_ylabel(f"average precision at {OVERLAPS[0]:g}", fontsize=8)
+    axes.set_ylabel("average precision at 0.5", fontsize=8)
 
 
-def _volumes(axes: Axes, rows: Sequence[Row]) -> None:
-    """Draw the average precision over the size of the messages; the ego alone is a horizontal line.
+VOLUME = "megabytes_per_second"
+VOLUME_CURVES = {
+    "bytes: features and boxes": ("#7e22ce", "-"),
+    "bytes: features only": ("#a16207", "-"),
+    "bytes: features as codes, and boxes": ("#7e22ce", ":"),
+}
+"""Curves over the volume with one point per share of the cells; other arms are points or curves of their own."""
 
-    Arms with features form two curves: with 8-bit integers from `attention` with all cells down to `where2comm`, and
-    with codes.
-    """
-    for arm, color in {**_present(rows), CODES: CODES_COLOR}.items():
-        mine = sorted((row for row in rows if _volume_curve(row) == arm), key=lambda row: number(row, VOLUME))
-        for overlap, style in zip(OVERLAPS, ("o-", "s--"), strict=True):
-            values = [number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
-            if arm == "none":
-                axes.axhline(values[0], color=color, lw=1, ls=style[1:])
-                continue
+
+def _volumes(axes: Axes, rows: Sequence[Row], overlap: float) -> None:
+    """Draw the average precision over the size of the messages; the ego alone is a horizontal line."""
+    styles = {**_present(rows), **VOLUME_CURVES}
+    for curve in dict.fromkeys(_volume_curve(row) for row in rows):
+        mine = sorted((row for row in rows if _volume_curve(row) == curve), key=lambda row: number(row, VOLUME))
+        if curve not in styles:
+            continue
+        color, style = styles[curve]
+        values = [number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
+        if curve == "none":
+            axes.axhline(values[0], color=color, lw=1.3, ls=style)
+        else:
             at = [number(row, VOLUME) for row in mine]
-            label = f"at {overlap:g}" if arm == "early" else VOLUME_LABELS.get(arm) if mine and style == "o-" else None
-            axes.plot(at, values, style, color=color, ms=3, lw=1.2, label=label)
+            axes.plot(at, values, "o", ls=style, color=color, ms=2.5, lw=1.3)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("all messages [MB/s]", fontsize=8)
-    axes.set_ylabel("average precision", fontsize=8)
-    axes.legend(fontsize=7)
 
 
-CODES, CODES_COLOR = "codes", "#ca8a04"
-VOLUME_LABELS = {"attention": "features, int8", CODES: "features, codes"}
-VOLUME = "megabytes_per_second"
-
-
-def _volume_curve(row: Row) -> str | None:
-    """Return the curve over the volume to which a row belongs; None for another method with all cells."""
-    if row["share"] is None:
-        return str(row["arm"])
-    if row["encoding"] == CODES:
-        return CODES
-    return None if row["arm"] in ("max", "attention, aligned") else "attention"
+def _volume_curve(row: Row) -> str:
+    """Return the curve over the volume to which a row belongs."""
+    arm = str(row["arm"])
+    if row["share"] is None or arm in ("max", "attention, aligned"):
+        return arm
+    if row["encoding"] == "codes":
+        return "bytes: features as codes, and boxes"
+    return "bytes: features only" if arm.startswith("features only") else "bytes: features and boxes"
 
 
 ORDERED_COLORS = ("#0b6e99", "#c2410c")
@@ -299,10 +325,10 @@ def table_2_figure(data: PaperRows) -> Figure:
 
 def _paper_points(axes: Axes, arms: Sequence[str], scenario: str, detector: str) -> None:
     """Draw mean, standard deviation and the episodes of the paper."""
-    for place, arm in enumerate(arms):
+    for index, arm in enumerate(arms):
         published = TABLE_2[scenario, detector, arm]
-        at = place + 0.25
-        label = "paper: mean ± sd, episodes" if place == 0 else None
+        at = index + 0.25
+        label = "paper: mean ± sd, episodes" if index == 0 else None
         _paper_values(axes, [at], [published.mean], [published.sd], label)
         axes.plot([at + 0.12] * len(published.episodes), published.episodes, "_", ms=5, color=PAPER, alpha=0.5)
 
@@ -325,9 +351,9 @@ def table_3_figure(data: PaperRows) -> Figure:
             mine = _select(rows, scenario=scenario, detector=detector)
             at = [senders.index(str(row["senders"])) for row in mine]
             low, rate, high = ([number(row, name) for row in mine] for name in ("rate_low", "rate", "rate_high"))
-            _interval(axes, [place - 0.1 for place in at], low, rate, high, ORDERED_COLORS[0], "measured, 95 %")
+            _interval(axes, [index - 0.1 for index in at], low, rate, high, ORDERED_COLORS[0], "measured, 95 %")
             paper, spread = ([number(row, name) for row in mine] for name in ("paper_rate", "paper_rate_sd"))
-            _paper_values(axes, [place + 0.1 for place in at], paper, spread, "paper ± sd")
+            _paper_values(axes, [index + 0.1 for index in at], paper, spread, "paper ± sd")
             axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
             axes.set_xticks(range(len(senders)), labels=senders, fontsize=8)
             axes.set_xlim(-0.5, len(senders) - 0.5)
@@ -375,6 +401,10 @@ FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
 """Figure of a part, by the name of the part. The others have none."""
 
 
+RESOLUTION = 110
+"""Resolution of PNG files [dots per inch]."""
+
+
 def draw(part: str, report: PartReport, out: Path) -> Path | None:
     """Draw the figure of a part into a folder as PNG and PDF; return the path of the PNG, None without a figure.
 
@@ -384,7 +414,7 @@ def draw(part: str, report: PartReport, out: Path) -> Path | None:
         return None
     figure, path = FIGURES[part](report.data()), out / f"{part}.png"
     for suffix in (".png", ".pdf"):
-        write_figure(figure, path.with_suffix(suffix), 130)
+        write_figure(figure, path.with_suffix(suffix), RESOLUTION)
     return path
 
 
@@ -404,7 +434,7 @@ def _interval(
 ) -> None:
     below = [value - end for value, end in zip(middle, low, strict=True)]
     above = [end - value for value, end in zip(middle, high, strict=True)]
-    errors = [[max(0.0, one) for one in below], [max(0.0, one) for one in above]]
+    errors = [[max(0.0, length) for length in lengths] for lengths in (below, above)]
     axes.errorbar(at, middle, yerr=errors, fmt="o", ms=4, color=color, capsize=3, lw=1, label=label)
 
 

@@ -70,11 +70,11 @@ def write_paper_page(out: Path) -> Path:
 
 def _duration(origins: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the number of runs and the duration of all parts; empty if one was not computed in a single call."""
-    known = [origins[name] for name in PARTS if name in origins]
-    if not known or any(one.get("runs") != one.get("runs_of_last_call") for one in known):
+    parts = [origins[name] for name in PARTS if name in origins]
+    if not parts or any(part.get("runs") != part.get("runs_of_last_call") for part in parts):
         return ""
-    runs, seconds = (sum(float(one[name]) for one in known) for name in ("runs", "last_call_s"))
-    processes = max(int(one.get("processes") or 1) for one in known)
+    runs, seconds = (sum(float(part[name]) for part in parts) for name in ("runs", "last_call_s"))
+    processes = max(int(part.get("processes") or 1) for part in parts)
     duration = f"{seconds:.0f} seconds" if seconds < 120.0 else f"{seconds / 60.0:.0f} minutes"
     return f"{runs:,.0f} runs in {duration} on {processes} process{'es' if processes > 1 else ''}"
 

@@ -17,7 +17,7 @@ class Case:
     """Scenario with the settings of one arm, which is run with every seed.
 
     arm      name of the settings, without the scenario
-    counted  station whose known objects are counted; "" for none
+    counted  station whose objects after fusion are counted; "" for none
     varied   function that returns the parameters of a seed, if the part draws them instead of the scenario
     load     number of stations that are added to the scenario and send CAM; see `with_load`
     shift    number that is added to the seed, so that an arm can have several runs per episode
@@ -76,10 +76,10 @@ class Part:
 
 def by_case(episodes: Sequence[Episode]) -> dict[tuple[str, str], list[Episode]]:
     """Return the episodes of each case by scenario and arm, ordered by seed."""
-    found: dict[tuple[str, str], list[Episode]] = {}
-    for episode in sorted(episodes, key=lambda one: one.seed):
-        found.setdefault((episode.scenario, episode.arm), []).append(episode)
-    return found
+    cases: dict[tuple[str, str], list[Episode]] = {}
+    for episode in sorted(episodes, key=lambda episode: episode.seed):
+        cases.setdefault((episode.scenario, episode.arm), []).append(episode)
+    return cases
 
 
 def select(episodes: Sequence[Episode], scenario: str, arm: str) -> list[Episode]:

@@ -41,7 +41,7 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
 
     Raise SettingError for a name that no part uses, or if the part uses none of them.
     """
-    _check("--detectors", names, dict.fromkeys(name for one in (*PARTS.values(), part) for name in one.detectors))
+    _check("--detectors", names, dict.fromkeys(name for user in (*PARTS.values(), part) for name in user.detectors))
     detectors = tuple(name for name in part.detectors if name in names) if names else part.default
     if not detectors:
         message = f"--detectors: part {part.name} uses none of them (got {quoted(','.join(names))})"
@@ -49,8 +49,8 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
     return detectors
 
 
-def _check(what: str, names: Iterable[str], known: Iterable[str]) -> None:
-    known = tuple(known)
+def _check(what: str, names: Iterable[str], valid: Iterable[str]) -> None:
+    valid = tuple(valid)
     for name in names:
-        if name not in known:
-            raise SettingError(Diagnostic(f"{what}: unknown name {quoted(name)}", suggestion(name, known)))
+        if name not in valid:
+            raise SettingError(Diagnostic(f"{what}: unknown name {quoted(name)}", suggestion(name, valid)))

@@ -9,6 +9,7 @@ from eidrive_reports.cooperative_perception.receivers import (
     AXES,
     DRIFT_TIME,
     LEAST_EXISTENCE,
+    POSE_AND_LATENCY,
     SCAN_RATE,
     YAW_PER_POSITION,
     Condition,
@@ -19,20 +20,19 @@ from eidrive_reports.cooperative_perception.scores import RANGES, PerceptionReco
 from eidrive_reports.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_reports.reproduction import pose_errors
 from eidrive_reports.reproduction.episodes import Episode
-from eidrive_reports.reproduction.layout import REASON, DataTable, PartReport, Row, Section, number, result_sections
+from eidrive_reports.reproduction.layout import REASON, PartReport, Row, Section, number, result_sections
 from eidrive_reports.reproduction.part import Case, Part
-from eidrive_reports.reproduction.perception_shapes import SHAPE_COLUMNS, crossing, shapes
+from eidrive_reports.reproduction.perception_shapes import crossing, shape_section
 from eidrive_reports.reproduction.perception_tables import (
     arm_rows,
     arm_table,
     curve_rows,
-    curve_table,
+    curve_sections,
     data_sections,
     hidden_rows,
-    hidden_table,
+    object_counts,
     records,
     volume_rows,
-    volume_table,
 )
 from eidrive_scenario.api.run import RunSettings
 
@@ -47,10 +47,9 @@ STUDY = Study(
 )
 
 
-def setup(records: Sequence[PerceptionRecord], seeds: int, scenes: int) -> tuple[str, ...]:
+def setup(measured: Sequence[PerceptionRecord], seeds: int, scenes: int) -> tuple[str, ...]:
     """Return the paragraphs about runs and arms."""
-    frames, objects = sum(one.frames for one in records), sum(sum(one.objects) for one in records)
-    hit, hidden = sum(sum(one.hit) for one in records), sum(sum(one.hidden) for one in records)
+    frames, objects, hit, hidden = object_counts(measured, STUDY)
     return (
         f"{scenes} scenes of the library with {seeds} seeds each: scenario 3 (parked ego, one vehicle sends), 4 "
         "(parked ego, three roadside units), 5 and 7 (ego turns at a crossing, a vehicle and one or two roadside "
@@ -111,7 +110,7 @@ def conclusions(arms: Sequence[Row], curves: Sequence[Row], volumes: Sequence[Ro
     return (
         f"Without faults, AP at 0.3, 0.5 and 0.7: {'; '.join(listed)}.",
         f"Hidden objects that are found at 0.5: {', '.join(hidden)}.",
-        *(_limits(curves, axis) for axis in AXES),
+        *(_limits(curves, axis) for axis in AXES if axis != POSE_AND_LATENCY),
         _volume(volumes),
         _sorting(arms),
         *_departures(by_arm),
@@ -203,20 +202,15 @@ def measured_cases(detectors: Sequence[str], study: Study) -> list[Case]:
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: protocol, results without faults, curves, hidden objects, volume, and shapes of the curves."""
-    found = records(episodes)
-    curves, hidden = tuple(curve_rows(found, STUDY)), tuple(hidden_rows(found, STUDY))
-    arms, volumes = tuple(arm_rows(found, STUDY)), tuple(volume_rows(found, STUDY))
-    seeds = len({one.seed for one in episodes})
+    measured = records(episodes)
+    curves, hidden = tuple(curve_rows(measured, STUDY)), tuple(hidden_rows(measured, STUDY))
+    arms, volumes = tuple(arm_rows(measured, STUDY)), tuple(volume_rows(measured, STUDY))
     sections = (
-        Section("Set-up", setup(found, seeds, len(SCENES))),
+        Section("Set-up", setup(measured, len({episode.seed for episode in episodes}), len(SCENES))),
         Section("Protocol", protocol(STUDY)),
         *result_sections(conclusions(arms, curves, volumes), arm_table(arms, STUDY)),
-        Section(
-            "Shapes of the curves", (), DataTable("perception_shapes", SHAPE_COLUMNS, shapes(STUDY, curves, volumes))
-        ),
-        Section("Curves", ("Average precision over all ranges.",), curve_table(curves, STUDY)),
-        Section("Objects hidden to the ego", ("Recall at the overlap 0.5.",), hidden_table(hidden, STUDY)),
-        Section("Precision and volume", (), volume_table(volumes, STUDY)),
+        shape_section(STUDY, curves, volumes),
+        *curve_sections(curves, hidden, volumes, STUDY),
         pose_errors.section(episodes),
         *data_sections(curves, hidden, STUDY),
     )

@@ -16,8 +16,20 @@ ALL_RANGES = "all"
 
 def records(episodes: Sequence[Episode]) -> list[PerceptionRecord]:
     """Return the measurements by scene and seed."""
-    ordered = [one for mine in by_case(episodes).values() for one in mine]
-    return [one.perception for one in ordered if one.perception is not None]
+    ordered = [episode for mine in by_case(episodes).values() for episode in mine]
+    return [episode.perception for episode in ordered if episode.perception is not None]
+
+
+def object_counts(measurements: Sequence[PerceptionRecord], study: Study) -> tuple[int, int, int, int]:
+    """Return the number of frames, of objects in the ranges of a study, of those that any lidar hits, and of those
+    hidden to the ego."""
+    reach = study.reach
+    counts = [
+        (record.frames, sum(record.objects[:reach]), sum(record.hit[:reach]), sum(record.hidden[:reach]))
+        for record in measurements
+    ]
+    frames, objects, hit, hidden = (sum(values) for values in zip(*counts, strict=True))
+    return frames, objects, hit, hidden
 
 
 def pool(measurements: Sequence[PerceptionRecord], study: Study, condition: Condition) -> Pool:
@@ -25,32 +37,32 @@ def pool(measurements: Sequence[PerceptionRecord], study: Study, condition: Cond
     return Pool(measurements, condition.name, study.reach)
 
 
-def range_name(place: int | None) -> str:
+def range_name(range_class: int | None) -> str:
     """Return the name of a range class, such as `30 to 50 m`."""
-    if place is None:
+    if range_class is None:
         return ALL_RANGES
-    return f"{RANGES[place - 1] if place else 0.0:g} to {RANGES[place]:g} m"
+    return f"{RANGES[range_class - 1] if range_class else 0.0:g} to {RANGES[range_class]:g} m"
 
 
 def curve_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
     """Yield the average precision of each arm over each axis, by range and overlap."""
-    places: tuple[int | None, ...] = (None, *range(study.reach))
+    classes: tuple[int | None, ...] = (None, *range(study.reach))
     for arm, axis in product(study.compared, study.axes):
         for value in AXES[axis][2]:
-            measured = pool(measurements, study, on_axis(arm, axis, value))
-            for place, (index, overlap) in product(places, enumerate(OVERLAPS)):
-                one = measured.precision(index, place)
+            pooled = pool(measurements, study, on_axis(arm, axis, value))
+            for range_class, (index, overlap) in product(classes, enumerate(OVERLAPS)):
+                precision = pooled.precision(index, range_class)
                 yield {
                     "arm": arm,
                     "axis": axis,
                     "value": value,
-                    "range": range_name(place),
+                    "range": range_name(range_class),
                     "iou": overlap,
-                    "ap": finite(one.value),
-                    "low": finite(one.low),
-                    "high": finite(one.high),
-                    "ap_local_sort": finite(one.local),
-                    "objects": one.objects,
+                    "ap": finite(precision.value),
+                    "low": finite(precision.low),
+                    "high": finite(precision.high),
+                    "ap_local_sort": finite(precision.local),
+                    "objects": precision.objects,
                 }
 
 
@@ -58,33 +70,40 @@ def hidden_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Itera
     """Yield the recall of objects that are hidden to the ego and that the lidar of another station hits."""
     for arm, axis in product(study.compared, study.axes):
         for value in AXES[axis][2]:
-            measured = pool(measurements, study, on_axis(arm, axis, value))
+            pooled = pool(measurements, study, on_axis(arm, axis, value))
             for index, overlap in enumerate(OVERLAPS):
-                one = measured.hidden_recall(index)
-                place: dict[str, Value] = {"arm": arm, "axis": axis, "value": value, "iou": overlap}
-                counts: dict[str, Value] = {"found": one.found, "hidden": one.objects}
-                limits = {"low": finite(one.low), "high": finite(one.high)}
-                yield {**place, **counts, "recall": finite(one.value), **limits}
+                recall = pooled.hidden_recall(index)
+                yield {
+                    "arm": arm,
+                    "axis": axis,
+                    "value": value,
+                    "iou": overlap,
+                    "detected": recall.detected,
+                    "hidden": recall.objects,
+                    "recall": finite(recall.value),
+                    "low": finite(recall.low),
+                    "high": finite(recall.high),
+                }
 
 
 def arm_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
     """Yield the results of each arm without faults, with both ways of sorting and both truths."""
     for arm in study.arms:
-        measured = pool(measurements, study, Condition(arm))
-        whole = [measured.precision(number) for number in range(len(OVERLAPS))]
-        row: dict[str, Value] = {"arm": arm}
-        for overlap, one in zip(OVERLAPS, whole, strict=True):
-            row |= {
-                f"ap_{_key(overlap)}": one.value,
-                f"low_{_key(overlap)}": finite(one.low),
-                f"high_{_key(overlap)}": finite(one.high),
+        pooled = pool(measurements, study, Condition(arm))
+        precisions = [pooled.precision(index) for index in range(len(OVERLAPS))]
+        fields: dict[str, Value] = {"arm": arm}
+        for overlap, precision in zip(OVERLAPS, precisions, strict=True):
+            fields |= {
+                f"ap_{_key(overlap)}": precision.value,
+                f"low_{_key(overlap)}": finite(precision.low),
+                f"high_{_key(overlap)}": finite(precision.high),
             }
-        for place in range(study.reach):
-            row[f"ap_50_range_{place}"] = finite(measured.precision(1, place).value)
-        row["ap_50_local_sort"] = whole[1].local
-        row["ap_50_hit"] = finite(measured.precision_of_hit_objects().value)
-        row["hidden_50"] = finite(measured.hidden_recall(1).value)
-        yield row
+        for range_class in range(study.reach):
+            fields[f"ap_50_range_{range_class}"] = finite(pooled.precision(1, range_class).value)
+        fields["ap_50_local_sort"] = precisions[1].local
+        fields["ap_50_hit"] = finite(pooled.precision_of_hit_objects().value)
+        fields["hidden_50"] = finite(pooled.hidden_recall(1).value)
+        yield fields
 
 
 def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
@@ -92,21 +111,17 @@ def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Itera
 
     share  of the cells of a map of features
     """
-    for one in (Condition(study.arms[0]), *study.volumes):
-        measured, arm = pool(measurements, study, one), ARMS[one.arm]
-        row: dict[str, Value] = {
-            "arm": one.arm,
-            "messages_per_second": SCAN_RATE / one.every if arm.cooperates else None,
-            "cell": one.cell if arm.shares == "points" else None,
+    for condition in (Condition(study.arms[0]), *study.volumes):
+        pooled, arm = pool(measurements, study, condition), ARMS[condition.arm]
+        fields: dict[str, Value] = {
+            "arm": condition.arm,
+            "messages_per_second": SCAN_RATE / condition.every if arm.cooperates else None,
+            "cell": condition.cell if arm.shares == "points" else None,
             "share": arm.settings.get("share"),
             "encoding": arm.settings.get("encoding"),
-            "megabytes_per_second": measured.megabytes_per_second,
+            "megabytes_per_second": pooled.megabytes_per_second,
         }
-        yield row | {f"ap_{_key(overlap)}": measured.precision(index).value for index, overlap in enumerate(OVERLAPS)}
-
-
-def _place(axis: str, value: float) -> dict[str, Value]:
-    return {"axis": axis, "value": value}
+        yield fields | {f"ap_{_key(overlap)}": pooled.precision(index).value for index, overlap in enumerate(OVERLAPS)}
 
 
 def _key(overlap: float) -> int:
@@ -136,7 +151,7 @@ def arm_table(rows: Sequence[Row], study: Study) -> DataTable:
     columns = (
         plain("arm", "arm"),
         *(_precision(overlap) for overlap in OVERLAPS),
-        *(plain(f"AP 0.5, {range_name(place)}", f"ap_50_range_{place}", ".3f") for place in range(study.reach)),
+        *(plain(f"AP 0.5, {range_name(number)}", f"ap_50_range_{number}", ".3f") for number in range(study.reach)),
         plain("AP 0.5, local sort", "ap_50_local_sort", ".3f"),
         plain("AP 0.5, hit objects", "ap_50_hit", ".3f"),
         plain("recall of hidden objects, 0.5", "hidden_50", ".3f"),
@@ -157,12 +172,16 @@ def volume_table(rows: Sequence[Row], study: Study) -> DataTable:
 
 def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of all ranges with one column per arm and overlap."""
-    held = {
+    precisions = {
         (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
     }
     lines: list[Row] = [
-        _place(axis, value)
-        | {f"{arm}_{_key(overlap)}": held[axis, value, arm, overlap] for arm in study.compared for overlap in OVERLAPS}
+        {"axis": axis, "value": value}
+        | {
+            f"{arm}_{_key(overlap)}": precisions[axis, value, arm, overlap]
+            for arm in study.compared
+            for overlap in OVERLAPS
+        }
         for axis in study.axes
         for value in AXES[axis][2]
     ]
@@ -180,11 +199,11 @@ def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
 
 def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of the recall at the overlap 0.5 with one column per arm."""
-    held = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
+    recalls = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
     lines: list[Row] = [
-        _place(axis, value)
-        | {arm: held[axis, value, arm]["recall"] for arm in study.compared}
-        | {"hidden": held[axis, value, study.compared[0]]["hidden"]}
+        {"axis": axis, "value": value}
+        | {arm: recalls[axis, value, arm]["recall"] for arm in study.compared}
+        | {"hidden": recalls[axis, value, study.compared[0]]["hidden"]}
         for axis in study.axes
         for value in AXES[axis][2]
     ]
@@ -195,6 +214,17 @@ def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
         plain("objects", "hidden"),
     )
     return DataTable(f"{study.name}_hidden_curves", columns, tuple(lines))
+
+
+def curve_sections(
+    curves: Sequence[Row], hidden: Sequence[Row], volumes: Sequence[Row], study: Study
+) -> tuple[Section, ...]:
+    """Return the sections with the tables of curves, hidden objects and volume."""
+    return (
+        Section("Curves", ("Average precision over all ranges.",), curve_table(curves, study)),
+        Section("Objects hidden to the ego", ("Recall at the overlap 0.5.",), hidden_table(hidden, study)),
+        Section("Precision and volume", (), volume_table(volumes, study)),
+    )
 
 
 def data_sections(curves: Sequence[Row], hidden: Sequence[Row], study: Study) -> tuple[Section, ...]:

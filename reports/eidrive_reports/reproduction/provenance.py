@@ -54,7 +54,7 @@ def job_digest(scenario: str, settings: RunSettings, *, load: int = 0, condition
     if own:
         content["files"] = [sha256_of(path.read_bytes()) for path in own]
     if conditions:
-        content |= {"conditions": [one.name for one in conditions], "measurement": _measurement_digest()}
+        content |= {"conditions": [condition.name for condition in conditions], "measurement": _measurement_digest()}
     return sha256_of(canonical_json(content).encode())[:_LENGTH]
 
 
@@ -65,7 +65,7 @@ def _own_files(settings: RunSettings) -> list[Path]:
     """
     named = (("detectors", settings.detector), ("fusion", settings.fusion), ("planners", settings.planner))
     used = [(registry(kind), name) for kind, name in named if name is not None]
-    modules = [Path(getfile(found.load(name))) for found, name in used if found.distribution(name) is not None]
+    modules = [Path(getfile(group.load(name))) for group, name in used if group.distribution(name) is not None]
     return modules + [path for path in map(Path, map(str, settings.sources)) if _is_file(path)]
 
 
@@ -138,12 +138,12 @@ def read_provenance(out: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        known = load_json(path.read_bytes())
+        origins = load_json(path.read_bytes())
     except ValueError as error:
         raise SettingError(Diagnostic(f"the file is damaged: {error}", "remove it", str(path))) from error
-    if not isinstance(known, dict):
+    if not isinstance(origins, dict):
         raise SettingError(Diagnostic("the file is damaged: not a JSON object", "remove it", str(path)))
-    return known
+    return origins
 
 
 def write_provenance(
@@ -155,7 +155,7 @@ def write_provenance(
     added      number of runs of this call; without one, commit and duration remain those of the call that computed
     elapsed_s  duration of this call [s];  processes  number of its processes
     """
-    known = read_provenance(out)
+    origins = read_provenance(out)
     code = {"version": version(ENGINE), "code": code_digest(), "python": platform.python_version()}
     call = {
         "commit": commit(),
@@ -163,10 +163,10 @@ def write_provenance(
         "last_call_s": round(elapsed_s, 1),
         "processes": processes,
     }
-    former = known.get(part)
+    former = origins.get(part)
     if not added and isinstance(former, dict) and former.get("code") == code["code"]:
         call = {name: former.get(name) for name in call}
-    parts = {**known, part: {**code, **call, **values}}
+    parts = {**origins, part: {**code, **call, **values}}
     with write_atomically(out / FILE) as stream:
         stream.write((json.dumps(parts, indent=1, sort_keys=True) + "\n").encode())
 
@@ -177,8 +177,8 @@ def commit() -> str | None:
     try:
         if Path(_git(folder, "rev-parse", "--show-toplevel")) != folder.resolve().parent:
             return None  # an installed package within the checkout of another project
-        found = _git(folder, "rev-parse", "HEAD")
-        return found + ("+" if _git(folder, "status", "--porcelain", "--untracked-files=no") else "")
+        head = _git(folder, "rev-parse", "HEAD")
+        return head + ("+" if _git(folder, "status", "--porcelain", "--untracked-files=no") else "")
     except (OSError, subprocess.SubprocessError):
         return None
 

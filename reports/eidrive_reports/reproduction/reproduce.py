@@ -114,23 +114,23 @@ def reproduce(
     read_provenance(out)  # a damaged file is an error before the runs, not after them
     jobs = part.jobs(episodes, detectors)
     with Record.open(out / f"{part.name}.jsonl", restart=restart) as record:
-        known = len(record.episodes)
+        recorded = len(record.episodes)
         left = [job for job in jobs if job.key not in record.episodes]
         if left:
             run_jobs(left, run_episode, workers=workers, console=console, title=part.name, finished=record.add)
-        found = tuple(record.episodes[job.key] for job in jobs)
-    report = part.report(found, detectors)
+        used = tuple(record.episodes[job.key] for job in jobs)
+    report = part.report(used, detectors)
     report = replace(report, sections=(Section("Question", (part.question,)), *report.sections))
     _write_report(part, out, report)
-    unused = known - (len(jobs) - len(left))
-    done = Reproduced(report, found, len(left), unused, time.perf_counter() - start)
+    unused = recorded - (len(jobs) - len(left))
+    done = Reproduced(report, used, len(left), unused, time.perf_counter() - start)
     write_provenance(
         out,
         part.name,
         {
             "seeds": f"1 to {episodes}",
             "detectors": list(detectors),
-            "runs": len(found),
+            "runs": len(used),
             "all_runs_s": round(done.computed_s, 1),
         },
         added=done.added,
