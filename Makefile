@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help help-all install demo test test-all lint reproduce docs check-docs check-standards bench bench-compare bench-corpora bench-history eval closed-loop planners overtaking corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
+.PHONY: help help-all install demo test test-all lint reproduce docs check-docs check-standards bench bench-compare bench-corpora bench-history eval closed-loop planners overtaking corner-cases driven-files long-drives heat-maps fusion-picture library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -hE '^[a-z-]+:.* ## ' $(MAKEFILE_LIST) | sed -E 's/:.* ## /\t/' | expand -t 20
@@ -82,6 +82,9 @@ closed-loop: install  #- run the scenarios of the paper with learned detectors, 
 
 heat-maps: install  #- run the obstructed crossings over both speeds: reports/heat_maps/*.png
 	$(BIN)/python -m eidrive_reports.heat_maps --out reports/heat_maps
+
+fusion-picture: install  #- draw features, transmitted cells and fused objects of scenario 5: docs/figures/feature_fusion.png
+	$(BIN)/python -m eidrive_reports.fusion_picture
 
 library-pictures: install  #- draw the scenarios of the library: docs/library/*.png and docs/library.md
 	$(BIN)/python -m eidrive_reports.library_pictures

@@ -94,7 +94,7 @@ def test_learned_fusion_uses_scenes_and_faults_of_the_part_perception() -> None:
     assert set(learned.STUDY.axes) < set(perception.STUDY.axes)
 
 
-def test_table_of_gains_has_a_line_per_fault_and_a_column_per_arm() -> None:
+def test_table_of_gains_has_line_per_fault_and_column_per_arm() -> None:
     """8 of 10 objects with features and 7 with boxes: a gain of 0.1 at each of the 12 faults."""
     table = learned.gain_table(tuple(learned.gain_rows(records(episodes(learned.STUDY)))), "average")
     assert [column.title for column in table.columns][2:] == [f"{arm} (95 %)" for arm in learned.INTERMEDIATE]
@@ -207,7 +207,7 @@ def test_shapes_over_the_share_of_the_cells() -> None:
     assert [row["holds"] for row in rows if "of the cells" in str(row["shape"])] == ["no", "no"]
 
 
-def test_axis_of_pose_error_and_latency_has_both_faults_of_the_noisy_setting_of_v2xset() -> None:
+def test_axis_with_two_faults_is_noisy_setting_of_v2xset() -> None:
     """OpenCOOD: 0.2 m on x and y, and 100 ms."""
     condition = on_axis("average", POSE_AND_LATENCY, 0.2)
     assert (condition.deviation, condition.latency) == (0.2, 0.1)

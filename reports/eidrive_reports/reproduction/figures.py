@@ -204,6 +204,7 @@ def precision_figure(data: Mapping[str, Sequence[Row]], part: str) -> Figure:
     for axes in panels.ravel():
         axes.tick_params(labelsize=7)
         axes.grid(axis="y", color="#e5e7eb", lw=0.5)
+        axes.set_axisbelow(True)
     shares = {_volume_curve(row) for row in volumes}
     styles = {**_present(curves), **{name: style for name, style in VOLUME_CURVES.items() if name in shares}}
     handles = [
@@ -264,7 +265,7 @@ VOLUME_CURVES = {
     "bytes: features only": ("#a16207", "-"),
     "bytes: features as codes, and boxes": ("#7e22ce", ":"),
 }
-"""Curves over the volume with one point per share of the cells; other arms are points or curves of their own."""
+"""Curves over the volume with one point per share of the cells; each other arm is a curve or a point."""
 
 
 def _volumes(axes: Axes, rows: Sequence[Row], overlap: float) -> None:

@@ -57,20 +57,20 @@ def shapes(study: Study, curves: Sequence[Row], volumes: Sequence[Row]) -> tuple
             by_curve.setdefault(key, {})[number(row, "value")] = number(row, "ap")
     sending = [arm for arm in study.compared if ARMS[arm].cooperates]
     intermediate = [arm for arm in sending if ARMS[arm].shares == "features"]
-    whole = [arm for arm in sending if arm not in intermediate]
+    others = [arm for arm in sending if arm not in intermediate]
     rows = [
         _flat_alone(by_curve),
         _late_below_alone(by_curve, intermediate),
         _strict_falls_first(by_curve, sending, [axis for axis in study.axes if axis != POSE_AND_LATENCY]),
-        _loss_of_messages(by_curve, whole),
+        _loss_of_messages(by_curve, others),
         _compensated(by_curve),
         *(_aligned(by_curve, arm, study.axes) for arm in sending if f"{arm}, aligned" in sending),
-        *_plateaus(volumes, whole),
+        *_plateaus(volumes, others),
         _order(by_curve, "early", [LATE, "early"]),
     ]
     if intermediate:
         rows += [
-            _loss_of_frames(by_curve, intermediate, whole),
+            _loss_of_frames(by_curve, intermediate, others),
             *_masks(volumes),
             _order(by_curve, "intermediate", [LATE, *intermediate]),
             _early_and_intermediate(by_curve, intermediate),
@@ -158,11 +158,11 @@ def _loss_of_messages(curves: _Curves, arms: Sequence[str]) -> Row:
     return _row(shape, max(shares.values()) < MILD, f"benefit that remains: {', '.join(texts)}")
 
 
-def _loss_of_frames(curves: _Curves, intermediate: Sequence[str], whole: Sequence[str]) -> Row:
+def _loss_of_frames(curves: _Curves, intermediate: Sequence[str], others: Sequence[str]) -> Row:
     """Cells of an object are redundant, and frames are lost independently."""
     values = {value: _remaining(curves, intermediate, value) for value in AXES["loss"][2][1:]}
     last = max(values)
-    messages = max(_remaining(curves, whole, last).values())
+    messages = max(_remaining(curves, others, last).values())
     texts = [
         f"{arm} {', '.join(f'{shares[arm]:.0%} at {value:.0%}' for value, shares in values.items())}"
         for arm in intermediate

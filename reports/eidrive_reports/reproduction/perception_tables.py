@@ -124,6 +124,10 @@ def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Itera
         yield fields | {f"ap_{_key(overlap)}": pooled.precision(index).value for index, overlap in enumerate(OVERLAPS)}
 
 
+def _fault(axis: str, value: float) -> dict[str, Value]:
+    return {"axis": axis, "value": value}
+
+
 def _key(overlap: float) -> int:
     """Return the overlap in percent, for names of fields."""
     return round(100.0 * overlap)
@@ -176,7 +180,7 @@ def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
         (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
     }
     lines: list[Row] = [
-        {"axis": axis, "value": value}
+        _fault(axis, value)
         | {
             f"{arm}_{_key(overlap)}": precisions[axis, value, arm, overlap]
             for arm in study.compared
@@ -201,7 +205,7 @@ def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of the recall at the overlap 0.5 with one column per arm."""
     recalls = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
     lines: list[Row] = [
-        {"axis": axis, "value": value}
+        _fault(axis, value)
         | {arm: recalls[axis, value, arm]["recall"] for arm in study.compared}
         | {"hidden": recalls[axis, value, study.compared[0]]["hidden"]}
         for axis in study.axes
