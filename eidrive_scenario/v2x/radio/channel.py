@@ -105,13 +105,19 @@ class RadioChannel(QueuedChannel):
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         self._advance(now)
         offered: list[Transmission] = []
+        reports: dict[str, int] = {}
+        """Number of the message that determines the jitter of each sender."""
         for message, receivers in outbox:
             rows = self._rows_of(message.sender, receivers)
             if message.sender not in self._rows or len(rows) < len(receivers):
                 missing = next(name for name in (message.sender, *receivers) if name not in self._rows)
                 raise ValueError(f"station {missing!r} has no antenna position in the radio environment")
             row = self._rows[message.sender]
-            ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
+            # Features are ready with the CPM before them: with a random time for each frame they would enter the queue
+            # out of order, and a full queue would drop any of them instead of the last ones
+            number = reports.get(message.sender, message.number) if message.kind == "features" else message.number
+            reports[message.sender] = number
+            ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], number)
             entry = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
             self._counters.send(row, rows, message.size)
             if self._jamming.blocks(message.sender):

@@ -82,6 +82,24 @@ def test_lcfs_queue_keeps_all_messages_of_one_tick() -> None:
     assert len(events) > 390
 
 
+@pytest.mark.parametrize("discipline", ["fifo", "lcfs"])
+def test_queue_of_feature_frames_drops_the_last_frames(discipline: str) -> None:
+    """A CPM with 40 frames every 0.1 s: a queue of 16 takes the CPM and the first 15, however they are delayed."""
+    queue = {"discipline": discipline, "length": 16}
+    carrier = radio(1, queue=queue, **QUIET)
+    outcomes: dict[str, set[int]] = {"delivered": set(), "lost": set()}
+    for period in range(50):
+        now = 0.1 * period
+        carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}))
+        report = [replace(message("A", 41 * period, now), offset=0.02)]
+        frames = [
+            replace(message("A", 41 * period + part, now, 1400), kind="features", offset=0.02) for part in range(1, 41)
+        ]
+        for event in carrier.transmit([(one, ["B"]) for one in [*report, *frames]], now):
+            outcomes[event.outcome].add(event.number % 41)
+    assert outcomes == {"delivered": set(range(16)), "lost": set(range(16, 41))}
+
+
 @pytest.mark.parametrize(
     ("congestion", "least"),
     [({"kind": "reactive"}, 1.0), ({"kind": "limeric"}, 0.448 / 0.6), ({"kind": "none"}, 0.0)],
