@@ -140,7 +140,7 @@ class AgentSettings(Settings):
     planner: str | None = None
     vehicle_controller: str = "pid"
     vehicle_controller_settings: dict[str, Any] = Field(default_factory=dict)
-    sensors: Annotated[dict[str, _Sensor] | None, BeforeValidator(_sensors)] = None
+    sensors: Annotated[dict[str, _Sensor], BeforeValidator(_sensors)] | None = None
     range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] | None = None
     field_of_view: Annotated[float, Field(gt=0.0, le=360.0)] | None = None
     visibility: Annotated[float, Field(gt=0.0, le=1.0)] | None = None

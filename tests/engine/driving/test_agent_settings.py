@@ -39,7 +39,7 @@ def test_sensors_of_the_station_replace_default_sensors_of_the_detector() -> Non
     """The learned detectors want a camera, and usually have a LiDAR to lift by as well."""
     usual = {"camera": CameraSettings(width=512, height=384, rate=10.0), "lidar": LidarSettings(rate=10.0)}
     needs = frozenset({"camera"})
-    assert settings().rig_sensors(needs, usual) == usual
+    assert settings().rig_sensors(needs, usual) == settings(("sensors", "")).rig_sensors(needs, usual) == usual
     assert settings(("sensors", "camera")).rig_sensors(needs, usual) == {"camera": CameraSettings()}
     with pytest.raises(SettingError, match="needs a sensor of kind camera"):
         settings(("sensors", "lidar")).rig_sensors(needs, usual)
