@@ -27,9 +27,14 @@ from eidrive_reports.reproduction.benchmark_page import write_benchmark_page
 from eidrive_reports.reproduction.episodes import BUSY, BYTES, Episode, air_metrics
 from lxml import html
 
+from eidrive_scenario.api.experiments import resolve_scenario
+from eidrive_scenario.api.run import load_scenario
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.driving.agent_factory import station_sensors
+from eidrive_scenario.driving.station_declarations import declared_settings
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.extensions.registry import register, registry
+from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.v2x.analytic.ieee80211p import offered_load
 from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
@@ -124,10 +129,26 @@ def test_texts_select_methods_channels_and_scenarios_once() -> None:
 def test_settings_of_all_cells_without_options_are_valid() -> None:
     part = benchmark.benchmark_part(())
     cases = part.cases(())
-    assert len(cases) == len(SCENARIOS) * (1 + 6 * len(CHANNELS))
+    assert len(cases) == len(SCENARIOS) * (1 + 4 * len(CHANNELS))
     for name in CHANNELS:
         RadioProfile.model_validate(channel_of(name).profile)
     assert settings_of(SCENARIO, Method("none", "lidar"), SILENT).channel == "none"
+
+
+@pytest.mark.parametrize("detector", ["pillars", "lidar"])
+def test_lidars_have_the_field_of_view_that_stations_declare(detector: str) -> None:
+    for name in SCENARIOS:
+        settings = settings_of(name, Method("none", detector), SILENT)
+        scenario = load_scenario(resolve_scenario(name), parameters=settings.parameters)
+        for station in declared_settings(scenario, {"detector": detector}).values():
+            (lidar,) = station_sensors(station).values()
+            default = LidarSettings(rate=10.0, rotation=10.0) if detector == "pillars" else LidarSettings()
+            assert lidar == default.model_copy(update={"field_of_view": station.field_of_view or 360.0})
+
+
+def test_sensors_of_oracles_and_cameras_are_not_replaced() -> None:
+    for detector in ("oracle", "yolov5"):
+        assert settings_of("coop/scenario_5", Method("none", detector), SILENT).parameters == {}
 
 
 @pytest.mark.parametrize(

@@ -293,7 +293,7 @@ def benchmark_part(
         NAME,
         "Benchmark of fusion methods",
         "Which fusion method avoids most failures on which channel, and at how many bytes?",
-        10,
+        5,
         tuple(registry("detectors")),
         tuple(detectors or DETECTORS),
         lambda _: cases(plan),

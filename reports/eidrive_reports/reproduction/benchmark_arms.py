@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
 from typing import Any
 
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, registry
@@ -15,8 +15,8 @@ from eidrive_scenario.api.v2x import load_profile
 
 NO_COOPERATION = "none"
 """Name of the method, and of the channel, without messages."""
-METHODS = (NO_COOPERATION, "average", "covariance_intersection", "early", "max", "attention", "where2comm")
-"""Methods without an option."""
+METHODS = (NO_COOPERATION, "covariance_intersection", "early", "attention", "where2comm")
+"""Methods without an option: no, late and early fusion, features of all cells, and of the most confident ones."""
 SUITABLE = {"early": ("lidar", "pillars"), **dict.fromkeys(("max", "attention", "where2comm"), ("pillars",))}
 """Detectors that a method can use. Other methods are run with each detector of `--detectors`."""
 
@@ -67,10 +67,6 @@ SENSED_ROAD = 584.15
 Sepulcre et al., arXiv:2104.07923, divided by the load of one vehicle per meter."""
 MOST_STATIONS = 350
 """Maximum number of stations on a shared channel; the channel busy ratio of the model is valid up to 385."""
-RATES = (1, 3, 6)
-"""Rates that a station can use on the channels without an option [Mbit/s]."""
-STATIONS = (2, 40, 80)
-"""Numbers of stations on the channels without an option."""
 
 
 def shared_channel(rate: float, stations: int) -> Mapping[str, Any]:
@@ -114,8 +110,8 @@ class BenchmarkChannel:
         return self.name if self.rate is None else f"{self.rate:g} Mbit/s, {self.stations} stations"
 
 
-CHANNELS = tuple(f"{rate}mbit_{stations}" for stations, rate in product(STATIONS, RATES))
-"""Names of the channels without an option."""
+CHANNELS = ("6mbit_2", "3mbit_40", "1mbit_80")
+"""Names of the channels without an option, from the emptiest to the fullest."""
 SILENT = BenchmarkChannel(NO_COOPERATION, NO_COOPERATION)
 """Channel of runs without cooperation."""
 _SHARED = re.compile(r"(\d+(?:\.\d+)?)mbit_(\d+)")
@@ -140,18 +136,16 @@ def channel_of(text: str) -> BenchmarkChannel:
 SCENARIOS = (
     *(f"coop/scenario_{number}" for number in (5, 6, 7, 8)),
     "corner_cases/pedestrian_parked_cars",
-    "corner_cases/wrong_way_driver",
-    "corner_cases/emergency_vehicle",
-    "corner_cases/tunnel_breakdown",
-    "corner_cases/cyclist_right_turn",
-    "corner_cases/jam_end",
-    "corner_cases/ghost",
-    "corner_cases/contradicting_senders",
-    "corner_cases/wrong_clock",
     "ncap/crossing_car",
     "ncap/crossing_child",
 )
-"""Scenarios without an option. `corner_cases/jammer` is none of them: other channels have no jammer."""
+"""Scenarios without an option, in which correct CPMs of others avoid a collision of the ego with the oracle.
+
+Others do not compare fusion of perception: senders transmit CAMs only (`emergency_vehicle`, `tunnel_breakdown`,
+`jam_end`) or are faulty (`ghost`, `contradicting_senders`, `wrong_clock`, `jammer`), the ego passes without messages
+(`cyclist_right_turn`), or all stations see too little (`wrong_way_driver`: with the range of `pillars`, 51.2 m, the ego
+collides with the oracle and an ideal channel, too).
+"""
 PARTNERS = {
     "corner_cases/pedestrian_parked_cars": "Child",
     "corner_cases/wrong_way_driver": "WrongWay",
@@ -165,6 +159,25 @@ PARTNERS = {
 }
 """Actor whose minimum distance to the ego is measured, where the scenario has no criterion for it."""
 EGO = "Ego"
+FIELD_OF_VIEW = {f"coop/scenario_{number}": 100 for number in (5, 6, 7, 8)}
+"""Horizontal field of view that the stations of a scenario declare [degrees], where its outcome depends on it."""
+
+
+def sensor_parameters(scenario: str, detector: str) -> dict[str, str]:
+    """Return the parameter of a scenario that gives lidars the field of view that its stations declare.
+
+    That property applies to the sensor of the oracle only, and default lidars see all around: with them the ego of
+    scenarios 5 to 8 sees the car that overtakes it from behind, and needs no messages. Cameras have 100° by default.
+    """
+    detector_class = registry("detectors").load(detector)
+    if scenario not in FIELD_OF_VIEW or detector_class.needs != {"lidar"}:
+        return {}
+    view = {"field_of_view": FIELD_OF_VIEW[scenario]}
+    sensors = {
+        name: {"kind": sensor.kind, **sensor.model_dump(exclude_unset=True), **view}
+        for name, sensor in detector_class.default_sensors.items()
+    }
+    return {"Sensors": json.dumps(sensors or {"lidar": view})}
 
 
 def scenarios_of(texts: Sequence[str]) -> tuple[str, ...]:
@@ -186,7 +199,10 @@ def scenarios_of(texts: Sequence[str]) -> tuple[str, ...]:
 def settings_of(scenario: str, method: Method, channel: BenchmarkChannel) -> RunSettings:
     """Return the settings of the runs of a cell."""
     partner = PARTNERS.get(scenario)
-    criteria = None if partner is None else {"min_distance": {"of": EGO, "to": partner}}
-    if not method.cooperates:
-        return RunSettings(channel=NO_COOPERATION, detector=method.detector, criteria=criteria)
-    return RunSettings(channel=channel.profile, detector=method.detector, fusion=method.fusion, criteria=criteria)
+    return RunSettings(
+        channel=channel.profile,
+        detector=method.detector,
+        fusion=method.fusion if method.cooperates else None,
+        parameters=sensor_parameters(scenario, method.detector),
+        criteria=None if partner is None else {"min_distance": {"of": EGO, "to": partner}},
+    )

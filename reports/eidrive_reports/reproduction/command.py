@@ -23,8 +23,7 @@ def reproduce(
             min=1,
             max=10_000,
             help="Episodes of each cell, with seeds from 1.",
-            show_default="table2: 20, table3: 40, channels, benchmark: 10, perception: 4, sensitivity: 3, "
-            "learned: 2, else 5",
+            show_default="table2: 20, table3: 40, channels: 10, perception: 4, sensitivity: 3, learned: 2, else 5",
         ),
     ] = None,
     detectors: Annotated[
@@ -32,7 +31,7 @@ def reproduce(
         typer.Option(
             metavar="A,B",
             help="Detectors of the stations.",
-            show_default="the paper's; table3: oracle; benchmark: lidar",
+            show_default="the paper's; table3: oracle; perception: lidar; learned, benchmark: pillars",
         ),
     ] = None,
     fusion: Annotated[
