@@ -237,4 +237,4 @@ def reorder_rows(values: NDArray[Any], rows: Sequence[int | None], fresh: float)
 
 def _is_outdated(entry: Transmission, *, by: Transmission) -> bool:
     """Return True if another message of the same kind was sent in a later tick."""
-    return entry.message.kind == by.message.kind and entry.sent < by.sent
+    return entry.sent < by.sent and entry.message.kind == by.message.kind
