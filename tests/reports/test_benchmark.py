@@ -148,7 +148,7 @@ def test_lidars_have_the_field_of_view_that_stations_declare(detector: str) -> N
 
 def test_sensors_of_oracles_and_cameras_are_not_replaced() -> None:
     for detector in ("oracle", "yolov5"):
-        assert settings_of("coop/scenario_5", Method("none", detector), SILENT).parameters == {}
+        assert settings_of("coop/scenario_7", Method("none", detector), SILENT).parameters == {}
 
 
 @pytest.mark.parametrize(
