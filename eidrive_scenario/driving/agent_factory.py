@@ -156,7 +156,12 @@ def build_agent(
             another = detector if fusion.shares == "features" else build_detector(settings)
             if another is not detector:
                 another.setup(installation)
-            joint = Perception(another, tracker=_tracker(settings, another), latency=settings.detector_latency)
+            joint = Perception(
+                another,
+                tracker=_tracker(settings, another),
+                latency=settings.detector_latency,
+                false_objects=settings.false_objects,
+            )
         limit = settings.mtu - settings.security_bytes
         sharing = SensorDataSharing(fusion, perception, joint, limit=limit, latency=settings.detector_latency)
     return Agent(

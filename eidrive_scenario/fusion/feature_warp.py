@@ -121,7 +121,7 @@ def _warp(latent: Floats, present: Bools, transform: Array, boxes: Array, warped
 
 
 @kernel("void(f4[:,::1], b1[:,::1], f4[:,:,::1])")
-def place(features: Floats, present: Bools, grid: Floats) -> None:
+def scatter(features: Floats, present: Bools, grid: Floats) -> None:
     """Write features (C, N) of the N present cells (n, m), in their order, into a grid (C, n, m)."""
     rows, columns = present.shape
     for channel in range(len(features)):

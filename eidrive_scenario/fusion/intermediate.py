@@ -23,10 +23,11 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
-from eidrive_scenario.fusion.feature_warp import Grid, attend, place, warp
+from eidrive_scenario.fusion.feature_warp import Grid, attend, scatter, warp
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pose_alignment import align_pose
+from eidrive_scenario.fusion.pose_alignment import PoseAlignment, align_pose, aligned_report
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.result_checks import check_array
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.v2x.messages.feature_frames import Encoding, FeatureFrame, split, to_cells
 from eidrive_scenario.v2x.messages.message import Payload
@@ -54,11 +55,13 @@ class IntermediateFusionSettings(CovarianceIntersectionSettings):
 class _ReceivedMap:
     """Cells of the newest map of a station that have arrived.
 
+    interval  time between the two scans in the features [s]; 0: they are of one scan and show no motion
     latent (n, m, 8), present (n, m) whether the features of a cell have arrived
     """
 
     sequence: int
     time: float
+    interval: float
     grid: Grid
     latent: Floats
     present: Bools
@@ -144,8 +147,8 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         rows, columns = features.confidence.shape
         self._maps += 1
         whole = FeatureFrame(
-            0, self._maps % 65536, 0, 1, features.time, features.x, features.y, features.yaw, features.height,
-            features.foot, features.cell, (rows, columns), settings.encoding, float(codec.scale),
+            0, self._maps % 65536, 0, 1, features.time, features.x, features.y, features.yaw,
+            features.interval or 0.0, features.foot, features.cell, (rows, columns), settings.encoding, float(codec.scale),
             to_cells(chosen, codes),
         )  # fmt: skip
         return split(whole, limit)
@@ -165,13 +168,13 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         latent = self._codec.from_int8(payload.integers) if integers else self._codec.from_codes(payload.codes)
         grid = Grid(payload.x, payload.y, payload.yaw, payload.cell, payload.shape)
         held = self._received.get(sender)
-        if held is None or held.sequence != payload.sequence:
+        if held is None or (held.sequence, held.grid) != (payload.sequence, grid):
             if held is not None and payload.time <= held.time:
                 return
             values, present = np.zeros((*grid.shape, len(latent)), np.float32), np.zeros(grid.shape, np.bool_)
-            held = self._received[sender] = _ReceivedMap(payload.sequence, payload.time, grid, values, present)
-        elif held.grid != grid:
-            return
+            held = self._received[sender] = _ReceivedMap(
+                payload.sequence, payload.time, payload.interval, grid, values, present
+            )
         cells = np.stack(np.unravel_index(payload.indices, grid.shape), axis=-1)
         length, width = body[3] + grid.cell, body[4] + grid.cell  # all cells that overlap with the body
         outline = np.array([*body[:2], 0.0, length, width, 1.0, body[6]])
@@ -181,24 +184,53 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         held.present[rows, columns] = True
 
     def add_report(self, report: Report) -> None:
-        """Store the moving boxes of a report, and process its boxes whose features have not arrived."""
+        """Store the moving boxes of a report, and process its boxes whose features have not arrived.
+
+        Out-of-sequence reports do not replace the moving boxes of a newer one.
+        """
         detections, station = report.detections, report.station
-        self._reports[station] = report
-        held = self._boxes.setdefault(station, {})
-        oldest = detections.time - self.settings.max_age
-        boxes = {} if report.complete else {number: box for number, box in held.items() if box.time >= oldest}
+        newest = self._reports.get(station)
+        # A report that is older by more than this is not late: the clock of its sender was set back.
+        if newest is None or not 0.0 < newest.detections.time - detections.time <= self.settings.max_age:
+            self._reports[station] = report
+            self._boxes[station] = self._moving_boxes(report)
+        arrived = self._received.get(station)
+        if arrived is not None and len(detections) and arrived.time >= report.arrived - self.max_payload_age:
+            rows = np.flatnonzero(~self._covered(arrived, detections.boxes[:, :2])).tolist()
+            report = self._aligned(report)
+            report = replace(report, detections=report.detections.subset(rows))
+        super().add_report(report)
+
+    def _aligned(self, report: Report) -> Report:
+        """Return a report aligned by all of its boxes: those without features are too few, as most are not shared."""
+        alignment = self._alignment(report)
+        if alignment is None or not alignment.is_corrected:
+            return report
+        # Errors of successive corrections are independent at most.
+        return replace(aligned_report(report, alignment), pose_change=2.0 * alignment.covariance)
+
+    def _alignment(self, report: Report | None) -> PoseAlignment | None:
+        """Return the pose of a sender, aligned to the objects in the own features; None if the pose is not aligned."""
+        if not self.settings.align_poses or self._alone is None or report is None or report.state is None:
+            return None
+        return align_pose(self._alone, report)
+
+    def _moving_boxes(self, report: Report) -> dict[int, _MovingBox]:
+        """Return the moving boxes of a station after a report, by object."""
+        detections = report.detections
+        held = {} if report.complete else self._boxes.get(report.station, {})
+        boxes = {number: box for number, box in held.items() if self._is_usable(box, detections.time)}
         numbers = detections.tracks or range(len(detections))
         for number, box, (vx, vy) in zip(numbers, detections.boxes.tolist(), detections.velocity.tolist(), strict=True):
             boxes.pop(number, None)
             if math.hypot(vx, vy) > 0.0:  # not if it is unknown
                 x, y, _, length, width, _, yaw = box
                 boxes[number] = _MovingBox(detections.time, x, y, length, width, yaw, vx, vy)
-        self._boxes[station] = boxes
-        arrived = self._received.get(station)
-        if arrived is not None and len(detections) and arrived.time >= report.arrived - self.max_payload_age:
-            rows = np.flatnonzero(~self._covered(arrived, detections.boxes[:, :2])).tolist()
-            report = replace(report, detections=detections.subset(rows))
-        super().add_report(report)
+        return boxes
+
+    def _is_usable(self, box: _MovingBox, time: float) -> bool:
+        """Return whether a box can be predicted to a time [s]."""
+        return abs(time - box.time) <= self.settings.max_age
 
     def _covered(self, arrived: _ReceivedMap, points: Array) -> Bools:
         """Return whether the features at points (N, 2) of the world are in the fused map."""
@@ -222,14 +254,13 @@ class IntermediateFusion(CovarianceIntersectionFusion):
             return readings
         received = np.zeros((len(self._received), *features.features.shape), np.float32)
         present = np.zeros((len(self._received), *shape), np.bool_)
-        for row, (sender, held) in enumerate(sorted(self._received.items())):
-            boxes = self._boxes.get(sender, {}).values()
+        for station, (sender, held) in enumerate(sorted(self._received.items())):
             moving = np.array([
                 (box.x + box.vx * (held.time - box.time), box.y + box.vy * (held.time - box.time), box.yaw,
                  box.length + 2.0 * BOX_MARGIN, box.width + 2.0 * BOX_MARGIN, box.vx, box.vy)
-                for box in boxes
+                for box in self._boxes.get(sender, {}).values() if self._is_usable(box, held.time)
             ]).reshape(-1, 7)  # fmt: skip
-            latent, present[row] = warp(
+            latent, present[station] = warp(
                 held.latent,
                 held.present,
                 held.grid,
@@ -237,22 +268,25 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 moving,
                 features.time - held.time,
             )
-            place(self._codec.expand(np.ascontiguousarray(latent[present[row]].T)), present[row], received[row])
+            expanded = self._codec.expand(np.ascontiguousarray(latent[present[station]].T))
+            scatter(expanded, present[station], received[station])
         fused = self.fuse_maps(features.features, received, present)
-        return replace(readings, features=replace(features, features=fused))
+        check_array(self, "fuse_maps", "features", fused, features.features.shape)
+        # Features of one scan contain an arbitrary motion, so that no velocity in the fused ones is known.
+        interval = features.interval if all(held.interval for held in self._received.values()) else None
+        return replace(readings, features=replace(features, features=fused, interval=interval))
 
     def _grid_for(self, sender: str, grid: Grid) -> Grid:
         """Return the own grid relative to the pose that a sender states, from which objects of both may differ."""
-        report = self._reports.get(sender)
-        if not self.settings.align_poses or self._alone is None or report is None or report.state is None:
+        alignment = self._alignment(self._reports.get(sender))
+        if alignment is None:
             return grid
-        alignment, state = align_pose(self._alone, report), report.state
         x, y, _ = alignment.pose
-        turn = float(alignment.error[2])
+        ex, ey, turn = alignment.error.tolist()
         dx, dy = grid.x - x, grid.y - y
         cos, sin = math.cos(turn), math.sin(turn)
         return dataclasses.replace(
-            grid, x=state.x + cos * dx - sin * dy, y=state.y + sin * dx + cos * dy, yaw=grid.yaw + turn
+            grid, x=x + ex + cos * dx - sin * dy, y=y + ey + sin * dx + cos * dy, yaw=grid.yaw + turn
         )
 
 

@@ -16,7 +16,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
 from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess
-from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
+from eidrive_scenario.perception.result_checks import check_array, check_detections, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
@@ -190,7 +190,7 @@ class Perception:
 
         def in_view(boxes: Array) -> Array:
             shares = self.detector.in_view(boxes, readings, found)
-            check_in_view(self.detector, shares, len(boxes))
+            check_array(self.detector, "in_view", "shares", shares, (len(boxes),))
             return shares
 
         tracked = self._tracker.update(found, in_view)

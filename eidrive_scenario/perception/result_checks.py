@@ -67,12 +67,13 @@ def check_detections(extension: object, method: str, found: object) -> None:
     raise_outside(extension, method, "a variance", variances, 0.0, LARGEST**2)
 
 
-def check_in_view(extension: object, shares: object, count: int) -> None:
-    """Raise InvalidResult unless `shares` is an array of `count` finite numbers."""
-    if not isinstance(shares, np.ndarray) or shares.shape != (count,):
-        shape = f"an array of shape {shares.shape}" if isinstance(shares, np.ndarray) else describe(shares)
-        raise InvalidResult(extension, "in_view", f"returned {shape} (expected an array of shape {(count,)})")
-    raise_not_finite(extension, "in_view", {"shares": shares})
+def check_array(extension: object, method: str, name: str, values: object, shape: tuple[int, ...]) -> None:
+    """Raise InvalidResult unless `values` is an array of finite numbers with this shape."""
+    if not isinstance(values, np.ndarray) or values.shape != shape:
+        given = f"an array of shape {values.shape}" if isinstance(values, np.ndarray) else describe(values)
+        raise InvalidResult(extension, method, f"returned {given} (expected an array of shape {shape})")
+    if values.size and not are_within(values, LARGEST):
+        raise_not_finite(extension, method, {name: values})
 
 
 def raise_not_finite(extension: object, method: str, fields: dict[str, object]) -> None:

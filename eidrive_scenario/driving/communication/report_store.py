@@ -254,9 +254,11 @@ class ReportStore:
                 regions.add_message(message)
             payload = message.payload
             if sharing is not None and payload is not None and sharing.accepts(payload) and not own:
-                if self._is_expired(payload.time, self._fusion.max_payload_age, now):
+                longest = self._fusion.max_payload_age
+                if self._is_expired(payload.time, longest, now):
                     expired.append(row)
-                else:
+                # Data of the far future would replace all later ones of their sender.
+                elif payload.time <= now + longest + TIME_TOLERANCE:
                     sharing.add(sender, payload, self._own_body.box(payload.time))
                 continue
             if message.kind == "features":

@@ -24,8 +24,8 @@ _ENCODINGS: tuple[Encoding, ...] = ("int8", "codes")
 _HEADER = struct.Struct("<BI3H3d4f2HBfH")
 HEADER_BYTES = _HEADER.size
 """Size of the header [bytes]: version (1), station (4), map, number and count of frames (3 x 2), time, x and y (3 x 8),
-yaw, height, foot and edge of a cell (4 x 4), cells along x and y (2 x 2), encoding (1), scale (4), cells (2)."""
-_SINGLE = ("yaw", "height", "foot", "cell", "scale")
+yaw, interval, foot and edge of a cell (4 x 4), cells along x and y (2 x 2), encoding (1), scale (4), cells (2)."""
+_SINGLE = ("yaw", "interval", "foot", "cell", "scale")
 """Fields with 32 bits."""
 _FARTHEST = 1e9
 """Maximum absolute value of coordinates [m], as of positions in a scenario."""
@@ -40,7 +40,8 @@ class FeatureFrame:
     number, count  number of the frame, and of the frames of the map
     time        of the scan by the clock of the sender [s]
     x, y, yaw   pose of the grid in the world, as the sender assumes it [m, rad]
-    height, foot  height of the lidar and of the ground below it in the world [m]
+    interval    time between the two scans in the features [s]; 0: they are of one scan and show no motion
+    foot        height of the ground below the lidar in the world [m]
     cell        edge of a cell [m]
     shape       number of cells along x and y
     encoding    `int8`: 8 channels as integers; `codes`: entry of the code book
@@ -58,7 +59,7 @@ class FeatureFrame:
     x: float
     y: float
     yaw: float
-    height: float
+    interval: float
     foot: float
     cell: float
     shape: tuple[int, int]
@@ -94,7 +95,7 @@ class FeatureFrame:
         """Return the bytes of the frame."""
         header = _HEADER.pack(
             PROTOCOL, self.station, self.sequence, self.number, self.count, self.time, self.x, self.y, self.yaw,
-            self.height, self.foot, self.cell, *self.shape, _ENCODINGS.index(self.encoding), self.scale,
+            self.interval, self.foot, self.cell, *self.shape, _ENCODINGS.index(self.encoding), self.scale,
             len(self.cells),
         )  # fmt: skip
         return header + self.cells.tobytes()
@@ -112,9 +113,9 @@ class FeatureFrame:
         if len(data) != HEADER_BYTES + count * width:
             raise ValueError(f"a feature frame of {count} cells has other than {len(data)} bytes")
         cells = np.frombuffer(data, np.uint8, offset=HEADER_BYTES).reshape(count, width)
-        station, sequence, number, of, time, x, y, yaw, height, foot, cell = numbers
+        station, sequence, number, of, time, x, y, yaw, interval, foot, cell = numbers
         frame = cls(
-            station, sequence, number, of, time, x, y, yaw, height, foot, cell, (rows, columns), kind, scale, cells
+            station, sequence, number, of, time, x, y, yaw, interval, foot, cell, (rows, columns), kind, scale, cells
         )
         frame.check()
         return frame
@@ -122,11 +123,13 @@ class FeatureFrame:
     def check(self) -> None:
         """Raise ValueError if a number is out of range, or a cell is not in the grid."""
         rows, columns = self.shape
-        numbers = (self.time, self.x, self.y, self.yaw, self.height, self.foot)
+        numbers = (self.time, self.x, self.y, self.yaw, self.foot)
         if not all(math.isfinite(number) and abs(number) <= _FARTHEST for number in numbers):
             raise ValueError("time or pose of a feature frame is out of range")
-        if not (0.0 < self.cell <= _FARTHEST and 0.0 < self.scale <= _FARTHEST):
-            raise ValueError(f"edge and scale of the cells are {self.cell:g} and {self.scale:g}")
+        if not (0.0 < self.cell <= _FARTHEST and 0.0 < self.scale <= _FARTHEST and 0.0 <= self.interval <= _FARTHEST):
+            raise ValueError(
+                f"edge, scale and interval of the cells are {self.cell:g}, {self.scale:g} and {self.interval:g}"
+            )
         if not (rows > 0 and columns > 0 and rows * columns <= MAX_CELLS):
             raise ValueError(f"a grid has 1 to {MAX_CELLS} cells (got {rows} x {columns})")
         if not self.number < self.count:

@@ -149,6 +149,17 @@ def test_early_fusion_ignores_old_points_and_keeps_the_newest() -> None:
     assert len(step.fused) == 0
 
 
+def test_points_of_the_far_future_do_not_replace_later_ones() -> None:
+    ego, rsu, ahead = agent(EGO), agent(RSU), agent(RSU, clock_offset=3.0)
+    at = (40.0, 12.0, math.pi)
+    hostile = ahead.act(readings(0.0, at, car(10.0, -6.0, "fl")), (), 0.0, None).outbox[0]
+    sent = rsu.act(readings(0.1, at, car(*CAR, "fl")), (), 0.1, None).outbox[0]
+    assert not len(ego.act(readings(0.1, (0.0, 0.0, 0.0)), [ReceivedMessage(hostile, 0.1)], 0.1, None).fused)
+    fused = ego.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(sent, 0.2)], 0.2, None).fused
+    assert len(fused) == 1
+    assert math.dist(fused.boxes[0, :2], CAR) < 0.5
+
+
 def test_early_fusion_uses_boxes_of_stations_without_points() -> None:
     ego, plain = agent(EGO), agent(RSU, fusion="covariance_intersection")
     sent = plain.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]

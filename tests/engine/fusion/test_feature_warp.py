@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.fusion.feature_warp import ENOUGH, Grid, attend, place, warp
+from eidrive_scenario.fusion.feature_warp import ENOUGH, Grid, attend, scatter, warp
 
 N, C = 24, 8
 HERE = Grid(10.0, -5.0, 0.4, 0.5, (N, N))
@@ -164,11 +164,11 @@ def test_far_grid_has_no_features() -> None:
         assert not warp(latent, present, HERE, far, NOTHING, 0.0)[1].any()
 
 
-def test_place_equals_assignment_by_mask() -> None:
+def test_scatter_equals_assignment_by_mask() -> None:
     random = generator(0, "place")
     present, values = random.random((6, 7)) < 0.4, random.random((3, 42)).astype(np.float32)
     grid, expected = np.zeros((2, 3, 6, 7), np.float32)
-    place(np.ascontiguousarray(values[:, : present.sum()]), present, grid)
+    scatter(np.ascontiguousarray(values[:, : present.sum()]), present, grid)
     expected[:, present] = values[:, : present.sum()]
     np.testing.assert_array_equal(grid, expected)
 

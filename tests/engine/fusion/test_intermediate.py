@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.errors import SettingError
+from eidrive_scenario.errors import InvalidResult, SettingError
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.fusion.intermediate import AttentionFusion, MaxFusion, Where2commFusion
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
@@ -70,6 +70,14 @@ def fused(inbox: Sequence[Message], time: float = 0.1, *own: tuple[float, float]
     """Return the fused boxes of the ego that receives these messages at its first reading."""
     step = agent(EGO, **more).act(readings(time, HERE, *own), received(inbox, time), time, None)
     return step.fused.boxes
+
+
+def own_objects(time: float, inbox: Sequence[Message], earlier: Sequence[Message] = ()) -> np.ndarray:
+    """Return the boxes in the fused features of the ego, after a reading at 0.05 s with earlier messages."""
+    ego = agent(EGO)
+    ego.act(readings(0.05, HERE), received(earlier, 0.05), 0.05, None)
+    ego.act(readings(time, HERE), received(inbox, time), time, None)
+    return next(report for report in ego.reports if report.station == "Ego").detections.boxes
 
 
 def near(boxes: np.ndarray, *expected: tuple[float, float]) -> bool:
@@ -179,6 +187,22 @@ def test_shared_boxes_correct_the_pose_of_the_sender() -> None:
         found = step.fused.boxes[:, :2]
         alone = found[np.hypot(found[:, 0] - place, found[:, 1] + 4.0) < 3.0]
         assert abs(alone.mean(axis=0)[0] - place) < 0.6, align_poses
+
+
+def test_shared_boxes_with_features_correct_boxes_without() -> None:
+    """As above, but the fifth object is beyond the grid of the receiver, so that only its box reports it."""
+    common = [(20.0, 4.0), (12.0, -9.0), (-15.0, -8.0), (25.0, 16.0)]
+    covariance = np.diag([0.64, 0.64, math.radians(0.4) ** 2])
+    points = [(x + 1.6, y) for x, y in [*common, (80.0, -4.0)]]
+    for align_poses, place in ((False, 81.6), (True, 80.0)):
+        ego = agent(EGO, fusion_settings={"align_poses": align_poses})
+        for tick in range(1, 5):
+            messages = sent(MASTS[0], 0.05 * tick, *points, at=(THERE[0] + 1.6, THERE[1], THERE[2]))
+            stated = [replace(each, state=replace(each.state, pose_covariance=covariance)) for each in messages]
+            step = ego.act(readings(0.05 * tick, HERE, *common), received(stated, 0.05 * tick), 0.05 * tick, None)
+        far = step.fused.boxes[step.fused.boxes[:, 0] > 60.0]
+        assert len(far) == 1
+        assert abs(far[0, 0] - place) < CELL, align_poses
 
 
 def test_lost_frame_costs_its_cells_only() -> None:
@@ -291,6 +315,90 @@ def test_cells_of_a_moving_object_are_moved() -> None:
     boxes, *messages = sent(MASTS[0], 0.0, (20.0, 4.0), velocity=(20.0, 0.0), fusion="where2comm")
     assert near(fused(messages, 0.4), (20.0, 4.0))
     assert near(fused([*messages, boxes], 0.4), (28.0, 4.0))
+
+
+def test_late_report_of_an_older_measurement_does_not_move_cells() -> None:
+    """The object turned back: at 0 s it had another velocity than at 0.1 s, when the features were measured."""
+    old = sent(MASTS[0], 0.0, (20.0, 4.0), velocity=(-20.0, 0.0), fusion="where2comm")[0]
+    new, *messages = sent(MASTS[0], 0.1, (20.0, 4.0), velocity=(20.0, 0.0), fusion="where2comm")
+    for inbox in ([*messages, new, old], [*messages, old, new]):
+        assert near(own_objects(0.5, inbox), (28.0, 4.0))
+
+
+def test_report_of_a_clock_that_is_set_back_moves_cells() -> None:
+    """The first report is of a clock that was 60 s ahead."""
+    ahead = sent(MASTS[0], 60.0, (20.0, 4.0), velocity=(-20.0, 0.0), fusion="where2comm")[0]
+    new, *messages = sent(MASTS[0], 0.1, (20.0, 4.0), velocity=(20.0, 0.0), fusion="where2comm")
+    assert near(own_objects(0.5, [ahead, *messages, new]), (28.0, 4.0))
+
+
+def test_boxes_older_than_their_maximum_age_do_not_move_cells() -> None:
+    """A car passes at 8 m/s; 3 s later another one stands where it would be, and its report is lost."""
+    boxes, *_ = sent(MASTS[0], 0.0, (20.0, 4.0), velocity=(8.0, 0.0), fusion="where2comm")
+    _, *messages = sent(MASTS[0], 3.0, (44.0, 4.0), fusion="where2comm")
+    assert near(own_objects(3.4, messages, earlier=[boxes]), (44.0, 4.0))
+
+
+def test_station_that_enters_again_counts_its_maps_from_the_start() -> None:
+    first = sent(MASTS[0], 0.0, (20.0, 4.0), fusion="where2comm")
+    again = sent(MASTS[0], 0.3, (25.0, -4.0), at=(42.0, 9.0, 1.0), fusion="where2comm")
+    assert frames(first)[0].sequence == frames(again)[0].sequence
+    assert near(own_objects(0.4, again[1:], earlier=first[1:]), (25.0, -4.0))
+
+
+@pytest.mark.parametrize("ahead", [3.0, 1e4])
+def test_features_of_the_far_future_do_not_replace_later_ones(ahead: float) -> None:
+    hostile = sent(MASTS[0], 0.0, (30.0, -8.0), fusion="where2comm", clock_offset=ahead)[1:]
+    messages = sent(MASTS[0], 0.1, (20.0, 4.0), fusion="where2comm")[1:]
+    ego = agent(EGO)
+    step = ego.act(readings(0.1, HERE), received(hostile, 0.1), 0.1, None)
+    assert not len(step.fused)
+    assert step.expired == ()
+    step = ego.act(readings(0.2, HERE), received(messages, 0.2), 0.2, None)
+    assert near(step.fused.boxes, (20.0, 4.0))
+
+
+@pytest.mark.parametrize(("own", "others", "expected"), [(0.2, 0.2, 0.2), (0.2, None, None), (None, 0.2, None)])
+def test_motion_in_fused_features_is_known_if_all_stations_show_it(
+    own: float | None, others: float | None, expected: float | None
+) -> None:
+    def features(time: float, interval: float | None) -> Readings:
+        detector = CellDetector()
+        detector.detect(readings(time, HERE, (20.0, 4.0)))
+        assert detector.feature_map is not None
+        return replace(readings(time, HERE), features=replace(detector.feature_map, interval=interval))
+
+    sender, receiver = MaxFusion(), MaxFusion()
+    for method in (sender, receiver):
+        method.setup(CellDetector())
+    for frame in sender.payloads(features(0.0, others), 1400):
+        assert isinstance(frame, FeatureFrame)
+        receiver.add_payload("RSU0", FeatureFrame.decode(frame.encode()), np.array([0.0, 0, 0, 4, 2, 2, 0]))
+    merged = receiver.merge_readings(features(0.1, own)).features
+    assert merged is not None
+    assert merged.interval == expected
+
+
+@pytest.mark.parametrize(
+    ("result", "text"),
+    [
+        (np.zeros((8, 128, 128)), r"returned an array of shape \(8, 128, 128\) \(expected .* \(96, 128, 128\)\)"),
+        (np.full((96, 128, 128), np.nan), "returned features with the value nan"),
+        (None, "returned None"),
+    ],
+)
+def test_invalid_result_of_a_method_names_the_method(
+    monkeypatch: pytest.MonkeyPatch, result: np.ndarray | None, text: str
+) -> None:
+    monkeypatch.setattr(MaxFusion, "fuse_maps", lambda *given: result)
+    with pytest.raises(InvalidResult, match=f"fuse_maps {text}"):
+        fused(sent(MASTS[0], 0.0, (20.0, 4.0)))
+
+
+def test_false_object_of_the_receiver_is_in_fused_features() -> None:
+    ghost = [{"kind": "car", "x": 25.0, "y": -6.0}]
+    inbox = sent(MASTS[0], 0.0, (20.0, 4.0))
+    assert near(fused(inbox, 0.1, false_objects=ghost), (20.0, 4.0), (25.0, -6.0))
 
 
 def test_partial_reports_move_cells() -> None:

@@ -25,7 +25,7 @@ def frame(encoding: str = "int8", count: int = 3, **more: Any) -> FeatureFrame:
     codes = np.resize(CODES.T, (count, 8)).T if encoding == "int8" else np.arange(count, dtype=np.uint8)
     given = {
         "station": 0x01020304, "sequence": 258, "number": 0, "count": 1, "time": 12.5, "x": 100.25, "y": -3.0,
-        "yaw": 0.5, "height": 1.75, "foot": 0.25, "cell": 0.8, "shape": (128, 128), "encoding": encoding,
+        "yaw": 0.5, "interval": 0.25, "foot": 0.75, "cell": 0.8, "shape": (128, 128), "encoding": encoding,
         "scale": 0.0625, "cells": to_cells(indices, codes),
     }  # fmt: skip
     return FeatureFrame(**{**given, **more})
@@ -38,7 +38,7 @@ def test_header_has_documented_layout() -> None:
     assert data[1:5] == bytes([4, 3, 2, 1])
     assert struct.unpack_from("<3H", data, 5) == (258, 0, 1)
     assert struct.unpack_from("<3d", data, 11) == (12.5, 100.25, -3.0)
-    assert struct.unpack_from("<4f", data, 35) == (0.5, 1.75, 0.25, float(np.float32(0.8)))
+    assert struct.unpack_from("<4f", data, 35) == (0.5, 0.25, 0.75, float(np.float32(0.8)))
     assert struct.unpack_from("<2H", data, 51) == (128, 128)
     assert data[55] == 0
     assert struct.unpack_from("<f", data, 56) == (0.0625,)
