@@ -91,6 +91,8 @@ class Perception:
         self.detector = detector
         self._checked = is_checked(detector)
         self._tracker = tracker
+        if tracker is not None:
+            tracker.setup(detector.velocity_deviation)
         self._localizer = localizer
         self._latency = latency
         self._pose_error = pose_error

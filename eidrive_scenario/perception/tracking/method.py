@@ -88,6 +88,9 @@ class TrackingMethod(ABC):
     def __init__(self, settings: TrackerKind) -> None:
         self.settings = settings
 
+    def setup(self, velocity_deviation: float) -> None:  # noqa: B027 - an optional hook
+        """Store the deviation that the detector states of its velocities [m/s], before the first detections."""
+
     def set_pose(self, pose: PoseUncertainty) -> None:  # noqa: B027 - an optional hook
         """Store the pose of the station and its uncertainty; called in each time step, before the calls below, if the
         pose has random errors. With a latency of the detector, `update` gets detections of an earlier time step.

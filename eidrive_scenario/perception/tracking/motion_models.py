@@ -20,7 +20,8 @@ TURN_DENSITY = 0.15
 UNKNOWN_SPEED = 12.0
 """Standard deviation of the velocity of an object at its first detection [m/s]."""
 KNOWN_SPEED = 0.5
-"""Standard deviation of a velocity that the detector provides [m/s]."""
+"""Standard deviation of a detected or reported velocity in each axis [m/s]; a detector may state another one for moving
+objects."""
 HEADING_DEVIATION = math.radians(6.0)
 """Standard deviation between the axes of a box and of its object [rad]."""
 WANDERING_DENSITY = 0.01
@@ -49,7 +50,10 @@ class Update(NamedTuple):
 
 
 class MotionModel(ABC):
-    """State of a track and its transition. Positions [m], angles [rad], all in the world frame."""
+    """State of a track and its transition. Positions [m], angles [rad], all in the world frame.
+
+    velocity_deviation  standard deviation of the detected velocity of a moving object in each axis [m/s]
+    """
 
     size: int
     """Number of states."""
@@ -57,6 +61,9 @@ class MotionModel(ABC):
     """Indices of the states that are 0 for an object at rest."""
     measures_heading: bool = False
     """Whether a box corrects the third state, a heading, by its axis."""
+
+    def __init__(self, velocity_deviation: float = KNOWN_SPEED) -> None:
+        self.velocity_deviation = velocity_deviation
 
     @abstractmethod
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
@@ -93,7 +100,7 @@ class ConstantVelocity(MotionModel):
         state = np.concatenate([boxes[:, :2], np.where(known[:, None], velocity, 0.0)], axis=1)
         covariance = np.zeros((len(boxes), 4, 4))
         covariance[:, :2, :2] = noise
-        variance = np.where(known, KNOWN_SPEED, UNKNOWN_SPEED) ** 2
+        variance = np.where(known, self.velocity_deviation, UNKNOWN_SPEED) ** 2
         covariance[:, 2, 2] = covariance[:, 3, 3] = variance
         return Estimates(state, covariance)
 
@@ -140,7 +147,7 @@ class TurnRate(MotionModel):
         covariance = np.zeros((len(boxes), 5, 5))
         covariance[:, :2, :2] = noise
         covariance[:, 2, 2] = HEADING_DEVIATION**2
-        covariance[:, 3, 3] = np.where(known, KNOWN_SPEED, UNKNOWN_SPEED) ** 2
+        covariance[:, 3, 3] = np.where(known, self.velocity_deviation, UNKNOWN_SPEED) ** 2
         covariance[:, 4, 4] = UNKNOWN_TURN**2
         return Estimates(state, covariance)
 
@@ -203,6 +210,7 @@ class Standing(MotionModel):
     """
 
     def __init__(self, base: MotionModel) -> None:
+        super().__init__(base.velocity_deviation)
         self._base = base
         self.size, self.motion, self.measures_heading = base.size, base.motion, base.measures_heading
 

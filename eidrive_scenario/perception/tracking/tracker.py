@@ -24,7 +24,13 @@ from eidrive_scenario.perception.tracking.association import (
 )
 from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT, InteractingModels, Tracks
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerKind, TrackerSettings, TrackingMethod
-from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
+from eidrive_scenario.perception.tracking.motion_models import (
+    KNOWN_SPEED,
+    ConstantVelocity,
+    Estimates,
+    MotionModel,
+    TurnRate,
+)
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 
 
@@ -103,7 +109,8 @@ class Tracker(TrackingMethod):
         if settings.kind == NO_TRACKER:
             raise ValueError("tracker settings: kind 'none' disables tracking (expected cv or ctrv)")
         self._pose_errors: PoseErrors | None = None
-        self._filter = InteractingModels(MODELS[settings.kind]())
+        self._velocity_deviation = KNOWN_SPEED
+        self._filter = self._new_filter()
         self._gate = -2.0 * math.log1p(-settings.gate)
         self._time: float | None = None
         self._tracks = self._filter.no_tracks()
@@ -113,10 +120,17 @@ class Tracker(TrackingMethod):
         self._histories: list[TrackHistory] = []
         self._confirmed = 0
 
+    def setup(self, velocity_deviation: float) -> None:
+        self._velocity_deviation = velocity_deviation
+        self._filter = self._new_filter()
+
+    def _new_filter(self) -> InteractingModels:
+        return InteractingModels(MODELS[self.settings.kind](self._velocity_deviation), self._pose_errors)
+
     def set_pose(self, pose: PoseUncertainty) -> None:
         if self._pose_errors is None and self._time is None:
             self._pose_errors = PoseErrors()
-            self._filter = InteractingModels(MODELS[self.settings.kind](), self._pose_errors)
+            self._filter = self._new_filter()
             self._tracks = self._filter.no_tracks()
         if self._pose_errors is not None:
             self._pose_errors.add(pose)

@@ -119,6 +119,7 @@ class UncertainPose(MotionModel):
     """
 
     def __init__(self, base: MotionModel, errors: PoseErrors) -> None:
+        super().__init__(base.velocity_deviation)
         self._base = base
         self.size = base.size + 3
         self.motion, self.measures_heading = base.motion, base.measures_heading

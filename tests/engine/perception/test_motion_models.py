@@ -12,6 +12,7 @@ from eidrive_scenario.perception.tracking.motion_models import (
     TURN_DENSITY,
     ConstantVelocity,
     Estimates,
+    MotionModel,
     TurnRate,
 )
 
@@ -37,6 +38,18 @@ def test_constant_velocity_predict_moves_straight() -> None:
     assert covariance[0, 2, 2] == pytest.approx(ACCELERATION_DENSITY * 2.0)
     assert covariance[0, 0, 2] == pytest.approx(ACCELERATION_DENSITY * 2.0)
     assert covariance[0, 0, 1] == 0.0
+
+
+@pytest.mark.parametrize(("model", "speed"), [(ConstantVelocity, slice(2, 4)), (TurnRate, slice(3, 4))])
+@pytest.mark.parametrize(("deviation", "expected"), [(None, 0.5), (1.5, 1.5)])
+def test_begin_has_the_deviation_of_the_detected_velocity(
+    model: type[MotionModel], speed: slice, deviation: float | None, expected: float
+) -> None:
+    given = model() if deviation is None else model(deviation)
+    held = given.begin(box(0.0, 0.0), np.array([[8.0, 0.0]]), noise())
+    np.testing.assert_allclose(np.diagonal(held.covariance[0])[speed], expected**2)
+    unknown = given.begin(box(0.0, 0.0), UNKNOWN, noise())
+    np.testing.assert_allclose(np.diagonal(unknown.covariance[0])[speed], 144.0)
 
 
 def test_constant_velocity_many_small_steps_equal_one_step() -> None:

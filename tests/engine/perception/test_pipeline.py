@@ -13,7 +13,7 @@ from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.localization import Localizer
+from eidrive_scenario.perception.localization import Localizer, PoseNoise, PoseNoiseProcess
 from eidrive_scenario.perception.oracle import OracleDetector
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.method import TrackerKind, TrackerSettings, TrackingMethod
@@ -54,6 +54,26 @@ def test_perceive_with_latency_delays_each_detection() -> None:
 
 def test_perceive_with_latency_between_ticks_returns_at_later_tick() -> None:
     assert result_times(Perception(OracleDetector(), latency=0.11), 6) == [None, None, None, 0.0, 0.05, 0.1]
+
+
+@pytest.mark.parametrize("pose_is_exact", [True, False])
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_tracker_weighs_velocities_by_the_deviation_of_the_detector(kind: Any, pose_is_exact: bool) -> None:
+    """The detector states 10 m/s of boxes that move by 6 m/s."""
+
+    def speed(deviation: float) -> float:
+        detector = OracleDetector()
+        detector.velocity_deviation = deviation
+        noise = None if pose_is_exact else PoseNoiseProcess(PoseNoise(position=1e-6), "Ego", 1)
+        perception = Perception(detector, tracker=Tracker(TrackerSettings(kind=kind)), pose_noise=noise)
+        for tick in range(3):
+            given = perception.locate(readings(tick * DT, 6.0 * tick * DT))
+            found = perception.perceive(given)
+        assert found is not None
+        return float(found.velocity[0, 0])
+
+    assert speed(0.01) == pytest.approx(10.0, abs=0.5)
+    assert speed(50.0) == pytest.approx(6.0, abs=0.5)
 
 
 def test_perceive_without_due_sensor_returns_none() -> None:

@@ -34,6 +34,14 @@ from eidrive_scenario.perception.lidar.station import StationLidars
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 
+VELOCITY_DEVIATION = 1.5
+"""Standard deviation of the velocities of moving objects in each axis [m/s].
+
+Root mean square of 16,633 errors in 40 scenarios of the library (seed 1, 12 s, overlap of at least 0.3): 1.2 within
+20 m, 1.5 from 20 to 30 m, 1.6 to 40 m and 1.9 beyond; 0.5 across the motion and 2.1 along it. The 6,931 errors of
+standing objects have 0.55.
+"""
+
 
 def grid_frame(reading: LidarReading) -> LevelFrame:
     """Return the frame of the grid of a station with this reading: axes of the world, its origin on a multiple of the
@@ -71,6 +79,7 @@ class PillarDetector(Detector):
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
     provides_features: ClassVar[bool] = True
+    velocity_deviation = VELOCITY_DEVIATION
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {"lidar": LidarSettings(rate=10.0, rotation=10.0)}
     settings_type: ClassVar[type[Settings] | None] = PillarSettings
 

@@ -11,6 +11,7 @@ import pytest
 from msgspec.structs import replace
 from opendrive_xml import map_xml, road_xml
 from pillar_weights import Arrays, plain_arrays, random_arrays, save
+from scenario_1 import FrameCollector, simulate
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
@@ -18,12 +19,14 @@ from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.extensions.settings import parse_settings
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.learned.pillars.detector import PillarDetector, PillarSettings
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.method import TrackerSettings
+from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED
 from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
@@ -237,6 +240,32 @@ def test_tracker_begins_with_measured_velocity(tmp_path: Path) -> None:
         tracks = tracker.update(found)
     assert len(tracks) == 4
     np.testing.assert_allclose(tracks.velocity, [[8.0, 0.0]] * 4, atol=0.5)
+
+
+def test_stated_deviation_of_velocities_is_that_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each axis, within a factor of two: scenario 7 has 200 detections of moving, and 80 of standing vehicles."""
+    detect, found = PillarDetector.detect, list[Detections]()
+
+    def recorded(detector: PillarDetector, given: Readings) -> Detections:
+        found.append(detect(detector, given))
+        return found[-1]
+
+    monkeypatch.setattr(PillarDetector, "detect", recorded)
+    collector = FrameCollector()
+    simulate(resolve_scenario("coop/scenario_7"), "ideal", collector, detector="pillars", time_limit=3.0)
+    views = {round(frame.view.time, 6): frame.view for frame in collector.frames}
+    errors: dict[bool, list[Array]] = {True: [], False: []}
+    for detections in found:
+        view = views[round(detections.time, 6)]
+        overlap = iou_bev(detections.boxes, view.boxes)
+        for row in np.flatnonzero(overlap.max(axis=1, initial=0.0) > 0.3).tolist():
+            true = view.velocity[overlap[row].argmax(), :2]
+            speed = math.hypot(*true)
+            if (speed < 0.1 or speed > 0.5) and np.isfinite(detections.velocity[row]).all():
+                errors[speed > 0.5].append(detections.velocity[row] - true)
+    deviation = {moves: float(np.sqrt(np.mean(np.square(values)))) for moves, values in errors.items()}
+    assert 0.5 < deviation[True] / PillarDetector.velocity_deviation < 2.0
+    assert 0.5 < deviation[False] / KNOWN_SPEED < 2.0
 
 
 def test_registry_loads_detector_by_entry_point() -> None:
