@@ -25,7 +25,7 @@ class EarlyFusionSettings(CovarianceIntersectionSettings):
     """Settings of early fusion (property `fusion_settings`). Inherited ones apply to stations without shared points.
 
     cell         cell size of the grid of transmitted points [m]
-    max_lateness  maximum age of merged points; older ones show past positions [s]
+    max_lateness  maximum age of merged points; older ones show past positions [s]. Also the maximum lead of a clock
     """
 
     cell: PositiveFloat = 0.1

@@ -43,7 +43,7 @@ class IntermediateFusionSettings(CovarianceIntersectionSettings):
 
     share         share of the cells of a map that is sent, the most confident ones
     encoding      `int8`: 8 bytes per cell; `codes`: 1 byte per cell, an entry of the code book of the network
-    max_lateness  maximum age of fused features [s]
+    max_lateness  maximum age of fused features, and maximum lead of the clock of their sender [s]
     """
 
     share: float = Field(default=1.0, gt=0.0, le=1.0)
@@ -148,8 +148,8 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         self._maps += 1
         whole = FeatureFrame(
             0, self._maps % 65536, 0, 1, features.time, features.x, features.y, features.yaw,
-            features.interval or 0.0, features.foot, features.cell, (rows, columns), settings.encoding, float(codec.scale),
-            to_cells(chosen, codes),
+            features.interval or 0.0, features.foot, features.cell, (rows, columns), settings.encoding,
+            float(codec.scale), to_cells(chosen, codes),
         )  # fmt: skip
         return split(whole, limit)
 

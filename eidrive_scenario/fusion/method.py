@@ -61,7 +61,7 @@ class FusionMethod(ABC):
 
     @property
     def max_payload_age(self) -> float:
-        """Maximum age of received sensor data that are merged [s]."""
+        """Maximum age of received sensor data that are merged, and maximum lead of the clock of their sender [s]."""
         return 0.0
 
     def setup(self, detector: Detector) -> None:  # noqa: B027 - optional
@@ -75,7 +75,7 @@ class FusionMethod(ABC):
         return ()
 
     def add_payload(self, sender: str, payload: Payload, body: Array) -> None:  # noqa: B027 - optional
-        """Store received sensor data that are not too old, without those on the ego body (7,) at their time."""
+        """Store received sensor data within this age, without those on the ego body (7,) at their time."""
 
     def merge_readings(self, readings: Readings, alone: Detections | None = None) -> Readings:
         """Return the readings of a station with the received sensor data that are not too old.
