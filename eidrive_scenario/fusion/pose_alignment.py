@@ -302,26 +302,26 @@ def _likeliest(candidates: _Candidates) -> _Hypothesis | None:
         return None
     seeds = np.unique(np.linspace(0, len(candidates.rows) - 1, MAX_SEEDS).astype(int))
     errors, covariances, scores, tempered = _seeded(candidates, seeds)
-    found: list[_Hypothesis] = []
+    hypotheses: list[_Hypothesis] = []
     refined = 0
     for seed in np.argsort(-scores, kind="stable").tolist():
         pair = seeds[seed : seed + 1]
         if tempered[seed] < tempered.max() - NEGLIGIBLE or any(
-            _fits(candidates, pair, other.error, other.covariance)[0] for other in found
+            _fits(candidates, pair, other.error, other.covariance)[0] for other in hypotheses
         ):
             continue
         hypothesis = _refine(candidates, errors[seed], covariances[seed])
-        if hypothesis is not None and not any(_are_same(hypothesis, other) for other in found):
-            found.append(hypothesis)
+        if hypothesis is not None and not any(_are_same(hypothesis, other) for other in hypotheses):
+            hypotheses.append(hypothesis)
         refined += 1
         if refined == MAX_HYPOTHESES:
             break
-    found.sort(key=lambda hypothesis: -hypothesis.log_odds)
-    if not found:
+    hypotheses.sort(key=lambda hypothesis: -hypothesis.log_odds)
+    if not hypotheses:
         return None
-    odds = np.array([0.0, *(hypothesis.log_odds for hypothesis in found)])
-    probability = 1.0 / np.exp(odds - found[0].log_odds).sum()
-    return found[0] if probability >= MIN_PROBABILITY else None
+    odds = np.array([0.0, *(hypothesis.log_odds for hypothesis in hypotheses)])
+    probability = 1.0 / np.exp(odds - hypotheses[0].log_odds).sum()
+    return hypotheses[0] if probability >= MIN_PROBABILITY else None
 
 
 def _seeded(candidates: _Candidates, seeds: Integers) -> tuple[Array, Array, Array, Array]:

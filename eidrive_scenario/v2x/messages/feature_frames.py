@@ -142,8 +142,8 @@ class FeatureFrame:
 
 def to_cells(indices: NDArray[np.int64], codes: NDArray[np.int8] | Bytes) -> Bytes:
     """Return cells (N, 2 + K) from indices (N,) and codes (K, N) or (N,), as frames contain them."""
-    places = np.ascontiguousarray(indices, "<u2").view(np.uint8).reshape(-1, INDEX_BYTES)
-    return np.concatenate([places, np.atleast_2d(codes).T.view(np.uint8)], axis=1)
+    numbers = np.ascontiguousarray(indices, "<u2").view(np.uint8).reshape(-1, INDEX_BYTES)
+    return np.concatenate([numbers, np.atleast_2d(codes).T.view(np.uint8)], axis=1)
 
 
 def split(frame: FeatureFrame, limit: int) -> tuple[FeatureFrame, ...]:
