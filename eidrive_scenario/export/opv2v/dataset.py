@@ -140,8 +140,8 @@ def export_dataset(
     workers   number of processes; by default that of the cores
     finished  function that gets the outcome of each run
 
-    Raise OutputError if the folder cannot be written, if another command writes there, or if its runs have other
-    sensors or versions. A run that fails is an outcome.
+    Raise OutputError if the folder cannot be written, if another command writes there, if its runs have other
+    sensors or versions, or if a manifest is damaged. A run that fails is an outcome.
     """
     (folder,) = {job.folder for job in jobs}
     sensors = jobs[0].sensors
@@ -154,8 +154,11 @@ def export_dataset(
     }
     check_writable(folder)
     with _locked(folder):
+        complete = dict(_manifests(folder))
         _check_same(folder, about)
-        left = [job for job in jobs if not (job.path / MANIFEST).is_file()]
+        # Before the first run, so that a killed command is continued with the same sensors and versions only.
+        _write_json(folder / MANIFEST, {**about, "runs": complete})
+        left = [job for job in jobs if job.name not in complete]
         try:
             return list(run_jobs(left, _export, workers=workers, console=console, title="dataset", finished=finished))
         finally:
@@ -177,9 +180,9 @@ def _locked(folder: Path) -> Iterator[None]:
 def _check_same(folder: Path, about: Mapping[str, Any]) -> None:
     """Raise OutputError if a dataset in the folder differs in what all its runs share."""
     path = folder / MANIFEST
-    if not path.is_file():
+    if not path.exists():
         return
-    before = _read_json(path)
+    before = _read_json(path, "choose another folder")
     for name, value in about.items():
         if before.get(name) != value:
             message = f"the folder contains a dataset with other {name}"
@@ -189,10 +192,10 @@ def _check_same(folder: Path, about: Mapping[str, Any]) -> None:
 def _manifests(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield name and manifest of each complete run, sorted by name."""
     for path in sorted(folder.glob(f"*/{MANIFEST}")):
-        yield path.parent.name, _read_json(path)
+        yield path.parent.name, _read_json(path, "remove its folder, so that the run is repeated")
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(path: Path, hint: str) -> dict[str, Any]:
     try:
         content = load_json(read_regular_file(path, _LARGEST), max_depth=40)
         if isinstance(content, dict):
@@ -200,7 +203,7 @@ def _read_json(path: Path) -> dict[str, Any]:
         raise ValueError("no JSON object")
     except (OSError, ValueError) as error:
         message = f"cannot read the manifest: {reason_of(error)}"
-        raise OutputError(Diagnostic(message, "choose another folder", str(path))) from error
+        raise OutputError(Diagnostic(message, hint, str(path))) from error
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive, eidrive
 
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.errors import OutputError
 from eidrive_scenario.experiments.sweeps.axes import parse_axes
-from eidrive_scenario.export.opv2v.dataset import DatasetJob, export_dataset, plan_dataset, read_sensors
+from eidrive_scenario.export.opv2v.dataset import DatasetJob, ExportedRun, export_dataset, plan_dataset, read_sensors
 from eidrive_scenario.files.atomic import FileLock
+from eidrive_scenario.perception.oracle import OracleDetector
+from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.simulation import RunSettings, run_file
 
 __all__ = ["eidrive"]
@@ -95,10 +99,50 @@ def test_folder_in_use_is_an_error(tmp_path: Path) -> None:
         export_dataset(plan(tmp_path), workers=1)
 
 
-def test_damaged_manifest_is_an_error(tmp_path: Path) -> None:
+def test_damaged_manifest_is_an_error_before_the_first_run(dataset: Path, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text("[1]")
-    with pytest.raises(OutputError, match=r"manifest\.json: cannot read the manifest"):
+    with pytest.raises(OutputError, match=r"manifest\.json: cannot read the manifest: .*choose another folder"):
         export_dataset(plan(tmp_path), workers=1)
+    shutil.copytree(dataset, tmp_path / "damaged")
+    run = plan(tmp_path / "damaged")[1].path
+    (run / "manifest.json").write_text('{"frames": ')
+    with pytest.raises(OutputError, match=rf"{run.name}/manifest\.json: cannot read the manifest: .*remove its folder"):
+        export_dataset(plan(tmp_path / "damaged", seeds=(3,)), workers=1)
+    assert len(list((tmp_path / "damaged").glob("*/manifest.json"))) == 4
+
+
+def test_killed_command_is_not_continued_with_other_sensors(tmp_path: Path) -> None:
+    """The manifest of the dataset exists from the first run on."""
+
+    def read(run: ExportedRun) -> None:
+        about = json.loads((tmp_path / "manifest.json").read_text())
+        assert (about["sensors"]["lidar"]["channels"], about["runs"]) == (4, {})
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export_dataset(plan(tmp_path), workers=1, finished=read)
+    with pytest.raises(OutputError, match="contains a dataset with other sensors"):
+        export_dataset(plan_dataset(["coop/scenario_1"], tmp_path, SHORT), workers=1)
+
+
+def test_run_that_fails_midway_leaves_no_folder_and_the_others_are_exported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    detect = OracleDetector.detect
+
+    def fail(self: OracleDetector, readings: Readings) -> Detections:
+        if readings.time > 0.1:
+            raise RuntimeError("the sensor is broken")
+        return detect(self, readings)
+
+    first, second = plan(tmp_path, seeds=(1,))
+    with monkeypatch.context() as patched:
+        patched.setattr(OracleDetector, "detect", fail)
+        (failed,) = export_dataset([first], workers=1)
+    assert "the sensor is broken" in failed.error
+    assert [path.name for path in tmp_path.iterdir()] == ["manifest.json"]
+    (complete,) = export_dataset([second], workers=1)
+    assert (complete.frames, complete.error) == (3, "")
 
 
 @pytest.mark.process
