@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.driving.agent_factory import station_sensors
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
-from eidrive_scenario.export.opv2v.frame_text import CameraEntry, ObjectEntry, StationFrame
-from eidrive_scenario.export.opv2v.point_cloud import write_pcd
+from eidrive_scenario.export.opv2v.frame_files import (
+    CameraEntry,
+    ObjectEntry,
+    StationFrame,
+    write_file,
+    write_pcd,
+    write_png,
+)
 from eidrive_scenario.export.opv2v.poses import MIRROR, opv2v_pose
 from eidrive_scenario.export.opv2v.reader_limits import ReaderLimits
-from eidrive_scenario.files.atomic import create
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import MiscObject
 from eidrive_scenario.recording.frame import Frame
@@ -101,13 +104,11 @@ class Opv2vWriter:
         self._assign_ids(scenario, names)
 
     def _assign_ids(self, scenario: Scenario, names: Sequence[str]) -> None:
-        masts = [name for name in names if isinstance(scenario.entities[name], MiscObject)]
-        numbered = [name for name in names if name not in masts] + masts[1:]
-        self._ids = {name: FIRST_ID + row for row, name in enumerate(numbered)}
-        self.stations = {name: self._ids[name] for name in numbered}
-        for name in masts[:1]:
-            self.stations[name] = ROADSIDE_UNIT
-        for name in masts[1:]:
+        roadside = [name for name in names if isinstance(scenario.entities[name], MiscObject)]
+        numbered = [name for name in names if name not in roadside] + roadside[1:]
+        self._ids = {name: FIRST_ID + count for count, name in enumerate(numbered)}
+        self.stations = {**self._ids, **dict.fromkeys(roadside[:1], ROADSIDE_UNIT)}
+        for name in roadside[1:]:
             self.warnings.append(
                 f"roadside unit {name!r} has the id {self._ids[name]} of a vehicle: readers accept one negative id"
             )
@@ -127,12 +128,13 @@ class Opv2vWriter:
         listed: dict[str, list[str]] = {}
         for name in present:
             (cloud,) = readings[name].lidars.values()
-            hits = [view.names[row] for row in np.unique(cloud.rows[cloud.rows >= 0]).tolist()]
+            hit_actors = [view.names[row] for row in np.unique(cloud.rows[cloud.rows >= 0]).tolist()]
             lidars[name] = cloud.pose
-            listed[name] = [other for other in hits if view.categories[view.rows[other]] not in _NO_VEHICLES]
+            listed[name] = [other for other in hit_actors if view.categories[view.rows[other]] not in _NO_VEHICLES]
             step = frame.steps.get(name)
             estimate = None if step is None else step.estimate
-            self._write(number, name, readings[name], cloud, self._frame(view, name, hits, readings[name], estimate))
+            station_frame = self._frame(view, name, hit_actors, readings[name], estimate)
+            self._write(number, name, readings[name], cloud, station_frame)
         if lidars:
             objects = dict.fromkeys(other for names in listed.values() for other in names)
             self._limits.observe(lidars, listed, {other: _corners(view, view.rows[other]) for other in objects})
@@ -154,13 +156,13 @@ class Opv2vWriter:
         return self._ids[name]
 
     def _frame(
-        self, view: WorldView, name: str, hits: Sequence[str], readings: Readings, estimate: EgoState | None
+        self, view: WorldView, name: str, hit_actors: Sequence[str], readings: Readings, estimate: EgoState | None
     ) -> StationFrame:
         row = view.rows[name]
         (cloud,) = readings.lidars.values()
         pose = _base_pose(view, row)
         entries: dict[bool, dict[int, ObjectEntry]] = {False: {}, True: {}}
-        for other in hits:
+        for other in hit_actors:
             category = view.categories[view.rows[other]]
             if other != name and category != "misc":
                 entries[category == "pedestrian"][self._id(other)] = _entry(view, view.rows[other])
@@ -178,9 +180,9 @@ class Opv2vWriter:
     def _write(self, number: int, name: str, readings: Readings, cloud: LidarReading, frame: StationFrame) -> None:
         folder = self.folder / str(self.stations[name])
         write_pcd(folder / f"{number:06d}.pcd", cloud.points * MIRROR.diagonal()[:3], cloud.intensity)
-        for row, camera in enumerate(readings.cameras.values()):
-            _write_file(folder / f"{number:06d}_camera{row}.png", _png(camera.rgb))
-        _write_file(folder / f"{number:06d}.yaml", frame.text().encode())
+        for camera_number, camera in enumerate(readings.cameras.values()):
+            write_png(folder / f"{number:06d}_camera{camera_number}.png", camera.rgb)
+        write_file(folder / f"{number:06d}.yaml", frame.text().encode())
         self._written.setdefault(name, []).append(number)
 
     def conclude(self, result: RunResult) -> None:
@@ -262,17 +264,3 @@ def _camera(reading: CameraReading, lidar: Array) -> CameraEntry:
     pose[:3, :3] = pose[:3, :3] @ _OPTICAL.T
     extrinsic = MIRROR @ np.linalg.inv(pose) @ lidar @ MIRROR
     return CameraEntry(opv2v_pose(pose), extrinsic.tolist(), reading.intrinsics.tolist())
-
-
-def _png(rgb: NDArray[np.uint8]) -> bytes:
-    """Return an image (H, W, 3) as a PNG file."""
-    import cv2
-
-    _, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
-    encoded: Any = data
-    return bytes(encoded.tobytes())
-
-
-def _write_file(path: Path, content: bytes) -> None:
-    with create(path) as stream:
-        stream.write(content)

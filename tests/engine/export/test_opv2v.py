@@ -13,13 +13,20 @@ import numpy as np
 import pytest
 import yaml
 from numpy.typing import NDArray
+from opendrive_xml import elevation_xml, map_xml, road_xml, superelevation_xml
+from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
+from storyboard_xml import (
+    end_xml,
+    init_xml,
+    lane_position_xml,
+    teleport_xml,
+)
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import points_in_box, rotation_matrix
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.export.opv2v.dataset import read_sensors
-from eidrive_scenario.export.opv2v.frame_text import StationFrame
-from eidrive_scenario.export.opv2v.point_cloud import write_pcd
+from eidrive_scenario.export.opv2v.frame_files import StationFrame, write_pcd
 from eidrive_scenario.export.opv2v.poses import opv2v_pose, pose_matrix
 from eidrive_scenario.export.opv2v.reader_limits import ReaderLimits
 from eidrive_scenario.export.opv2v.writer import Opv2vWriter
@@ -118,8 +125,8 @@ def test_folder_has_one_file_of_each_kind_per_station_and_frame(scene: Exported)
 
 def test_keys_of_frames_are_those_of_opv2v_and_three_additions(scene: Exported) -> None:
     frame = scene.frame(-1, 4)
-    known = {"camera0", "ego_speed", "lidar_pose", "plan_trajectory", "predicted_ego_pos", "true_ego_pos", "vehicles"}
-    assert set(frame) == known | {"ego_extent", "pedestrians"}
+    keys = {"camera0", "ego_speed", "lidar_pose", "plan_trajectory", "predicted_ego_pos", "true_ego_pos", "vehicles"}
+    assert set(frame) == keys | {"ego_extent", "pedestrians"}
     for entry in frame["vehicles"].values():
         assert set(entry) == {"angle", "center", "extent", "location", "speed"} | {"obj_type"}
         assert all(isinstance(value, float) for key in ("angle", "center", "extent") for value in entry[key])
@@ -186,6 +193,54 @@ def test_points_lie_on_the_ground_and_in_boxes_of_listed_vehicles(scene: Exporte
     assert inside[np.any(near, axis=0)].all()
 
 
+def test_boxes_and_points_on_a_banked_slope_have_pitch_and_roll(tmp_path: Path) -> None:
+    """The road along x climbs by 10 % and is banked by 0.15 rad: it is the plane through the origin with normal n.
+
+    The ego drives up, the other car down, so that their pitch and roll have opposite signs. Bases of boxes lie on the
+    plane, and points on the plane or in a box: mirrors, handles and lamps reach beyond it by up to 0.07 m.
+    """
+    slope, bank = math.atan(0.1), 0.15
+    road = tmp_path / "banked.xodr"
+    profiles = elevation_xml(slope=0.1) + superelevation_xml(bank)
+    road.write_text(map_xml(road_xml(length=300.0, profiles=profiles)))
+    (tmp_path / "banked.xosc").write_bytes(
+        scenario_xml(
+            entities=object_xml("Ego", controller=agent_xml()) + object_xml("Car"),
+            init=init_xml("Ego", teleport_xml(lane_position_xml(-1, 100)))
+            + init_xml("Car", teleport_xml(lane_position_xml(1, 120))),
+            stop=end_xml(0.2),
+            road=road_file_xml(road),
+        )
+    )
+    exported = export(tmp_path / "out", tmp_path / "banked.xosc", 0.2)
+    frame = exported.frame(1001, 0)
+    (car,) = frame["vehicles"].values()
+    half_height = frame["ego_extent"][2]
+    own = [*np.add(frame["true_ego_pos"][:3], (0.0, 0.0, half_height)), *frame["true_ego_pos"][3:]]
+    ahead = np.array([math.cos(slope), 0.0, math.sin(slope)])
+    left = np.array([-math.sin(slope) * math.sin(bank), math.cos(bank), math.cos(slope) * math.sin(bank)])
+    normal = np.cross(ahead, left)
+    boxes = [
+        (carla_matrix(own), np.array(frame["ego_extent"])),
+        (carla_matrix([*np.add(car["location"], car["center"]), *car["angle"]]), np.array(car["extent"])),
+    ]
+    for (pose, extent), direction in zip(boxes, (1.0, -1.0), strict=True):
+        base = [(pose @ (a * extent[0], b * extent[1], -extent[2], 1.0))[:3] for a in (-1, 1) for b in (-1, 1)]
+        assert np.abs(np.array(base) * (1.0, -1.0, 1.0) @ normal).max() < 1e-6
+        np.testing.assert_allclose(pose[:3, 0] * (1.0, -1.0, 1.0), direction * ahead, atol=1e-8)
+    assert (own[5], own[3]) == pytest.approx(np.degrees((slope, bank)), abs=1e-6)  # nose up, right side down
+    assert (car["angle"][2], car["angle"][0]) == pytest.approx(np.degrees((-slope, -bank)), abs=1e-6)
+    points, _ = read_pcd(exported.folder / "1001" / "000000.pcd")
+    lidar = carla_matrix(frame["lidar_pose"])
+    world = points @ lidar[:3, :3].T + lidar[:3, 3]
+    local = (world - boxes[1][0][:3, 3]) @ boxes[1][0][:3, :3]
+    in_box = (np.abs(local) <= boxes[1][1] + 0.08).all(axis=1)
+    on_road = np.abs(world * (1.0, -1.0, 1.0) @ normal) < 0.02
+    assert min(in_box.sum(), on_road.sum()) > 10
+    near = np.linalg.norm(world[:, :2] - boxes[0][0][:2, 3], axis=1) < 40.0
+    assert (in_box | on_road)[near].all()
+
+
 def test_intensity_is_the_red_byte(tmp_path: Path) -> None:
     write_pcd(tmp_path / "cloud.pcd", np.array([[1.0, -2.0, 3.0], [0.5, 0.0, 0.0]]), np.array([1.0, 0.5]))
     points, colors = read_pcd(tmp_path / "cloud.pcd")
@@ -193,7 +248,7 @@ def test_intensity_is_the_red_byte(tmp_path: Path) -> None:
     assert colors.tolist() == [0xFF0000, 0x800000]
 
 
-def test_camera_projects_the_truck_to_the_pixel_of_its_place(scene: Exported) -> None:
+def test_camera_projects_the_truck_to_the_pixel_of_its_position(scene: Exported) -> None:
     """`extrinsic` maps lidar to camera in left-handed axes; `cords` and `lidar_pose` give the same matrix.
 
     The camera is 2.5 m ahead of the center of the ego at a height of 1 m and looks along x, so that the pixel of a
