@@ -135,7 +135,8 @@ class Opv2vWriter:
             estimate = None if step is None else step.estimate
             station_frame = self._frame(view, name, hit_actors, readings[name], estimate)
             self._write(number, name, readings[name], cloud, station_frame)
-        if lidars:
+        # Frames that lack a station are omitted later, and readers find the ego in each of the others.
+        if len(present) == len(self.stations):
             objects = dict.fromkeys(other for names in listed.values() for other in names)
             self._limits.observe(lidars, listed, {other: _corners(view, view.rows[other]) for other in objects})
 

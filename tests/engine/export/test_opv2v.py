@@ -16,10 +16,19 @@ from numpy.typing import NDArray
 from opendrive_xml import elevation_xml, map_xml, road_xml, superelevation_xml
 from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
 from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
     end_xml,
+    event_xml,
+    global_xml,
+    group_xml,
     init_xml,
     lane_position_xml,
+    maneuver_xml,
     teleport_xml,
+    time_xml,
+    trigger_xml,
 )
 
 from eidrive_scenario.base.arrays import Array
@@ -287,6 +296,30 @@ def test_frames_without_a_late_station_are_omitted(tmp_path: Path) -> None:
         numbers = sorted(int(path.name[:6]) for path in (exported.folder / station).glob("*.yaml"))
         assert numbers == exported.writer.frames
     assert f"{first // 2} frames are omitted, in which a station is absent" in exported.writer.warnings
+
+
+def test_limits_of_readers_are_those_of_the_frames_that_remain(tmp_path: Path) -> None:
+    """The ego leaves at 0.25 s. Then the station 100 m ahead of it is the first one, and would be 0 m from the ego."""
+    road = tmp_path / "road.xodr"
+    road.write_text(map_xml(road_xml(length=300.0)))
+    leave = global_xml('<EntityAction entityRef="Ego"><DeleteEntityAction/></EntityAction>')
+    due = trigger_xml(condition_xml(time_xml(0.25, "greaterOrEqual")))
+    at_once = trigger_xml(condition_xml(time_xml(0, "greaterOrEqual"), name="start"))
+    (tmp_path / "leaves.xosc").write_bytes(
+        scenario_xml(
+            entities=object_xml("Ego", controller=agent_xml()) + object_xml("Ahead", controller=agent_xml()),
+            init=init_xml("Ego", teleport_xml(lane_position_xml(-1, 50)))
+            + init_xml("Ahead", teleport_xml(lane_position_xml(-1, 150))),
+            story=acts_xml(act_xml(group_xml(maneuver_xml(event_xml("leave", leave, due)), ""), at_once)),
+            stop=end_xml(0.6),
+            road=road_file_xml(road),
+        )
+    )
+    exported = export(tmp_path / "out", tmp_path / "leaves.xosc", 1.0)
+    assert exported.writer.frames == [0, 2, 4]
+    omitted, far = exported.writer.warnings
+    assert omitted == "4 frames are omitted, in which a station is absent"
+    assert "never uses station 'Ahead': its lidar is at least 100 m from that of 'Ego'" in far
 
 
 def test_absent_station_alone_makes_no_empty_dataset(tmp_path: Path) -> None:
