@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,22 +14,29 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import CLASSES
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.export.opv2v.poses import pose_matrix
-from eidrive_scenario.export.traffic_recording.scene import MobileStation, RoadsideStation, Track, TrafficScene
+from eidrive_scenario.export.traffic_recording.scene import (
+    LIDAR_HEIGHT,
+    MAX_NUMBER,
+    OUT_OF_RANGE,
+    STATION_SIZE,
+    MobileStation,
+    RoadsideStation,
+    Track,
+    TrafficScene,
+    assumed_size,
+    folder_name,
+)
 from eidrive_scenario.files.bounded import read_regular_file, reason_of
 from eidrive_scenario.files.yaml_text import MAX_YAML, key_lines, load_yaml
 
 FRAME_STEP = 0.05
 """Time between successive frame numbers [s]."""
-STATION_SIZE = (4.9, 2.06, 1.5)
-"""Length, width and height of a station whose box no file states: a Lincoln MKZ, as all stations of OPV2V [m]."""
-LIDAR_HEIGHT = 1.9
-"""Height of the lidar of a vehicle without `true_ego_pos` [m]."""
 MAX_FRAMES = 100_000
 """Maximum number of frames of all stations of a scenario."""
-MAX_NUMBER = 1e9
-"""Maximum absolute value of a number."""
 _STATION = re.compile(r"-?\d{1,9}", re.ASCII)
 _FRAME = re.compile(r"(\d{1,9})\.yaml", re.ASCII)
+_EXPONENT = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d{1,3}", re.ASCII)
+"""Number such as 1e-05 or 1.5e3, which is text in YAML 1.1 and a number for readers of OPV2V."""
 _HINT = "give a folder of OPV2V: SCENARIO/ID/NUMBER.yaml"
 
 
@@ -81,12 +87,12 @@ class _FrameFile:
         if key not in owner:
             self.fail(within, f"{path} is missing")
         value: Any = owner[key]
-        is_list = isinstance(value, list) and len(value) == count
-        if not is_list or not all(isinstance(number, int | float) and not isinstance(number, bool) for number in value):
+        numbers = list(map(_number, value)) if isinstance(value, list) else []
+        if len(numbers) != count or not all(isinstance(number, int | float) for number in numbers):
             self.fail(path, f"{path} is {quoted(value, 100)} (expected {count} numbers)")
-        if not all(math.isfinite(number) and abs(number) <= MAX_NUMBER for number in value):
-            self.fail(path, f"{path} has a number that is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})")
-        return tuple(float(number) for number in value)
+        if not all(abs(number) <= MAX_NUMBER for number in numbers):  # not of NaN either
+            self.fail(path, f"{path} {OUT_OF_RANGE}")
+        return tuple(map(float, numbers))
 
     def size(self, owner: Mapping[Any, Any], key: str, within: str = "") -> tuple[float, float, float]:
         """Return length, width and height from half of them."""
@@ -107,6 +113,13 @@ class _FrameFile:
             if not isinstance(number, int) or isinstance(number, bool) or not isinstance(content, Mapping):
                 self.fail(path, f"{path} is no object with an integer as its id")
             yield number, content, path
+
+
+def _number(value: Any) -> Any:
+    """Return the number of a text with an exponent, None for a truth value, and any other value as it is."""
+    if isinstance(value, str) and _EXPONENT.fullmatch(value):
+        return float(value)
+    return None if isinstance(value, bool) else value
 
 
 @dataclass
@@ -162,7 +175,7 @@ def read_scene(folder: Path) -> TrafficScene:
         for number in lidars
         if number < 0
     ]
-    return TrafficScene(folder.name, seconds(last), tracks, mobile, roadside, warnings)
+    return TrafficScene(folder_name(folder), seconds(last), tracks, mobile, roadside, warnings)
 
 
 def _read_objects(file: _FrameFile, key: str, frame: int, objects: dict[int, _Samples]) -> None:
@@ -188,11 +201,11 @@ def _add_stations(
         if station < 0:
             continue
         if station not in objects:
-            size = extents.get(station, STATION_SIZE)
-            if station not in extents:
-                given = " x ".join(f"{edge:g}" for edge in size)
-                warnings.append(f"station {station} has the size {given} m: no file states it")
-            objects[station] = _Samples("car" if station not in extents else "", size)
+            if station in extents:
+                objects[station] = _Samples("", extents[station])
+            else:
+                warnings.append(assumed_size(f"station {station}"))
+                objects[station] = _Samples("car", STATION_SIZE)
         samples = objects[station]
         if len(own[station]) < len(poses):
             warnings.append(f"station {station}: frames lack true_ego_pos, which is derived from lidar_pose")

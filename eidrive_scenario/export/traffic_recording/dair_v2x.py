@@ -18,7 +18,18 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.assignment import associate
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.export.traffic_recording.scene import MobileStation, RoadsideStation, Track, TrafficScene
+from eidrive_scenario.export.traffic_recording.scene import (
+    LIDAR_HEIGHT,
+    MAX_NUMBER,
+    OUT_OF_RANGE,
+    STATION_SIZE,
+    MobileStation,
+    RoadsideStation,
+    Track,
+    TrafficScene,
+    assumed_size,
+    folder_name,
+)
 from eidrive_scenario.files.bounded import MIB, load_json, read_regular_file, reason_of
 
 INDEX = PurePosixPath("cooperative/data_info.json")
@@ -29,12 +40,6 @@ GATE = 2.5
 """Maximum distance of a labeled box from the predicted position of a road user [m]."""
 MAX_GAP = 0.6
 """Time without a label after which a road user is another one [s]."""
-LIDAR_HEIGHT = 1.9
-"""Assumed height of the lidar of the vehicle above the ground [m]."""
-VEHICLE_SIZE = (4.9, 2.06, 1.5)
-"""Assumed length, width and height of the vehicle, if no label contains its lidar [m]."""
-MAX_NUMBER = 1e9
-"""Maximum absolute value of a number."""
 _LARGEST = 64 * MIB
 _MAX_VALUES = 2_000_000
 _CATEGORIES = {
@@ -84,10 +89,10 @@ class _JsonFile:
         value = self.value(owner, key, (list,), path)
         try:
             numbers = np.array(value, dtype=float).reshape(shape)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             self.fail(f"{path}{key} is {quoted(value, 100)} (expected {math.prod(shape)} numbers)")
         if not (np.abs(numbers) <= MAX_NUMBER).all():
-            self.fail(f"{path}{key} has a number that is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})")
+            self.fail(f"{path}{key} {OUT_OF_RANGE}")
         return numbers
 
     def pose(self, owner: Any, path: str = "") -> Array:
@@ -156,7 +161,9 @@ def read_scenes(folder: Path) -> Iterator[TrafficScene]:
     for frame in _frames(folder):
         sequences.setdefault(frame.sequence, []).append(frame)
     for name, frames in sorted(sequences.items()):
-        yield _scene(folder, f"sequence_{name}" if name else folder.name, sorted(frames, key=lambda frame: frame.time))
+        yield _scene(
+            folder, f"sequence_{name}" if name else folder_name(folder), sorted(frames, key=lambda frame: frame.time)
+        )
 
 
 def _frames(folder: Path) -> Iterator[_Frame]:
@@ -165,8 +172,8 @@ def _frames(folder: Path) -> Iterator[_Frame]:
     index = _JsonFile(folder / INDEX)
     if not index.entries():
         index.fail("the index has no frame")
-    for row, entry in enumerate(index.entries()):
-        at = f"[{row}]."
+    for number, entry in enumerate(index.entries()):
+        at = f"[{number}]."
         vehicle = PurePosixPath(index.value(entry, "vehicle_pointcloud_path", (str,), at)).stem
         unit = PurePosixPath(index.value(entry, "infrastructure_pointcloud_path", (str,), at)).stem
         label = PurePosixPath(index.value(entry, "cooperative_label_path", (str,), at)).stem
@@ -176,7 +183,7 @@ def _frames(folder: Path) -> Iterator[_Frame]:
         stamp = side.value(about, "pointcloud_timestamp", (str, int, float))
         try:
             microseconds = float(stamp)
-        except ValueError:
+        except (ValueError, OverflowError):
             microseconds = math.nan
         if not math.isfinite(microseconds):
             side.fail(f"pointcloud_timestamp is {quoted(stamp, 100)} (expected microseconds)")
@@ -210,18 +217,16 @@ def _scene(folder: Path, name: str, frames: list[_Frame]) -> TrafficScene:
         if unit is None:
             unit = _unit_lidar(folder, frame)
         labels = _labels(folder, frame)
-        inside = [label for label in labels if _contains(label, lidars[-1][:2, 3])]
-        own.append(inside[0] if inside else None)
-        others = [label for label in labels if not any(label is other for other in inside[:1])]
-        ended = [track for track in open_tracks if time - track.times[-1] > MAX_GAP]
-        done += ended
-        open_tracks = [track for track in open_tracks if not any(track is other for other in ended)]
+        own.append(next((label for label in labels if _contains(label, lidars[-1][:2, 3])), None))
+        others = [label for label in labels if label is not own[-1]]
+        done += [track for track in open_tracks if time - track.times[-1] > MAX_GAP]
+        open_tracks = [track for track in open_tracks if time - track.times[-1] <= MAX_GAP]
         open_tracks += _continue(open_tracks, others, time)
     tracks = [_station_track(times, lidars, own)]
     tracks += [_track(number, track) for number, track in enumerate([*done, *open_tracks], 1)]
     mobile = MobileStation(VEHICLE_NAME, np.linalg.inv(tracks[0].poses[0]) @ lidars[0])
     assert unit is not None
-    warnings = [] if any(own) else [f"no label contains the lidar of the vehicle: its size is assumed {VEHICLE_SIZE}"]
+    warnings = [] if any(own) else [assumed_size("the vehicle with the lidar")]
     return TrafficScene(name, times[-1], tracks, [mobile], [RoadsideStation(UNIT_NAME, unit)], warnings)
 
 
@@ -245,8 +250,8 @@ def _unit_lidar(folder: Path, frame: _Frame) -> Array:
 def _labels(folder: Path, frame: _Frame) -> list[_Label]:
     file = _JsonFile(folder / "cooperative" / "label_world" / f"{frame.label}.json")
     labels = []
-    for row, entry in enumerate(file.entries()):
-        at = f"[{row}]."
+    for number, entry in enumerate(file.entries()):
+        at = f"[{number}]."
         category = _CATEGORIES.get(file.value(entry, "type", (str,), at).lower())
         if category is None:
             continue
@@ -278,11 +283,11 @@ def _contains(label: _Label, point: Array) -> bool:
 
 def _continue(tracks: list[_OpenTrack], labels: list[_Label], time: float) -> list[_OpenTrack]:
     """Add the labels of a frame to the tracks that they continue, and return tracks of the others."""
-    known = {(track.identity, track.category): track for track in tracks if track.identity}
+    identified = {(track.identity, track.category): track for track in tracks if track.identity}
     started: list[_OpenTrack] = []
     free: list[_Label] = []
     for label in labels:
-        track = known.get((label.identity, label.category))
+        track = identified.get((label.identity, label.category))
         if track is not None:
             track.add(time, label)
         elif label.identity:
@@ -294,11 +299,13 @@ def _continue(tracks: list[_OpenTrack], labels: list[_Label], time: float) -> li
         of_category = [label for label in free if label.category == category]
         predicted = np.array([track.predict(time) for track in same]).reshape(-1, 2)
         pairs = associate(predicted, np.array([label.pose[:2, 3] for label in of_category]), GATE)
-        for row, column in pairs:
-            same[row].add(time, of_category[column])
-        continued = {column for _, column in pairs}
+        for track_index, label_index in pairs:
+            same[track_index].add(time, of_category[label_index])
+        continued = {label_index for _, label_index in pairs}
         started += [
-            _OpenTrack(category, "", [time], [label]) for row, label in enumerate(of_category) if row not in continued
+            _OpenTrack(category, "", [time], [label])
+            for label_index, label in enumerate(of_category)
+            if label_index not in continued
         ]
     return started
 
@@ -320,7 +327,7 @@ def _poses(labels: list[_Label]) -> Array:
 def _station_track(times: list[float], lidars: list[Array], own: list[_Label | None]) -> Track:
     """Return the track of the vehicle with the lidar: its labels, else a body below its lidar."""
     labels = [label for label in own if label is not None]
-    size = _size(labels) if labels else VEHICLE_SIZE
+    size = _size(labels) if labels else STATION_SIZE
     relative = None
     for lidar, label in zip(lidars, own, strict=True):
         if label is not None:

@@ -10,7 +10,7 @@ from lxml import etree
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.export.geometry import angles
-from eidrive_scenario.export.traffic_recording.bodies import body_of
+from eidrive_scenario.export.traffic_recording.bodies import Body, body_of
 from eidrive_scenario.export.traffic_recording.scene import MobileStation, RoadsideStation, Track, TrafficScene
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER
 from eidrive_scenario.files.encodable import encodable, printable
@@ -26,10 +26,10 @@ MAST_BASE = 0.5
 
 @dataclass(frozen=True)
 class _Actor:
-    """Entity of the scenario: its element, and the poses (N, 4, 4) of its reference point."""
+    """Entity of the scenario: its body, and the poses (N, 4, 4) of its reference point."""
 
     name: str
-    body: etree._Element
+    body: Body
     times: Array
     poses: Array
 
@@ -68,10 +68,10 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
     for track in scene.tracks:
         actor = _actor(track)
         entity = _add(entities, "ScenarioObject", name=actor.name)
-        entity.append(actor.body)
+        entity.append(actor.body.element)
         station = stations.get(track.name)
         if station is not None:
-            _add_stack(entity, track.name, _mount(station, track), lidar)
+            _add_stack(entity, track.name, _mount(station, actor.body), lidar)
         _add_motion(start, act, actor, scene.end, is_station=station is not None)
     for unit in scene.roadside:
         _add_mast(entities, start, unit, lidar)
@@ -92,13 +92,13 @@ def _actor(track: Track) -> _Actor:
     body = body_of(track.category, track.size)
     poses = track.poses.copy()
     poses[:, :3, 3] -= track.poses[:, :3, :3] @ np.array(body.center)
-    return _Actor(track.name, body.element, track.times, poses)
+    return _Actor(track.name, body, track.times, poses)
 
 
-def _mount(station: MobileStation, track: Track) -> dict[str, float]:
+def _mount(station: MobileStation, body: Body) -> dict[str, float]:
     """Return the mount of the lidar of a vehicle in the frame of its reference point [m, degrees]."""
     yaw, pitch, _ = angles(station.lidar[:3, :3])
-    x, y, z = station.lidar[:3, 3] + body_of(track.category, track.size).center
+    x, y, z = station.lidar[:3, 3] + body.center
     return _rounded_mount(x, y, z, yaw, pitch)
 
 

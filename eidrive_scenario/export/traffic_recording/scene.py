@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+
+STATION_SIZE = (4.9, 2.06, 1.5)
+"""Length, width and height of a vehicle with a lidar whose box no file states: a Lincoln MKZ, as in OPV2V [m]."""
+LIDAR_HEIGHT = 1.9
+"""Height of a lidar above the ground below a vehicle whose pose no file states [m]."""
+MAX_NUMBER = 1e9
+"""Maximum absolute value of a number in a file."""
+OUT_OF_RANGE = f"has a number that is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})"
+
+
+def folder_name(folder: Path) -> str:
+    """Return the name of a folder, that of `.` and `..` too."""
+    return os.path.basename(os.path.abspath(folder))
+
+
+def assumed_size(station: str) -> str:
+    """Return the warning about a station that has `STATION_SIZE`."""
+    return f"{station} has the size {' x '.join(f'{edge:g}' for edge in STATION_SIZE)} m: no file states it"
 
 
 @dataclass(frozen=True)

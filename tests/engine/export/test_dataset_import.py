@@ -129,7 +129,7 @@ def vehicle(x: float, y: float, yaw: float = 0.0, **others: Any) -> dict[str, An
 
 
 def frame(x: float, **vehicles: Any) -> dict[str, Any]:
-    objects = {int(name[1:]): one for name, one in vehicles.items()}
+    objects = {int(name[1:]): entry for name, entry in vehicles.items()}
     return {
         "lidar_pose": [x, 5.0, 1.9, 0.0, 90.0, 0.0],
         "true_ego_pos": [x, 5.0, 0.1, 0.0, 90.0, 0.0],
@@ -138,8 +138,8 @@ def frame(x: float, **vehicles: Any) -> dict[str, Any]:
 
 
 def imported(folder: Path, out: Path) -> tuple[Path, list[str]]:
-    (found,) = import_recordings(folder, out)
-    return found
+    (scenario,) = import_recordings(folder, out)
+    return scenario
 
 
 def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: Path) -> None:
@@ -158,6 +158,37 @@ def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: P
     for tick in (2, 3, 4, 5, 6):
         assert center_of(views[tick], "Vehicle7") == pytest.approx((20.0 + tick / 2, 4.0, 0.8), abs=1e-6)
     assert max(views) == 10
+
+
+def test_pitch_of_carla_raises_the_nose_and_roll_lowers_the_right_side(tmp_path: Path) -> None:
+    """The rows of `Rz(yaw) Ry(-pitch) Rx(-roll)`, with y mirrored, of roll 8, yaw 30 and pitch 5 degrees."""
+    for number in (68, 70):
+        write_frame(tmp_path / "in", 5, number, frame(0.0, v7=vehicle(20.0, -4.0, angle=[8.0, 30.0, 5.0])))
+    view = replay(imported(tmp_path / "in", tmp_path)[0])[2]
+    row = view.row("Vehicle7")
+    turn = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+    roll, yaw, pitch = np.radians([8.0, 30.0, 5.0])
+    ahead = (math.cos(pitch) * math.cos(yaw), -math.cos(pitch) * math.sin(yaw), math.sin(pitch))
+    assert turn[:, 0] == pytest.approx(ahead, abs=1e-8)
+    assert -turn[2, 1] == pytest.approx(-math.cos(pitch) * math.sin(roll), abs=1e-8)
+    assert center_of(view, "Vehicle7") == pytest.approx((20.0, 4.0, 0.8), abs=1e-6)
+
+
+def test_numbers_with_exponents_are_numbers_as_for_readers_of_opv2v(tmp_path: Path) -> None:
+    """YAML 1.1 takes numbers without a point, or without the sign of the exponent, as text."""
+    text = "lidar_pose: [1e-05, -5.0, 19e-1, 0, -9e+01, 0]\ntrue_ego_pos: [1.5e1, 2E0, 0.0, 0, 0, 0]\nvehicles: {}\n"
+    for number in (0, 2):
+        write_frame(tmp_path / "in", 5, number, text)
+    path, _ = imported(tmp_path / "in", tmp_path)
+    assert center_of(replay(path)[0], "Station5") == pytest.approx((15.0, -2.0, 0.75), abs=1e-6)
+
+
+def test_current_folder_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_frame(tmp_path / "scene", 1, 0, frame(0.0))
+    monkeypatch.chdir(tmp_path / "scene")
+    assert imported(Path("."), tmp_path)[0] == tmp_path / "scene.xosc"
+    monkeypatch.chdir(tmp_path / "scene" / "1")
+    assert imported(Path(".."), tmp_path)[0] == tmp_path / "scene.xosc"
 
 
 def test_heights_of_a_recording_are_those_above_its_lowest_road_user(tmp_path: Path) -> None:
@@ -183,7 +214,9 @@ def test_heights_of_a_recording_are_those_above_its_lowest_road_user(tmp_path: P
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\n", r"vehicles is missing"),
         ("lidar_pose: [0, 0, 0]\nvehicles: {}\n", r"000000\.yaml:1: lidar_pose is \[0, 0, 0\] \(expected 6 numbers\)"),
         ("lidar_pose: [0, 0, 0, 0, 0, .nan]\nvehicles: {}\n", r"yaml:1: lidar_pose has a number that is out of range"),
-        ("lidar_pose: [0, 0, 0, 0, 0, 1e300]\nvehicles: {}\n", r"yaml:1: lidar_pose"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 1e300]\nvehicles: {}\n", r"yaml:1: lidar_pose has a number that is out of range"),
+        (f"lidar_pose: [{'9' * 39}, 0, 0, 0, 0, 0]\nvehicles: {{}}\n", r"yaml:1: lidar_pose has a number that is out"),
+        ("lidar_pose: [yes, 0, 0, 0, 0, 0]\nvehicles: {}\n", r"yaml:1: lidar_pose is \[True, 0, 0, 0, 0, 0\]"),
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n- 1\n", r"yaml:2: vehicles is \[1\] \(expected a mapping"),
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  a: {}\n", r"yaml:3: vehicles\.a is no object with an integer"),
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  1:\n    angle: 3\n", r"yaml:3: vehicles\.1\.extent is missing"),
@@ -287,8 +320,8 @@ def dair(folder: Path, frames: int = 6) -> Path:
         kinds = ["Car", "car", "Truck"]
         corners = box_corners(boxes)[:, CORNERS_IN_CIRCLES]
         labels = [
-            {"type": kind, "world_8_points": one.tolist()}
-            for kind, one in list(zip(kinds, corners, strict=True))[:: (-1) ** row]
+            {"type": kind, "world_8_points": box.tolist()}
+            for kind, box in list(zip(kinds, corners, strict=True))[:: (-1) ** row]
         ]
         write_json(folder / LABELS.format(vehicle_id), [*labels, {"type": "Trafficcone", "world_8_points": []}])
     write_json(folder / "cooperative/data_info.json", index)
@@ -332,6 +365,16 @@ def test_recording_of_dair_v2x_is_replayed_with_associated_labels(tmp_path: Path
             "vehicle-side/data_info.json",
             '[{"pointcloud_path": "000100.pcd", "pointcloud_timestamp": "now"}]',
             r"pointcloud_timestamp is 'now'",
+        ),
+        (
+            "vehicle-side/data_info.json",
+            f'[{{"pointcloud_path": "000100.pcd", "pointcloud_timestamp": 1{"0" * 400}}}]',
+            r"data_info\.json: pointcloud_timestamp is an integer beyond",
+        ),
+        (
+            LABELS.format("000100"),
+            f'[{{"type": "Car", "world_8_points": [{f"[1{chr(48) * 400}, 0, 0]," * 7}[0, 0, 0]]}}]',
+            r"\[0\]\.world_8_points is .*expected 24 numbers",
         ),
         ("vehicle-side/calib/novatel_to_world/000100.json", "{}", r"000100\.json: rotation is missing"),
         (
