@@ -68,8 +68,11 @@ def dataset(
     Complete runs are kept, so that the same command continues a killed one.
     """
     if from_folder is not None:
-        if scenarios:
-            raise SettingError(Diagnostic("--import and scenarios exclude each other", "give one of them"))
+        given = {"scenarios": scenarios, "--seeds": seeds, "--vary": vary, "--sensors": sensors}
+        excluded = ", ".join(name for name, value in given.items() if value)
+        if excluded:
+            hint = "stations of recordings get their settings in the file that is written"
+            raise SettingError(Diagnostic(f"--import excludes {excluded}", hint))
         _import(from_folder, out)
         return
     if not scenarios:

@@ -173,7 +173,7 @@ def test_failed_runs_are_reported_and_the_others_exported(eidrive: Eidrive, tmp_
 
 def test_command_without_a_source_or_with_two_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
     assert "give an .xosc file, a library name, or --import DIR" in eidrive("dataset").stderr
-    both = eidrive("dataset", "coop/scenario_1", "--import", tmp_path)
-    assert (both.exit_code, "exclude each other" in both.stderr) == (2, True)
+    both = eidrive("dataset", "coop/scenario_1", "--sensors", LIDAR, "--import", tmp_path)
+    assert (both.exit_code, "--import excludes scenarios, --sensors; " in both.stderr) == (2, True)
     assert eidrive("dataset", "coop/scenario_1", "--vary", "wether=sunny", "--out", tmp_path / "x").exit_code == 2
     assert not (tmp_path / "x").exists()
