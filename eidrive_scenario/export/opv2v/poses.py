@@ -15,8 +15,6 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.export.geometry import angles
 
-DECIMALS = 9
-"""Decimals of written numbers: a degree with nine of them moves a point at 140 m by less than 1e-8 m."""
 MIRROR: Array = np.diag([1.0, -1.0, 1.0, 1.0])
 """Reflection (4, 4) between a frame of this project and that of OPV2V."""
 
@@ -25,7 +23,7 @@ def opv2v_pose(matrix: Array) -> list[float]:
     """Return the pose of OPV2V of a right-handed pose (4, 4)."""
     yaw, pitch, roll = angles(matrix[:3, :3])
     x, y, z = matrix[:3, 3].tolist()
-    return rounded([x, -y, z, math.degrees(roll), -math.degrees(yaw), -math.degrees(pitch)])
+    return [x, -y, z, math.degrees(roll), -math.degrees(yaw), -math.degrees(pitch)]
 
 
 def pose_matrix(pose: Sequence[float]) -> Array:
@@ -35,8 +33,3 @@ def pose_matrix(pose: Sequence[float]) -> Array:
     matrix[:3, :3] = rotation_matrix(-math.radians(yaw), -math.radians(pitch), math.radians(roll))
     matrix[:3, 3] = x, -y, z
     return matrix
-
-
-def rounded(values: Sequence[float]) -> list[float]:
-    """Return numbers with the decimals of a file, without negative zeros."""
-    return [round(value, DECIMALS) + 0.0 for value in values]

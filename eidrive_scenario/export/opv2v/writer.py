@@ -162,11 +162,13 @@ class Opv2vWriter:
         row = view.rows[name]
         (cloud,) = readings.lidars.values()
         pose = _base_pose(view, row)
-        entries: dict[bool, dict[int, ObjectEntry]] = {False: {}, True: {}}
+        vehicles: dict[int, ObjectEntry] = {}
+        pedestrians: dict[int, ObjectEntry] = {}
         for other in hit_actors:
             category = view.categories[view.rows[other]]
             if other != name and category != "misc":
-                entries[category == "pedestrian"][self._id(other)] = _entry(view, view.rows[other])
+                entries = pedestrians if category == "pedestrian" else vehicles
+                entries[self._id(other)] = _entry(view, view.rows[other])
         return StationFrame(
             opv2v_pose(cloud.pose),
             opv2v_pose(pose),
@@ -174,8 +176,8 @@ class Opv2vWriter:
             _speed(view, row),
             (view.size[row] / 2.0).tolist(),
             [_camera(camera, cloud.pose) for camera in readings.cameras.values()],
-            entries[False],
-            entries[True],
+            vehicles,
+            pedestrians,
         )
 
     def _write(self, number: int, name: str, readings: Readings, cloud: LidarReading, frame: StationFrame) -> None:
@@ -217,14 +219,10 @@ _NO_VEHICLES = frozenset({"misc", "pedestrian"})
 """Categories that are no vehicles."""
 
 
-def _rotation(view: WorldView, row: int) -> Array:
-    return rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
-
-
 def _center_pose(view: WorldView, row: int) -> Array:
     """Return the pose (4, 4) of the center of the box of an actor."""
     pose = np.eye(4)
-    pose[:3, :3] = _rotation(view, row)
+    pose[:3, :3] = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
     pose[:3, 3] = view.position[row] + pose[:3, :3] @ view.offset[row]
     return pose
 

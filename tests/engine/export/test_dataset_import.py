@@ -144,9 +144,9 @@ def imported(folder: Path, out: Path) -> tuple[Path, list[str]]:
 
 def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: Path) -> None:
     """Frame numbers begin at 68; vehicle 7 is recorded from 0.1 s to 0.3 s and drives 1 m in each tenth."""
-    for row in range(6):
-        seen = {"v7": vehicle(20.0 + row, -4.0, 180.0)} if 1 <= row <= 3 else {}
-        write_frame(tmp_path / "in", 214, 68 + 2 * row, frame(0.0, **seen))
+    for number in range(6):
+        seen = {"v7": vehicle(20.0 + number, -4.0, 180.0)} if 1 <= number <= 3 else {}
+        write_frame(tmp_path / "in", 214, 68 + 2 * number, frame(0.0, **seen))
     path, warnings = imported(tmp_path / "in", tmp_path / "out")
     assert path == tmp_path / "out" / "in.xosc"
     assert warnings == ["station 214 has the size 4.9 x 2.06 x 1.5 m: no file states it"]
@@ -288,8 +288,8 @@ def dair(folder: Path, frames: int = 6) -> Path:
     The world has its ground at 20 m. The roadside unit is at (110, 230) with a correction of (0.5, -0.25).
     """
     index, side, unit = [], [], []
-    for row in range(frames):
-        vehicle_id, unit_id = f"{100 + row:06d}", f"{300 + row:06d}"
+    for number in range(frames):
+        vehicle_id, unit_id = f"{100 + number:06d}", f"{300 + number:06d}"
         index.append(
             {
                 "vehicle_pointcloud_path": f"vehicle-side/velodyne/{vehicle_id}.pcd",
@@ -298,13 +298,13 @@ def dair(folder: Path, frames: int = 6) -> Path:
                 "system_error_offset": {"delta_x": 0.5, "delta_y": -0.25},
             }
         )
-        stamp = str(1_626_155_123_456_789 + 100_000 * row)
+        stamp = str(1_626_155_123_456_789 + 100_000 * number)
         side.append({"pointcloud_path": f"velodyne/{vehicle_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"})
         unit.append({"pointcloud_path": f"velodyne/{unit_id}.pcd", "pointcloud_timestamp": stamp, "batch_id": "12"})
         calibration = folder / "vehicle-side" / "calib"
         write_json(calibration / f"lidar_to_novatel/{vehicle_id}.json", {"transform": transform(0.0, 0.5, 0.0, 1.6)})
         write_json(
-            calibration / f"novatel_to_world/{vehicle_id}.json", transform(math.pi / 2, 100.0, 200.0 + row, 20.3)
+            calibration / f"novatel_to_world/{vehicle_id}.json", transform(math.pi / 2, 100.0, 200.0 + number, 20.3)
         )
         write_json(
             folder / f"infrastructure-side/calib/virtuallidar_to_world/{unit_id}.json",
@@ -312,8 +312,8 @@ def dair(folder: Path, frames: int = 6) -> Path:
         )
         boxes = np.array(
             [
-                [100.0, 200.2 + row, 20.8, 4.6, 1.9, 1.6, math.pi / 2],
-                [97.0, 240.0 - 0.8 * row, 20.75, 4.2, 1.8, 1.5, -math.pi / 2],
+                [100.0, 200.2 + number, 20.8, 4.6, 1.9, 1.6, math.pi / 2],
+                [97.0, 240.0 - 0.8 * number, 20.75, 4.2, 1.8, 1.5, -math.pi / 2],
                 [97.0, 250.0, 21.5, 9.0, 2.5, 3.0, -math.pi / 2],
             ]
         )
@@ -321,7 +321,7 @@ def dair(folder: Path, frames: int = 6) -> Path:
         corners = box_corners(boxes)[:, CORNERS_IN_CIRCLES]
         labels = [
             {"type": kind, "world_8_points": box.tolist()}
-            for kind, box in list(zip(kinds, corners, strict=True))[:: (-1) ** row]
+            for kind, box in list(zip(kinds, corners, strict=True))[:: (-1) ** number]
         ]
         write_json(folder / LABELS.format(vehicle_id), [*labels, {"type": "Trafficcone", "world_8_points": []}])
     write_json(folder / "cooperative/data_info.json", index)
@@ -339,10 +339,10 @@ def test_recording_of_dair_v2x_is_replayed_with_associated_labels(tmp_path: Path
     by_category = {views[0].categories[views[0].row(name)]: name for name in ("Vehicle1", "Vehicle2")}
     assert by_category.keys() == {"car", "truck"}
     for tick in range(0, 11, 2):
-        row = tick / 2
+        number = tick / 2
         view = views[tick]
-        assert center_of(view, "Station1") == pytest.approx((100.0, 200.2 + row, 0.8), abs=1e-6)
-        assert center_of(view, by_category["car"]) == pytest.approx((97.0, 240.0 - 0.8 * row, 0.75), abs=1e-6)
+        assert center_of(view, "Station1") == pytest.approx((100.0, 200.2 + number, 0.8), abs=1e-6)
+        assert center_of(view, by_category["car"]) == pytest.approx((97.0, 240.0 - 0.8 * number, 0.75), abs=1e-6)
         assert center_of(view, by_category["truck"]) == pytest.approx((97.0, 250.0, 1.5), abs=1e-6)
         assert view.yaw[view.row(by_category["car"])] == pytest.approx(-math.pi / 2)
         np.testing.assert_allclose(view.size[view.row("Station1")], (4.6, 1.9, 1.6), atol=1e-9)
