@@ -57,7 +57,8 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
         description=description,
     )
     locations = _add(root, "CatalogLocations")
-    _add(_add(locations, "MiscObjectCatalog"), "Directory", path=f"{LIBRARY_FOLDER}/{CATALOGS}")
+    if scene.roadside:
+        _add(_add(locations, "MiscObjectCatalog"), "Directory", path=f"{LIBRARY_FOLDER}/{CATALOGS}")
     _add(root, "RoadNetwork")
     entities = _add(root, "Entities")
     storyboard = _add(root, "Storyboard")

@@ -143,13 +143,20 @@ def imported(folder: Path, out: Path) -> tuple[Path, list[str]]:
 
 
 def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: Path) -> None:
-    """Frame numbers begin at 68; vehicle 7 is recorded from 0.1 s to 0.3 s and drives 1 m in each tenth."""
+    """Frame numbers begin at 68; vehicle 7 is recorded from 0.1 s to 0.3 s and drives 1 m in each tenth.
+
+    The folder is that of OPV2V, with its file of the simulation beside the stations.
+    """
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "data_protocol.yaml").write_text("world: &world {}\n")
     for number in range(6):
         seen = {"v7": vehicle(20.0 + number, -4.0, 180.0)} if 1 <= number <= 3 else {}
         write_frame(tmp_path / "in", 214, 68 + 2 * number, frame(0.0, **seen))
     path, warnings = imported(tmp_path / "in", tmp_path / "out")
     assert path == tmp_path / "out" / "in.xosc"
     assert warnings == ["station 214 has the size 4.9 x 2.06 x 1.5 m: no file states it"]
+    report = check_scenario(path)
+    assert (report.errors, report.warnings, [note.rule for note in report.notes]) == ((), (), [""])
     views = replay(path)
     for tick in range(0, 11, 2):
         assert ("Vehicle7" in views[tick].rows) is (2 <= tick <= 6)
