@@ -126,8 +126,10 @@ class Detector(ABC):
     def detect(self, readings: Readings) -> Detections:
         """Return the objects in these readings."""
 
-    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
-        """Return the share (N,) in [0, 1] of each box (N, 7) that these readings can show; `found` may occlude it.
+    def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
+        """Return the share (N,) in [0, 1] of each box (N, 7) that these readings can show.
+
+        The `detections` of these readings may occlude it.
 
         A tracker does not count objects out of view as missed. By default, all objects are in view.
         """

@@ -101,25 +101,25 @@ def with_pose_error(readings: Readings, error: PoseError) -> Readings:
     return at_pose(readings, replace(ego, position=position, yaw=wrap_angle(ego.yaw + math.radians(error.yaw))))
 
 
-def with_false_objects(found: Detections, objects: Sequence[FalseObject], *, with_velocity: bool) -> Detections:
+def with_false_objects(detections: Detections, objects: Sequence[FalseObject], *, with_velocity: bool) -> Detections:
     """Return the detections with the false objects that are reported at their time.
 
     with_velocity  whether the detector provides velocities
     """
-    numbers = [number for number, item in enumerate(objects) if item.is_reported(found.time)]
+    numbers = [number for number, item in enumerate(objects) if item.is_reported(detections.time)]
     if not numbers:
-        return found
+        return detections
     added = [objects[number] for number in numbers]
     scores = np.array([item.score for item in added])
     velocity: Array = np.array([item.velocity if with_velocity else (math.nan, math.nan) for item in added])
     covariance = np.array([np.eye(2) * item.deviation**2 for item in added])
     return Detections(
-        found.time,
-        np.concatenate([found.boxes, np.array([item.box(found.time) for item in added])]),
-        np.concatenate([found.scores, scores]),
-        (*found.classes, *(item.kind for item in added)),
-        np.concatenate([found.velocity, velocity]),
-        np.concatenate([found.covariance, covariance]),
-        (*found.tracks, *(FIRST_TRACK + number for number in numbers)) if found.tracks else (),
-        np.concatenate([found.existence, scores]) if len(found.existence) else NOT_ESTIMATED,
+        detections.time,
+        np.concatenate([detections.boxes, np.array([item.box(detections.time) for item in added])]),
+        np.concatenate([detections.scores, scores]),
+        (*detections.classes, *(item.kind for item in added)),
+        np.concatenate([detections.velocity, velocity]),
+        np.concatenate([detections.covariance, covariance]),
+        (*detections.tracks, *(FIRST_TRACK + number for number in numbers)) if detections.tracks else (),
+        np.concatenate([detections.existence, scores]) if len(detections.existence) else NOT_ESTIMATED,
     )

@@ -153,10 +153,10 @@ class Perception:
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
         """Return the signals in sight: those that the detector reads, and those of the signal sensor."""
-        found = self.detector.signals()
-        if not isinstance(found, Sequence):
-            raise InvalidResult(self.detector, "signals", f"returned {describe(found)} (expected SignalReadings)")
-        return (*found, *readings.signals)
+        signals = self.detector.signals()
+        if not isinstance(signals, Sequence):
+            raise InvalidResult(self.detector, "signals", f"returned {describe(signals)} (expected SignalReadings)")
+        return (*signals, *readings.signals)
 
     def perceive(self, readings: Readings) -> Detections | None:
         """Return the newest objects that become available now, or None if there is nothing new.
@@ -166,36 +166,38 @@ class Perception:
         """
         now = readings.time
         if _has_all(readings, self.detector.needs):
-            found = self.detector.detect(readings)
+            detections = self.detector.detect(readings)
             if self._checked:
-                check_detections(self.detector, "detect", found)
+                check_detections(self.detector, "detect", detections)
             if len(readings.attached):
-                found = without_rows(found, rows_on_bodies(found, outlines(readings.attached)))
+                detections = without_rows(detections, rows_on_bodies(detections, outlines(readings.attached)))
             if self._false_objects:
-                found = with_false_objects(found, self._false_objects, with_velocity=self.detector.provides_velocity)
+                detections = with_false_objects(
+                    detections, self._false_objects, with_velocity=self.detector.provides_velocity
+                )
             if self._latency <= 0.0 and not self._computing:
-                return self._track(found, readings)
-            self._computing.append((now + self._latency, found, readings))
+                return self._track(detections, readings)
+            self._computing.append((now + self._latency, detections, readings))
         newest = None
         while self._computing and self._computing[0][0] <= now + TIME_TOLERANCE:
-            _, found, past = self._computing.popleft()
-            newest = self._track(found, past)
+            _, detections, past = self._computing.popleft()
+            newest = self._track(detections, past)
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
             if newest is not None:
                 check_detections(self._tracker, "predict", newest)
         return newest
 
-    def _track(self, found: Detections, readings: Readings) -> Detections:
+    def _track(self, detections: Detections, readings: Readings) -> Detections:
         if self._tracker is None:
-            return found
+            return detections
 
         def in_view(boxes: Array) -> Array:
-            shares = self.detector.in_view(boxes, readings, found)
+            shares = self.detector.in_view(boxes, readings, detections)
             check_array(self.detector, "in_view", "shares", shares, (len(boxes),))
             return shares
 
-        tracked = self._tracker.update(found, in_view)
+        tracked = self._tracker.update(detections, in_view)
         check_detections(self._tracker, "update", tracked)
         return tracked
 

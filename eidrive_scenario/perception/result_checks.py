@@ -31,17 +31,17 @@ def is_checked(extension: object) -> bool:
     return not vars(type(extension)).get("is_finite_by_construction", False)
 
 
-def check_detections(extension: object, method: str, found: object) -> None:
-    """Raise InvalidResult unless `found` is a Detections of finite numbers in their ranges.
+def check_detections(extension: object, method: str, detections: object) -> None:
+    """Raise InvalidResult unless `detections` is a Detections of finite numbers in their ranges.
 
     Sizes are in [0, LARGEST_SIZE], scores and existence in [0, 1], variances at least 0, and no coordinate or speed
     exceeds LARGEST. Velocity and covariance may be NaN.
     """
-    if not isinstance(found, Detections):
-        raise InvalidResult(extension, method, f"returned {describe(found)} (expected Detections)")
-    _check_rows(extension, method, found)
+    if not isinstance(detections, Detections):
+        raise InvalidResult(extension, method, f"returned {describe(detections)} (expected Detections)")
+    _check_rows(extension, method, detections)
     try:
-        if math.isfinite(found.time) and (not len(found.boxes) or _is_in_range(found)):
+        if math.isfinite(detections.time) and (not len(detections.boxes) or _is_in_range(detections)):
             return
     except (TypeError, ValueError, AttributeError):
         pass
@@ -49,21 +49,21 @@ def check_detections(extension: object, method: str, found: object) -> None:
         extension,
         method,
         {
-            "time": found.time,
-            "boxes": found.boxes,
-            "scores": found.scores,
-            "existence": found.existence,
-            "velocity": _without_nan(found.velocity),
-            "covariance": _without_nan(found.covariance),
+            "time": detections.time,
+            "boxes": detections.boxes,
+            "scores": detections.scores,
+            "existence": detections.existence,
+            "velocity": _without_nan(detections.velocity),
+            "covariance": _without_nan(detections.covariance),
         },
     )
-    variances = found.covariance.reshape(-1, 4)[:, ::3]
-    raise_outside(extension, method, "boxes", found.boxes, -LARGEST, LARGEST)
-    raise_outside(extension, method, "a length, width or height", found.boxes[:, 3:6], 0.0, LARGEST_SIZE)
-    raise_outside(extension, method, "scores", found.scores, 0.0, 1.0, _ROUNDING)
-    raise_outside(extension, method, "existence", found.existence, 0.0, 1.0, _ROUNDING)
-    raise_outside(extension, method, "velocity", found.velocity, -LARGEST, LARGEST)
-    raise_outside(extension, method, "covariance", found.covariance, -(LARGEST**2), LARGEST**2)
+    variances = detections.covariance.reshape(-1, 4)[:, ::3]
+    raise_outside(extension, method, "boxes", detections.boxes, -LARGEST, LARGEST)
+    raise_outside(extension, method, "a length, width or height", detections.boxes[:, 3:6], 0.0, LARGEST_SIZE)
+    raise_outside(extension, method, "scores", detections.scores, 0.0, 1.0, _ROUNDING)
+    raise_outside(extension, method, "existence", detections.existence, 0.0, 1.0, _ROUNDING)
+    raise_outside(extension, method, "velocity", detections.velocity, -LARGEST, LARGEST)
+    raise_outside(extension, method, "covariance", detections.covariance, -(LARGEST**2), LARGEST**2)
     raise_outside(extension, method, "a variance", variances, 0.0, LARGEST**2)
 
 
@@ -80,8 +80,8 @@ def raise_not_finite(extension: object, method: str, fields: dict[str, object]) 
     """Raise InvalidResult that names the first field that is not numeric or not finite."""
     for name, value in fields.items():
         try:
-            found = np.asarray(value)
-            array = found.astype(float) if found.dtype.kind in _REAL else None
+            converted = np.asarray(value)
+            array = converted.astype(float) if converted.dtype.kind in _REAL else None
         except (TypeError, ValueError):
             array = None
         if array is None:
@@ -115,17 +115,17 @@ def describe(value: object) -> str:
     return "None" if value is None else f"an object of type {type(value).__name__}"
 
 
-def _is_in_range(found: Detections) -> bool:
+def _is_in_range(detections: Detections) -> bool:
     """Return whether all numbers of at least one object are certainly in range; each line is False for NaN."""
-    boxes, covariance = found.boxes, found.covariance
+    boxes, covariance = detections.boxes, detections.covariance
     sizes = boxes[:, 3:6]
     return bool(
         are_within(boxes, LARGEST)
         and sizes.min() >= 0.0
         and sizes.max() <= LARGEST_SIZE
-        and _are_probabilities(found.scores)
-        and (not found.existence.size or _are_probabilities(found.existence))
-        and not (np.abs(found.velocity) > LARGEST).any()
+        and _are_probabilities(detections.scores)
+        and (not detections.existence.size or _are_probabilities(detections.existence))
+        and not (np.abs(detections.velocity) > LARGEST).any()
         and not (np.abs(covariance) > LARGEST**2).any()
         and not (covariance.reshape(-1, 4)[:, ::3] < 0.0).any()
     )
@@ -135,17 +135,17 @@ def _are_probabilities(values: Array) -> bool:
     return bool(values.min() >= 0.0 and values.max() <= 1.0 + _ROUNDING)
 
 
-def _check_rows(extension: object, method: str, found: Detections) -> None:
+def _check_rows(extension: object, method: str, detections: Detections) -> None:
     """Raise InvalidResult unless arrays are numeric, classes are known, and track numbers are integers."""
     for name in ("boxes", "scores", "velocity", "covariance", "existence"):
-        array = getattr(found, name)
+        array = getattr(detections, name)
         if array.dtype.kind not in _REAL:
             raise InvalidResult(extension, method, f"returned {name} as {describe(array)} (expected numbers)")
-    for kind in found.classes:
+    for kind in detections.classes:
         if not isinstance(kind, str) or kind not in _CLASSES:
-            known = ", ".join(CLASSES)
-            raise InvalidResult(extension, method, f"returned the class {kind!r} (expected one of {known})")
-    for track in found.tracks:
+            classes = ", ".join(CLASSES)
+            raise InvalidResult(extension, method, f"returned the class {kind!r} (expected one of {classes})")
+    for track in detections.tracks:
         if not isinstance(track, int | np.integer):
             raise InvalidResult(extension, method, f"returned the track {track!r} (expected an integer)")
 

@@ -94,15 +94,15 @@ class SignalsAhead:
 
     def ahead(self, progress: float) -> Iterator[SignalAhead]:
         """Yield the signals whose stop lines are beyond `progress` [m] along the path, the nearest first."""
-        for place, line in self._on_path:
-            if place > progress:
+        for distance, line in self._on_path:
+            if distance > progress:
                 state = self._states.get(line.signal)
                 stop, is_yellow = state is not None, False
                 if stop and line.kind == "light":
                     colors = self._colors[line.signal]
                     stop = must_stop(state or "", colors)
                     is_yellow = stop and not shows_red(state or "", colors)
-                yield SignalAhead(line.signal, line.kind, place - progress, state, stop, is_yellow)
+                yield SignalAhead(line.signal, line.kind, distance - progress, state, stop, is_yellow)
 
 
 def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[StopLine]:

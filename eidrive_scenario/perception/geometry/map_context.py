@@ -63,8 +63,8 @@ class MapContext:
         if new.size:
             x = self._corner[0] + (new % self._mask.shape[1] + 0.5) * self._cell
             y = self._corner[1] + (new // self._mask.shape[1] + 0.5) * self._cell
-            found = self._roads.locate(x, y)
-            mask[new] = np.where((found.road >= 0) & (found.outside <= self.margin), ON, OFF)
+            located = self._roads.locate(x, y)
+            mask[new] = np.where((located.road >= 0) & (located.outside <= self.margin), ON, OFF)
         near[inside] = mask[cells[inside]] == ON
         return near
 
@@ -73,13 +73,13 @@ class MapContext:
         headings = np.full(len(plan), np.nan)
         if self._roads is None or not len(plan):
             return headings
-        found = self._roads.locate(plan[:, 0], plan[:, 1])
-        for row in np.flatnonzero((found.road >= 0) & (found.outside <= 0.0) & (found.lane != 0)).tolist():
-            road, lane = found.roads[int(found.road[row])], int(found.lane[row])
+        located = self._roads.locate(plan[:, 0], plan[:, 1])
+        for point in np.flatnonzero((located.road >= 0) & (located.outside <= 0.0) & (located.lane != 0)).tolist():
+            road, lane = located.roads[int(located.road[point])], int(located.lane[point])
             if self._roads.roads[road].junction_id is not None:
                 continue
             against = self._roads.driving_direction(road, lane) < 0
-            headings[row] = float(found.heading[row]) + (np.pi if against else 0.0)
+            headings[point] = float(located.heading[point]) + (np.pi if against else 0.0)
         return headings
 
     def facing(self, boxes: Array) -> Array:
@@ -93,8 +93,8 @@ class MapContext:
         height = np.full(len(plan), otherwise)
         if self._roads is None or self._level or not len(plan):
             return height
-        found = self._roads.locate(plan[:, 0], plan[:, 1])
-        for row in np.flatnonzero((found.road >= 0) & (found.outside <= 5.0)).tolist():
-            road = found.roads[int(found.road[row])]
-            height[row] = self._roads.road_pose_at(road, float(found.s[row]), float(found.t[row])).z
+        located = self._roads.locate(plan[:, 0], plan[:, 1])
+        for point in np.flatnonzero((located.road >= 0) & (located.outside <= 5.0)).tolist():
+            road = located.roads[int(located.road[point])]
+            height[point] = self._roads.road_pose_at(road, float(located.s[point]), float(located.t[point])).z
         return height

@@ -29,7 +29,7 @@ def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
 
     inverse = camera.pose[:3, :3].T
     in_camera = (points - camera.pose[:3, 3]) @ inverse.T
-    found = np.full((len(points), 2), np.nan)
+    positions = np.full((len(points), 2), np.nan)
     ahead = in_camera[:, 2] > NEAREST
     limit = _largest_radius(*camera.distortion.tolist())
     if limit < math.inf:
@@ -39,8 +39,8 @@ def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
         plane, _ = cv2.projectPoints(
             np.ascontiguousarray(in_camera[ahead]), np.zeros(3), np.zeros(3), camera.intrinsics, camera.distortion
         )
-        found[ahead] = plane[:, 0]
-    return found, in_camera[:, 2]
+        positions[ahead] = plane[:, 0]
+    return positions, in_camera[:, 2]
 
 
 @lru_cache(maxsize=64)
@@ -119,9 +119,9 @@ def in_lidar(boxes: Array, lidar: LidarReading, half_field: float, reach: float,
     if not len(boxes):
         return np.empty(0)
     points = points_of_boxes(boxes, POINTS)
-    place = LevelFrame.of(lidar.pose).to_local(points[..., :2])
-    bearing = np.abs(np.arctan2(place[..., 1], place[..., 0]))
-    visible = (bearing <= half_field) & (np.hypot(place[..., 0], place[..., 1]) <= reach)
+    local = LevelFrame.of(lidar.pose).to_local(points[..., :2])
+    bearing = np.abs(np.arctan2(local[..., 1], local[..., 0]))
+    visible = (bearing <= half_field) & (np.hypot(local[..., 0], local[..., 1]) <= reach)
     visible &= ~_hidden(lidar.pose[:3, 3], points, boxes, others)
     return np.asarray(visible.mean(axis=1))
 

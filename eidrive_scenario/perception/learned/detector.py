@@ -91,9 +91,9 @@ class ImageDetector(Detector):
                 batch = batches.setdefault(network.identity, [])
                 batch += [(detector, camera, image) for camera, image in of_station.cameras.items()]
         for identity, batch in batches.items():
-            found = networks[identity].find_in_all([image for _, _, image in batch])
-            for (detector, camera, _), one in zip(batch, found, strict=True):
-                detector._prepared = {**detector._prepared, camera: one}
+            detected = networks[identity].find_in_all([image for _, _, image in batch])
+            for (detector, camera, _), detections in zip(batch, detected, strict=True):
+                detector._prepared = {**detector._prepared, camera: detections}
 
     def detect(self, readings: Readings) -> Detections:
         """Return the road users in the images of all cameras with a reading."""
@@ -101,14 +101,14 @@ class ImageDetector(Detector):
         assert self._network is not None
         memory = image_memory.active()
         key = None if memory is None else self._key_of(self._network, readings)
-        found = None if memory is None or key is None else memory.stations.get(key)
-        if found is None:
-            found = self._process(self._network, readings)
+        result = None if memory is None or key is None else memory.stations.get(key)
+        if result is None:
+            result = self._process(self._network, readings)
             if memory is not None and key is not None:
-                objects = found.objects
+                objects = result.objects
                 image_memory.read_only(objects.boxes, objects.scores, objects.velocity, objects.covariance)
-                memory.stations.add(key, found)
-        self.image_detections, self._signals, objects = found
+                memory.stations.add(key, result)
+        self.image_detections, self._signals, objects = result
         return objects
 
     def _process(self, network: ImageNetwork, readings: Readings) -> StationDetections:
@@ -118,7 +118,7 @@ class ImageDetector(Detector):
             for camera, reading in readings.cameras.items()
         }
         signals = self._lights.read(images, readings.cameras)
-        parts = [self._lift_image(found, readings, camera) for camera, found in images.items()]
+        parts = [self._lift_image(detections, readings, camera) for camera, detections in images.items()]
         return StationDetections(images, signals, merge_duplicates(parts, readings.time))
 
     def _key_of(self, network: ImageNetwork, readings: Readings) -> Key | None:
@@ -128,7 +128,7 @@ class ImageDetector(Detector):
             return None
         digest = content_digest(
             images,
-            [(one.size, one.intrinsics, one.pose, one.distortion) for one in readings.cameras.values()],
+            [(camera.size, camera.intrinsics, camera.pose, camera.distortion) for camera in readings.cameras.values()],
             [(name, astuple(cloud)) for name, cloud in readings.lidars.items()],
             readings.time,
             float(readings.ego.position[2]),
@@ -136,30 +136,30 @@ class ImageDetector(Detector):
         )
         return type(self), network.identity, self._roads, digest
 
-    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+    def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the cameras can show."""
-        shares = [in_camera(boxes, reading, found.boxes) for reading in readings.cameras.values()]
+        shares = [in_camera(boxes, reading, detections.boxes) for reading in readings.cameras.values()]
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
     def signals(self) -> tuple[SignalReading, ...]:
         """Return the traffic lights and stop signs of the map that are in the last images."""
         return self._signals
 
-    def _lift_image(self, found: ImageDetections, readings: Readings, camera: str) -> Detections:
+    def _lift_image(self, detections: ImageDetections, readings: Readings, camera: str) -> Detections:
         """Return the objects of one image; of several lidars, the one with the best position estimate is used.
 
         Image boxes that no body fills are omitted.
         """
         clouds: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
-        categories = {row: object_category(name) for row, name in enumerate(found.classes)}
+        categories = {row: object_category(name) for row, name in enumerate(detections.classes)}
         used = {row: category for row, category in categories.items() if category is not None}
         rows = list(used)
         lifted = most_certain(
             [
                 lift(
-                    found.boxes[rows],
+                    detections.boxes[rows],
                     list(used.values()),
-                    found.scores[rows],
+                    detections.scores[rows],
                     readings.cameras[camera],
                     cloud,
                     time=readings.time,

@@ -107,11 +107,13 @@ class ExternalNetwork(ImageNetwork):
                 fits.append("detections")
         if len(fits) == 1:
             return fits[0]
-        found = ", ".join(str(shape) for shape in shapes)
+        shape_list = ", ".join(str(shape) for shape in shapes)
         if not fits:
-            message = f"weights {quoted(str(self._path))} return {found}, which fits no layout for {count} classes"
+            message = f"weights {quoted(str(self._path))} return {shape_list}, which fits no layout for {count} classes"
             raise SettingError(Diagnostic(message, f"check 'classes'; layouts: {LAYOUTS}"))
-        message = f"weights {quoted(str(self._path))} return {found}, which fits several layouts: {', '.join(fits)}"
+        message = (
+            f"weights {quoted(str(self._path))} return {shape_list}, which fits several layouts: {', '.join(fits)}"
+        )
         raise SettingError(Diagnostic(message, "set 'layout'"))
 
     def _candidates(self, outputs: list[Floats]) -> Candidates:

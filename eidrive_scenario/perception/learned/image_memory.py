@@ -37,23 +37,23 @@ class RecentResults(Generic[R]):
 
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
-        self._found: OrderedDict[Key, R] = OrderedDict()
+        self._results: OrderedDict[Key, R] = OrderedDict()
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._results)
 
     def get(self, key: Key) -> R | None:
         """Return a result; None if it is not stored."""
-        found = self._found.get(key)
-        if found is not None:
-            self._found.move_to_end(key)
-        return found
+        result = self._results.get(key)
+        if result is not None:
+            self._results.move_to_end(key)
+        return result
 
-    def add(self, key: Key, found: R) -> None:
+    def add(self, key: Key, result: R) -> None:
         """Store a result."""
-        self._found[key] = found
-        if len(self._found) > self._capacity:
-            self._found.popitem(last=False)
+        self._results[key] = result
+        if len(self._results) > self._capacity:
+            self._results.popitem(last=False)
 
 
 class ImageMemory:

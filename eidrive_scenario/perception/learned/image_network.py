@@ -44,8 +44,8 @@ def object_category(name: str) -> str | None:
     """Return the class out of eidrive_scenario.base.detections.CLASSES for a network class; None for other things."""
     if name in CLASSES:
         return name
-    known = _SAME_AS.get(name)
-    return known if known in CLASSES else None
+    category = _SAME_AS.get(name)
+    return category if category in CLASSES else None
 
 
 def light_state(name: str) -> str | None:
@@ -139,8 +139,8 @@ class ImageNetwork(ABC):
 
     def _find_all(self, images: Sequence[NDArray[np.uint8]]) -> list[ImageDetections]:
         scaled = [self._scaled(image) for image in images]
-        candidates = self.candidates_of([one.pixels for one in scaled])
-        return [self._detections(*one) for one in zip(images, scaled, candidates, strict=True)]
+        candidates = self.candidates_of([image.pixels for image in scaled])
+        return [self._detections(*parts) for parts in zip(images, scaled, candidates, strict=True)]
 
     def _scaled(self, image: NDArray[np.uint8]) -> _Scaled:
         if self.letterbox:

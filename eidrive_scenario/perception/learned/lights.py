@@ -42,15 +42,15 @@ def crops(image: NDArray[np.uint8], centers: Array, heights: Array) -> Floats:
 
     The maximum value of each region is 1. Pixels outside the image repeat its border.
     """
-    found = np.empty((len(centers), 3, CROP[1], CROP[0]), dtype=np.float32)
+    regions = np.empty((len(centers), 3, CROP[1], CROP[0]), dtype=np.float32)
     for row, ((x, y), height) in enumerate(zip(centers.tolist(), heights.tolist(), strict=True)):
         high = max(REGION_HEIGHT * height, 4.0)
         region = _region(image, x - high / 4.0, y - high / 2.0, x + high / 4.0, y + high / 2.0)
         shrinks = region.shape[0] >= CROP[1] and region.shape[1] >= CROP[0]
         scaled = cv2.resize(region, CROP, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
-        found[row] = scaled.transpose(2, 0, 1) / np.float32(255.0)
-    brightest = found.max(axis=(1, 2, 3), keepdims=True, initial=DARKEST)
-    return np.asarray(found / brightest, dtype=np.float32)
+        regions[row] = scaled.transpose(2, 0, 1) / np.float32(255.0)
+    brightest = regions.max(axis=(1, 2, 3), keepdims=True, initial=DARKEST)
+    return np.asarray(regions / brightest, dtype=np.float32)
 
 
 def _region(image: NDArray[np.uint8], left: float, top: float, right: float, bottom: float) -> NDArray[np.uint8]:
@@ -101,8 +101,8 @@ def _convolve(features: Floats, kernel: Floats, bias: Floats) -> Floats:
     """Return the 3 x 3 convolution of (N, I, H, W) with zero padding, followed by a ReLU."""
     padded = np.pad(features, ((0, 0), (0, 0), (1, 1), (1, 1)))
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), axis=(2, 3))
-    found = np.tensordot(windows, kernel, axes=((1, 4, 5), (1, 2, 3))) + bias
-    return np.ascontiguousarray(np.maximum(found, 0.0).transpose(0, 3, 1, 2), dtype=np.float32)
+    convolved = np.tensordot(windows, kernel, axes=((1, 4, 5), (1, 2, 3))) + bias
+    return np.ascontiguousarray(np.maximum(convolved, 0.0).transpose(0, 3, 1, 2), dtype=np.float32)
 
 
 def _max_pool(features: Floats) -> Floats:
@@ -155,23 +155,23 @@ class LightsOnMap:
         ).reshape(-1, len(SHOWN))
 
     def read(
-        self, found: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
+        self, detected: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
     ) -> tuple[SignalReading, ...]:
         """Return the visible signals of the map, each once with its most certain state, in the order of the map."""
         best: dict[int, tuple[float, str]] = {}
         for name, camera in cameras.items() if self._ids else ():
-            boxes = self._match(found[name], camera) if name in found else {}
+            boxes = self._match(detected[name], camera) if name in detected else {}
             for row, (score, state) in (boxes | self._lamp_states(camera, boxes)).items():
                 if row not in best or score > best[row][0]:
                     best[row] = (score, state)
         return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
 
     def by_class(
-        self, found: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
+        self, detected: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
     ) -> tuple[SignalReading, ...]:
         """Return the same from the classes of the boxes alone."""
         best: dict[int, tuple[float, str]] = {}
-        for name, detections in found.items() if self._ids else ():
+        for name, detections in detected.items() if self._ids else ():
             for row, candidate in self._match(detections, cameras[name]).items():
                 best[row] = max(best.get(row, candidate), candidate)
         return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
@@ -214,11 +214,11 @@ class LightsOnMap:
                 states[view.row] = (float(likely[index]), SHOWN[index])
         return states
 
-    def _match(self, found: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
+    def _match(self, detections: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
         """Return score and state of the box with the highest score for each signal, by its row."""
         places, _ = pixels(self._feet + self._heights[:, None] * (0.0, 0.0, 0.5), camera)
         matches: dict[int, tuple[float, str]] = {}
-        for box, score, name in zip(found.boxes, found.scores.tolist(), found.classes, strict=True):
+        for box, score, name in zip(detections.boxes, detections.scores.tolist(), detections.classes, strict=True):
             state = STOP if name == STOP_SIGN else light_state(name)
             if state is None:
                 continue

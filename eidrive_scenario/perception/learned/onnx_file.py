@@ -113,9 +113,9 @@ def _integer(number: int, value: int) -> bytes:
 
 def _varint(value: int) -> bytes:
     """Return a number of at least 0, seven bits per byte, the lowest first."""
-    found = bytearray()
+    encoded = bytearray()
     while value > 0x7F:
-        found.append(value & 0x7F | 0x80)
+        encoded.append(value & 0x7F | 0x80)
         value >>= 7
-    found.append(value)
-    return bytes(found)
+    encoded.append(value)
+    return bytes(encoded)

@@ -149,14 +149,14 @@ class OwnNetwork(ImageNetwork):
         if memory is None:
             return self._find_all([reading.rgb for reading in readings])
         keys = [self._key_of(reading) for reading in readings]
-        found = [memory.images.get(key) for key in keys]
-        missing = [row for row, known in enumerate(found) if known is None]
-        fresh = self._find_all([readings[row].rgb for row in missing])
-        for row, one in zip(missing, fresh, strict=True):
-            image_memory.read_only(one.boxes, one.scores)
-            memory.images.add(keys[row], one)
-            found[row] = one
-        return [one for one in found if one is not None]
+        results = [memory.images.get(key) for key in keys]
+        missing = [index for index, result in enumerate(results) if result is None]
+        fresh = self._find_all([readings[index].rgb for index in missing])
+        for index, detections in zip(missing, fresh, strict=True):
+            image_memory.read_only(detections.boxes, detections.scores)
+            memory.images.add(keys[index], detections)
+            results[index] = detections
+        return [detections for detections in results if detections is not None]
 
     def _key_of(self, reading: CameraReading) -> image_memory.Key:
         digest = reading.image_digest
@@ -169,12 +169,12 @@ class OwnNetwork(ImageNetwork):
         if memory is None:
             return super().find(image)
         key = image_memory.key_of(self.identity, image)
-        found = memory.images.get(key)
-        if found is None:
-            found = super().find(image)
-            image_memory.read_only(found.boxes, found.scores)
-            memory.images.add(key, found)
-        return found
+        detections = memory.images.get(key)
+        if detections is None:
+            detections = super().find(image)
+            image_memory.read_only(detections.boxes, detections.scores)
+            memory.images.add(key, detections)
+        return detections
 
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         return self._candidates(self._infer([image])[0])

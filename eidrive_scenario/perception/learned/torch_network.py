@@ -108,7 +108,7 @@ class TorchNetwork:
             batch[: len(part)] = part
             with torch.inference_mode():
                 pixels = torch.from_numpy(batch).to(self._device).permute(0, 3, 1, 2)
-                found = self._network.raw_outputs(pixels.to(torch.float32).div_(255.0))
-                together = [output.cpu().numpy() for output in found]
+                raw = self._network.raw_outputs(pixels.to(torch.float32).div_(255.0))
+                together = [output.cpu().numpy() for output in raw]
             outputs += [[output[row : row + 1] for output in together] for row in range(len(part))]
         return outputs

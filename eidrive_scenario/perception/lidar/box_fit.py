@@ -283,9 +283,9 @@ def _complete_box(hypothesis: _Hypothesis, shapeless: bool) -> tuple[list[float]
     prior = prior_of(hypothesis.name)
     order = (0, 1) if hypothesis.lengthwise == 0 else (1, 0)
     sizes, middles, variances = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
-    for place, axis in enumerate(order):
-        sizes[place], middles[axis], variances[axis] = complete_span(
-            hypothesis.spans[axis], prior.mean[place], prior.deviation[place]
+    for dimension, axis in enumerate(order):
+        sizes[dimension], middles[axis], variances[axis] = complete_span(
+            hypothesis.spans[axis], prior.mean[dimension], prior.deviation[dimension]
         )
     if shapeless:
         swing = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
@@ -388,10 +388,10 @@ def _ends_of(
         return (flags[1], flags[0]) if leads_left else flags
     bearing = _bearings(plan)
     at_low = at_high = False
-    for is_hidden, row in zip(flags, (int(np.argmax(bearing)), int(np.argmin(bearing))), strict=True):
+    for is_hidden, outermost in zip(flags, (int(np.argmax(bearing)), int(np.argmin(bearing))), strict=True):
         if is_hidden:
-            place = axis[0] * float(plan[row, 0]) + axis[1] * float(plan[row, 1])
-            if place - low < high - place:
+            coordinate = axis[0] * float(plan[outermost, 0]) + axis[1] * float(plan[outermost, 1])
+            if coordinate - low < high - coordinate:
                 at_low = True
             else:
                 at_high = True
@@ -400,9 +400,9 @@ def _ends_of(
 
 def _highest(points: Array, sensor_height: float, top: float, ground: float, pattern: Pattern) -> float:
     """Return the maximum height of the object above the ground, from the next ring above its highest point [m]."""
-    row = int(np.argmax(points[:, 2]))
-    reach = math.hypot(float(points[row, 0]), float(points[row, 1]))
-    elevation = math.atan2(float(points[row, 2]) - sensor_height, max(reach, 1e-6))
+    x, y, z = points[int(np.argmax(points[:, 2]))].tolist()
+    reach = math.hypot(x, y)
+    elevation = math.atan2(z - sensor_height, max(reach, 1e-6))
     if elevation > pattern.highest - 0.5 * pattern.elevation:
         return math.inf
     return max(sensor_height - ground + reach * math.tan(elevation + pattern.elevation), top)
@@ -411,7 +411,7 @@ def _highest(points: Array, sensor_height: float, top: float, ground: float, pat
 def _cost(prior: SizePrior, spans: tuple[Span, Span], lengthwise: int, top: float, highest: float) -> float:
     """Return squared deviations from a class, in standard deviations, minus twice the log of its share in traffic."""
     cost = -2.0 * math.log(prior.share)
-    for place, axis in enumerate((lengthwise, 1 - lengthwise)):
-        cost += size_cost(spans[axis], prior.mean[place], prior.deviation[place])
+    for dimension, axis in enumerate((lengthwise, 1 - lengthwise)):
+        cost += size_cost(spans[axis], prior.mean[dimension], prior.deviation[dimension])
     mean, deviation = prior.mean[2], prior.deviation[2]
     return cost + ((mean - min(max(mean, top), highest)) / deviation) ** 2

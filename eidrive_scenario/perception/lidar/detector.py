@@ -59,31 +59,36 @@ class LidarDetector(Detector):
         """Return the road users in the point clouds of all lidars of the station."""
         foot = float(readings.ego.position[2])
         restricted = self.settings.off_road is not None and self._map_context.has_map
-        found: list[tuple[FittedObject, LevelFrame]] = []
+        candidates: list[tuple[FittedObject, LevelFrame]] = []
         for name, cloud in self._lidars.revolutions(readings).items():
             pattern = self._lidars.pattern(name, readings.lidars[name])
             scan = Scan(cloud, pattern, foot, self._map_context.near_road if restricted else None)
-            found += [(one, scan.frame) for one in objects(scan, self._map_context, self.settings.min_points)]
-        found = [(one, frame) for one, frame in found if _score(one) >= self.settings.min_score]
-        if not found:
+            candidates += [
+                (candidate, scan.frame)
+                for candidate in objects(scan, self._map_context, self.settings.min_points)
+                if _score(candidate) >= self.settings.min_score
+            ]
+        if not candidates:
             return Detections(readings.time)
-        boxes = np.concatenate([frame.boxes_to_world(np.array([one.fit.box])) for one, frame in found])
+        boxes = np.concatenate([frame.boxes_to_world(np.array([candidate.fit.box])) for candidate, frame in candidates])
         boxes[:, 6] = self._map_context.facing(boxes)
         detections = Detections(
             readings.time,
             boxes,
-            np.array([_score(one) for one, _ in found]),
-            tuple(one.fit.name for one, _ in found),
-            np.full((len(found), 2), np.nan),
-            np.concatenate([frame.covariance_to_world(one.fit.covariance[None]) for one, frame in found]),
+            np.array([_score(candidate) for candidate, _ in candidates]),
+            tuple(candidate.fit.name for candidate, _ in candidates),
+            np.full((len(candidates), 2), np.nan),
+            np.concatenate(
+                [frame.covariance_to_world(candidate.fit.covariance[None]) for candidate, frame in candidates]
+            ),
         )
         return detections if len(readings.lidars) < 2 else without_duplicates(detections)
 
-    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+    def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show."""
-        return self._lidars.in_view(boxes, readings, found)
+        return self._lidars.in_view(boxes, readings, detections)
 
 
-def _score(found: FittedObject) -> float:
+def _score(candidate: FittedObject) -> float:
     """Return the score: one half for five points that fit a class well; less for unusual sizes."""
-    return len(found.rows) / (len(found.rows) + HALF_SURE) * math.exp(-found.fit.deviation / UNLIKELY)
+    return len(candidate.rows) / (len(candidate.rows) + HALF_SURE) * math.exp(-candidate.fit.deviation / UNLIKELY)

@@ -46,18 +46,22 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
 
     A cluster that fits no class is split at its gaps. Clusters with overlapping boxes are merged if one box fits both.
     """
-    found = _fit_clusters(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
-    merged = [one for one in found if one.fit.deviation <= POOR_FIT]
-    for poor in (one for one in found if one.fit.deviation > POOR_FIT):
+    candidates = _fit_clusters(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
+    separate = [candidate for candidate in candidates if candidate.fit.deviation <= POOR_FIT]
+    for poor in (candidate for candidate in candidates if candidate.fit.deviation > POOR_FIT):
         parts = clusters(scan.points[poor.rows], scan.pattern.azimuth, grazing=False)
         part_rows = [poor.rows[part] for part in parts]
         good = [
-            one
-            for one in (_fit_clusters(scan, surroundings, part_rows, min_points) if len(parts) > 1 else [])
-            if one.fit.deviation <= POOR_FIT
+            candidate
+            for candidate in (_fit_clusters(scan, surroundings, part_rows, min_points) if len(parts) > 1 else [])
+            if candidate.fit.deviation <= POOR_FIT
         ]
-        merged += good or _split_dense(scan, poor) or [poor]
-    return [one for one in _merge_parts(scan, merged) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
+        separate += good or _split_dense(scan, poor) or [poor]
+    return [
+        candidate
+        for candidate in _merge_parts(scan, separate)
+        if candidate.fit.deviation <= UNLIKELY and candidate.fit.name != "pole"
+    ]
 
 
 def _split_dense(scan: Scan, poor: FittedObject) -> list[FittedObject]:
@@ -73,9 +77,9 @@ def _split_dense(scan: Scan, poor: FittedObject) -> list[FittedObject]:
         step /= 2.0
         parts = [poor.rows[part] for part in clusters(scan.points[poor.rows], step, grazing=False)]
         fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= FEW]
-        found = [FittedObject(part, fit) for part, fit in fits if fit is not None and fit.deviation <= POOR_FIT]
-        if len(found) > 1 and sum(len(one.rows) for one in found) >= COVERED * len(poor.rows):
-            return found
+        candidates = [FittedObject(part, fit) for part, fit in fits if fit is not None and fit.deviation <= POOR_FIT]
+        if len(candidates) > 1 and sum(len(candidate.rows) for candidate in candidates) >= COVERED * len(poor.rows):
+            return candidates
     return []
 
 
@@ -86,41 +90,41 @@ def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], 
     if few and surroundings.has_map:
         centers = np.array([scan.points[groups[number], :2].mean(axis=0) for number in few])
         headings[few] = surroundings.lane_heading(scan.frame.to_world(centers)) - scan.frame.yaw
-    found = []
+    candidates = []
     for rows, heading in zip(groups, headings.tolist(), strict=True):
         fit = scan.fit(rows, tuple(PRIORS), heading if math.isfinite(heading) else None)
         if fit is not None:
-            found.append(FittedObject(rows, fit))
+            candidates.append(FittedObject(rows, fit))
         elif len(rows) > min_points:
             # A cluster that is larger than any road user: its parts at a finer distance.
             parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
             fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
-            found += [FittedObject(part, fit) for part, fit in fits if fit is not None]
-    return found
+            candidates += [FittedObject(part, fit) for part, fit in fits if fit is not None]
+    return candidates
 
 
-def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
+def _merge_parts(scan: Scan, candidates: list[FittedObject]) -> list[FittedObject]:
     """Return the objects, with overlapping boxes merged if one box fits the points of both.
 
     Two bodies cannot overlap, and hardly ever touch. Such boxes are parts of one object that something nearer divides,
     or that the rays graze so that its points are far apart. The same applies to boxes near each other whose points are
     one cluster.
     """
-    merged = list(found)
+    merged = list(candidates)
     again = True
     while again:
         again = False
-        for one, other in combinations(merged, 2):
-            if not overlap(_enlarge(one.fit.box, NEAR), other.fit.box):
+        for first, second in combinations(merged, 2):
+            if not overlap(_enlarge(first.fit.box, NEAR), second.fit.box):
                 continue
-            rows = np.concatenate([one.rows, other.rows])
+            rows = np.concatenate([first.rows, second.rows])
             if (
-                overlap(_enlarge(one.fit.box, TOUCHING), other.fit.box)
+                overlap(_enlarge(first.fit.box, TOUCHING), second.fit.box)
                 or len(clusters(scan.points[rows], scan.pattern.azimuth)) == 1
             ):
                 fit = scan.fit(rows, tuple(PRIORS))
                 if fit is not None and fit.deviation <= POOR_FIT:
-                    merged = [kept for kept in merged if kept is not one and kept is not other]
+                    merged = [kept for kept in merged if kept is not first and kept is not second]
                     merged.append(FittedObject(rows, fit))
                     again = True
                     break

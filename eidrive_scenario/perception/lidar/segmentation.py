@@ -82,20 +82,20 @@ def _follow_ground(offset: Array, where: Array, sector: Integers, distance: Arra
     for number in range(sectors):
         # Outward along the sector: a point is ground if it is hardly higher or lower than the last one that is.
         last = at = 0.0
-        for place in range(bins):
-            rise, reach = offset[number, place], where[number, place]
+        for index in range(bins):
+            rise, reach = offset[number, index], where[number, index]
             if abs(rise - last) <= BEND * (reach - at) + ROUGHNESS:
                 last, at = rise, reach
                 offset[number, knots[number]], where[number, knots[number]] = rise, reach
                 knots[number] += 1
-    for row, number in enumerate(sector):
-        x, x0, y0, knot = distance[row], 0.0, 0.0, 0
+    for point, number in enumerate(sector):
+        x, x0, y0, knot = distance[point], 0.0, 0.0, 0
         while knot < knots[number] and where[number, knot] <= x:
             x0, y0 = where[number, knot], offset[number, knot]
             knot += 1
         if knot < knots[number]:
             y0 += (offset[number, knot] - y0) / (where[number, knot] - x0) * (x - x0)
-        plane[row] += y0
+        plane[point] += y0
 
 
 def _plane(plan: Array, rise: Array) -> Array:

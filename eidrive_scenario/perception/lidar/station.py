@@ -38,10 +38,10 @@ class StationLidars:
             for name, reading in readings.lidars.items()
         }
 
-    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+    def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show."""
         shares = [
-            in_lidar(boxes, reading, *self._reach.get(name, (math.pi, math.inf)), found.boxes)
+            in_lidar(boxes, reading, *self._reach.get(name, (math.pi, math.inf)), detections.boxes)
             for name, reading in readings.lidars.items()
         ]
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))

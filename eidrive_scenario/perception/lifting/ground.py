@@ -52,9 +52,9 @@ def edges_behind_others(boxes: Array) -> Bools:
     hidden = np.zeros((len(boxes), 4), dtype=bool)
     for edge in range(4):
         axis = edge % 2
-        place = boxes[:, edge][:, None]
-        within = (place > low[None, :, axis] - margin[:, None, axis]) & (
-            place < high[None, :, axis] + margin[:, None, axis]
+        position = boxes[:, edge][:, None]
+        within = (position > low[None, :, axis] - margin[:, None, axis]) & (
+            position < high[None, :, axis] + margin[:, None, axis]
         )
         hidden[:, edge] = (nearer & within & beside[:, :, 1 - axis]).any(axis=1)
     return hidden
@@ -147,34 +147,34 @@ def lift_by_ground(
         return ByGround(np.empty((0, 7)), np.empty((0, 2, 2)), empty, empty, np.empty(0))
     possible = [possible_classes(name) for name in classes]
     owner = np.repeat(np.arange(len(boxes)), [len(names) for names in possible])
-    is_other = np.array([place > 0 for names in possible for place in range(len(names))])
+    is_other = np.array([rank > 0 for names in possible for rank in range(len(names))])
     view = _View(np.asarray(boxes, dtype=float)[owner], [name for names in possible for name in names], camera)
     heights = surroundings.ground(view.positions_by_height(), ground)
     for _ in range(LOOKS):
-        found = view.place(heights, surroundings)
-        new_heights = surroundings.ground(found.boxes[:, :2], ground)
+        lifted = view.lift(heights, surroundings)
+        new_heights = surroundings.ground(lifted.boxes[:, :2], ground)
         if np.all(np.abs(new_heights - heights) <= LEVEL):
             break
         heights = new_heights
-    return _likeliest(found, owner, is_other)
+    return _likeliest(lifted, owner, is_other)
 
 
-def _likeliest(found: ByGround, owner: Integers, is_other: Bools) -> ByGround:
+def _likeliest(lifted: ByGround, owner: Integers, is_other: Bools) -> ByGround:
     """Return the class with the minimum error for each image box.
 
     owner     (N,) index of the image box of each row, in ascending order
     is_other  (N,) whether the class is another one than that of the detector
     """
-    cost = found.of_named + np.where(is_other, OTHER_CLASS, 0.0)
+    cost = lifted.of_named + np.where(is_other, OTHER_CLASS, 0.0)
     order = np.lexsort((cost, owner))
     best = order[np.flatnonzero(np.diff(owner[order], prepend=-1))]
     weight = np.exp(-0.5 * (cost - cost[best][owner]))
     weight /= np.bincount(owner, weight)[owner]
-    offset = found.boxes[:, :2] - found.boxes[best][owner, :2]
-    covariance = found.covariance[best].copy()
+    offset = lifted.boxes[:, :2] - lifted.boxes[best][owner, :2]
+    covariance = lifted.covariance[best].copy()
     np.add.at(covariance, owner, weight[:, None, None] * offset[:, :, None] * offset[:, None, :])
-    of_named = found.of_named[~is_other]
-    return ByGround(found.boxes[best], covariance, found.headings[best], found.costs[best], of_named)
+    of_named = lifted.of_named[~is_other]
+    return ByGround(lifted.boxes[best], covariance, lifted.headings[best], lifted.costs[best], of_named)
 
 
 class _View:
@@ -187,8 +187,8 @@ class _View:
         self._sizes = np.array([prior.mean for prior in priors])
         self._deviations = np.array([prior.deviation for prior in priors])
         hulls = [_HULLS.get(name, _BOX) for name in classes]
-        self._known = edges_in_image(boxes, camera)
-        if not self._known[:, [0, 2]].all():
+        self._visible_edges = edges_in_image(boxes, camera)
+        if not self._visible_edges[:, [0, 2]].all():
             # A truncated body has its own outline: points between the two ends of each hull are added.
             shares, mirrored = (0.0, 0.125, 0.25, 0.375, 0.5), np.array([-1.0, 1.0, 1.0])
             hulls = [np.concatenate([hull + share * (hull * mirrored - hull) for share in shares]) for hull in hulls]
@@ -196,15 +196,15 @@ class _View:
         self._hulls = np.array([np.resize(hull, (most, 3)) for hull in hulls])
         focal = float(camera.intrinsics[0, 0])
         self._blur = (EDGE_DEVIATION + EDGE_SHARE * largest_sides(boxes)) / focal
-        self._cut = ~(self._known[:, 0] & self._known[:, 2])
+        self._cut = ~(self._visible_edges[:, 0] & self._visible_edges[:, 2])
         """Whether the left or right border of the image cuts the object."""
         self._borders = np.where(self._cut[:, None], self._edges[:, [0, 2]], (-np.inf, np.inf))
-        self._borders[self._known[:, 0], 0] = -np.inf
-        self._borders[self._known[:, 2], 1] = np.inf
-        self._known &= ~edges_behind_others(boxes)
+        self._borders[self._visible_edges[:, 0], 0] = -np.inf
+        self._borders[self._visible_edges[:, 2], 1] = np.inf
+        self._visible_edges &= ~edges_behind_others(boxes)
         self._lowest = np.where(self._cut, CUT_DEVIATION, 0.0)
 
-    def place(self, ground: Array, surroundings: MapContext) -> ByGround:
+    def lift(self, ground: Array, surroundings: MapContext) -> ByGround:
         """Return the boxes in the world for ground heights (N,)."""
         count = len(self._sizes)
         start = self._first_guess(ground)
@@ -214,21 +214,21 @@ class _View:
         step = np.pi / HEADINGS * np.arange(HEADINGS)
         headings = base[:, None] + step
         deviation = np.minimum(step, np.pi - step) / LANE_DEVIATION
-        places, errors, informations = self._fit(start, headings, ground)
+        positions, errors, informations = self._fit(start, headings, ground)
         costs = errors + np.where(on_lane[:, None], deviation**2, 0.0)
         best = np.argmin(costs, axis=1)
         rows = np.arange(count)
         weights = np.exp(-0.5 * (costs - costs[rows, best][:, None]))
         weights /= weights.sum(axis=1, keepdims=True)
-        place, information = places[rows, best], informations[rows, best]
+        position, information = positions[rows, best], informations[rows, best]
         # The image of a distant body hardly depends on its heading, so that the best one would be random.
         indistinct = on_lane & (costs[:, 0] <= costs[rows, best] + INDISTINCT)
         heading = headings[rows, np.where(indistinct, 0, best)]
-        offsets = places - place[:, None]
+        offsets = positions - position[:, None]
         heading_spread = np.einsum("nk,nki,nkj->nij", weights, offsets, offsets)
-        along = np.where(on_lane, base, np.arctan2(place[:, 1], place[:, 0]))
+        along = np.where(on_lane, base, np.arctan2(position[:, 1], position[:, 0]))
         heading = np.where(np.cos(heading - along) < -1e-9, heading + np.pi, heading)
-        boxes = np.column_stack([place, ground + self._sizes[:, 2] / 2.0, self._sizes, wrap_angle(heading)])
+        boxes = np.column_stack([position, ground + self._sizes[:, 2] / 2.0, self._sizes, wrap_angle(heading)])
         scale = np.maximum(errors[rows, best] / DEGREES_OF_FREEDOM, 1.0)
         covariance = self._covariance(information, heading, scale) + heading_spread
         return ByGround(
@@ -252,7 +252,7 @@ class _View:
         fall = np.maximum(-rays[:, 2], 1e-9)
         by_ground = (self._frame.height - ground) / fall * np.hypot(rays[:, 0], rays[:, 1])
         by_height = self._sizes[:, 2] / np.maximum(bottom - top, 1e-6)
-        usable = self._known[:, 3] & (-rays[:, 2] > 0.02) & (by_ground > 0.0)
+        usable = self._visible_edges[:, 3] & (-rays[:, 2] > 0.02) & (by_ground > 0.0)
         distance = np.clip(np.where(usable, by_ground, by_height), 1.0, FARTHEST)
         depth = self._sizes[:, :2].min(axis=1) / 2.0
         bearing = np.arctan2(rays[:, 1], rays[:, 0])
@@ -262,32 +262,32 @@ class _View:
     def _fit(self, start: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
         """Return the best position (N, K, 2) for each heading (N, K), its squared error and information matrix."""
         count, tried = headings.shape
-        place = np.repeat(start[:, None], tried, axis=1)
+        position = np.repeat(start[:, None], tried, axis=1)
         damping = np.full((count, tried), 1e-3)
-        error, gradient, information = self._linearize(place, headings, ground)
+        error, gradient, information = self._linearize(position, headings, ground)
         for _ in range(ROUNDS):
             # Levenberg-Marquardt: the damping scales with the diagonal, which has a positive lower bound.
             scaled = information + damping[..., None, None] * np.maximum(information, 1e-9) * np.eye(2)
             step = np.linalg.solve(scaled, gradient[..., None])[..., 0]
-            longest = 0.3 * np.linalg.norm(place, axis=-1) + 0.5
+            longest = 0.3 * np.linalg.norm(position, axis=-1) + 0.5
             length = np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
-            moved = place + step * np.minimum(1.0, longest / length)[..., None]
+            moved = position + step * np.minimum(1.0, longest / length)[..., None]
             new_error, new_gradient, new_information = self._linearize(moved, headings, ground)
             better = new_error < error
-            place = np.where(better[..., None], moved, place)
+            position = np.where(better[..., None], moved, position)
             error = np.where(better, new_error, error)
             gradient = np.where(better[..., None], new_gradient, gradient)
             information = np.where(better[..., None, None], new_information, information)
             damping = np.clip(np.where(better, damping * 0.2, damping * 8.0), 1e-9, 1e6)
-        return place, error, information
+        return position, error, information
 
-    def _linearize(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
+    def _linearize(self, position: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
         """Return squared error, its negative half gradient and its Gauss-Newton matrix at positions (N, K, 2)."""
         nudge = 0.01
-        tried = place + nudge * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[:, None, None]
+        tried = position + nudge * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[:, None, None]
         edges, depth = self._project(tried, headings, ground)
         off = self._edges[:, None] - edges[0]
-        beyond = ~self._known[:, None] & (off * _OUTWARDS < 0.0)
+        beyond = ~self._visible_edges[:, None] & (off * _OUTWARDS < 0.0)
         weight = np.where(beyond, 0.0, self._weights(depth[0]))
         residual = off * weight
         slope = (edges[1:] - edges[0]) / nudge * weight
@@ -295,13 +295,15 @@ class _View:
         information = np.einsum("anke,bnke->nkab", slope, slope)
         return np.einsum("nke,nke->nk", residual, residual), gradient, information
 
-    def _project(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
+    def _project(self, positions: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
         """Return edges (3, N, K, 4) of the projections, and depths (3, N, K) of the centers."""
         corners = self._hulls * self._sizes[:, None]
         corners[..., 2] = corners[..., 2] + ground[:, None] - self._frame.height
-        edges, depth = np.empty((*place.shape[:3], 4)), np.empty(place.shape[:3])
+        edges, depth = np.empty((*positions.shape[:3], 4)), np.empty(positions.shape[:3])
         turn, borders = np.ascontiguousarray(self._turn), np.ascontiguousarray(self._borders)
-        _find_edges(corners, np.cos(headings), np.sin(headings), place, turn, NEAREST, self._cut, borders, edges, depth)
+        _find_edges(
+            corners, np.cos(headings), np.sin(headings), positions, turn, NEAREST, self._cut, borders, edges, depth
+        )
         return edges, depth
 
     def _weights(self, depth: Array) -> Array:
@@ -330,42 +332,43 @@ class _View:
     "f8[:,:,::1])"
 )
 def _find_edges(
-    corners: Array, cos: Array, sin: Array, place: Array, turn: Array, nearest: float, cut: Bools, borders: Array,
+    corners: Array, cos: Array, sin: Array, positions: Array, turn: Array, nearest: float, cut: Bools, borders: Array,
     edges: Array, depth: Array,
 ) -> None:  # fmt: skip
-    """Find left, top, right, bottom of the projections of hulls (N, P, 3) at places (T, N, K, 2) and headings (N, K).
+    """Find left, top, right, bottom of the projections of hulls (N, P, 3).
 
+    positions     (T, N, K, 2) of the hulls at headings (N, K)
     cut, borders  (N,) and (N, 2) whether and where the left and right border of the image cut an object: parts outside
                   show neither top nor bottom, if others are within the image
     depth         (T, N, K) mean of the points, of which P is a multiple of eight
     """
-    trials, count, headings, _ = place.shape
+    trials, count, headings, _ = positions.shape
     partial = np.empty(8)
     for trial in range(trials):
-        for row in range(count):
+        for hull in range(count):
             for heading in range(headings):
-                px, py = place[trial, row, heading, 0], place[trial, row, heading, 1]
-                c, s = cos[row, heading], sin[row, heading]
+                px, py = positions[trial, hull, heading, 0], positions[trial, hull, heading, 1]
+                c, s = cos[hull, heading], sin[hull, heading]
                 left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
                 visible_top, visible_bottom = np.inf, -np.inf
                 partial[:] = 0.0
                 for point in range(corners.shape[1]):
-                    x = c * corners[row, point, 0] - s * corners[row, point, 1] + px
-                    y = s * corners[row, point, 0] + c * corners[row, point, 1] + py
-                    z = corners[row, point, 2]
+                    x = c * corners[hull, point, 0] - s * corners[hull, point, 1] + px
+                    y = s * corners[hull, point, 0] + c * corners[hull, point, 1] + py
+                    z = corners[hull, point, 2]
                     ahead = max(turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z, nearest)
                     u = (turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z) / ahead
                     v = (turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z) / ahead
                     left, top, right, bottom = min(left, u), min(top, v), max(right, u), max(bottom, v)
-                    if cut[row] and borders[row, 0] <= u <= borders[row, 1]:
+                    if cut[hull] and borders[hull, 0] <= u <= borders[hull, 1]:
                         visible_top, visible_bottom = min(visible_top, v), max(visible_bottom, v)
                     partial[point % 8] += ahead
                 if visible_top <= visible_bottom:
                     top, bottom = visible_top, visible_bottom
-                edges[trial, row, heading, 0], edges[trial, row, heading, 1] = left, top
-                edges[trial, row, heading, 2], edges[trial, row, heading, 3] = right, bottom
+                edges[trial, hull, heading, 0], edges[trial, hull, heading, 1] = left, top
+                edges[trial, hull, heading, 2], edges[trial, hull, heading, 3] = right, bottom
                 # The order in which numpy adds, for which equal terms have equal sums
                 total = ((partial[0] + partial[1]) + (partial[2] + partial[3])) + (
                     (partial[4] + partial[5]) + (partial[6] + partial[7])
                 )
-                depth[trial, row, heading] = total / corners.shape[1]
+                depth[trial, hull, heading] = total / corners.shape[1]

@@ -73,9 +73,9 @@ class Target(NamedTuple):
         The maximum is UNLIKELY_HEADING, because shapes differ and vehicles turn.
         """
         count = len(self.costs)
-        place = (heading - self.first) % math.pi / math.pi * count
-        row, part = int(place), place - int(place)
-        cost = (1.0 - part) * self.costs[row % count] + part * self.costs[(row + 1) % count]
+        position = (heading - self.first) % math.pi / math.pi * count
+        index, part = int(position), position - int(position)
+        cost = (1.0 - part) * self.costs[index % count] + part * self.costs[(index + 1) % count]
         return min(cost, UNLIKELY_HEADING)
 
     def likelihood(self, distance: float) -> float:
@@ -175,9 +175,9 @@ def _fit_points(
     points: list[Fit | None] = []
     for row, (box, name) in enumerate(zip(boxes, classes, strict=True)):
         guess, spread = by_ground.boxes[row], by_ground.covariance[row]
-        place = guess[:2] - camera.pose[:2, 3]
-        expected = max(float(np.linalg.norm(place)), 0.5)
-        deviation = math.sqrt(float(place @ spread @ place)) / expected**2
+        offset = guess[:2] - camera.pose[:2, 3]
+        expected = max(float(np.linalg.norm(offset)), 0.5)
+        deviation = math.sqrt(float(offset @ spread @ offset)) / expected**2
         target = Target(
             box.tolist(),
             possible_classes(name),

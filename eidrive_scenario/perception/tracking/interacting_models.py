@@ -76,7 +76,7 @@ class InteractingModels:
         self._pose_errors = pose_errors
         models: tuple[MotionModel, ...] = (Standing(model), model)
         if pose_errors is not None:
-            models = tuple(UncertainPose(one, pose_errors) for one in models)
+            models = tuple(UncertainPose(inner, pose_errors) for inner in models)
         self._models = models
 
     def no_tracks(self) -> Tracks:

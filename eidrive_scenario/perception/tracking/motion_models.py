@@ -96,11 +96,11 @@ class ConstantVelocity(MotionModel):
     motion = slice(2, 4)
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
-        known = np.asarray(np.all(np.isfinite(velocity), axis=1))
-        state = np.concatenate([boxes[:, :2], np.where(known[:, None], velocity, 0.0)], axis=1)
+        has_velocity = np.asarray(np.all(np.isfinite(velocity), axis=1))
+        state = np.concatenate([boxes[:, :2], np.where(has_velocity[:, None], velocity, 0.0)], axis=1)
         covariance = np.zeros((len(boxes), 4, 4))
         covariance[:, :2, :2] = noise
-        variance = np.where(known, self.velocity_deviation, UNKNOWN_SPEED) ** 2
+        variance = np.where(has_velocity, self.velocity_deviation, UNKNOWN_SPEED) ** 2
         covariance[:, 2, 2] = covariance[:, 3, 3] = variance
         return Estimates(state, covariance)
 
@@ -139,15 +139,15 @@ class TurnRate(MotionModel):
     measures_heading = True
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
-        known = np.asarray(np.all(np.isfinite(velocity), axis=1))
-        vx, vy = np.where(known[:, None], velocity, 0.0).T
+        has_velocity = np.asarray(np.all(np.isfinite(velocity), axis=1))
+        vx, vy = np.where(has_velocity[:, None], velocity, 0.0).T
         state = np.zeros((len(boxes), 5))
         state[:, :2], state[:, 2] = boxes[:, :2], boxes[:, 6]
         state[:, 3] = vx * np.cos(boxes[:, 6]) + vy * np.sin(boxes[:, 6])
         covariance = np.zeros((len(boxes), 5, 5))
         covariance[:, :2, :2] = noise
         covariance[:, 2, 2] = HEADING_DEVIATION**2
-        covariance[:, 3, 3] = np.where(known, self.velocity_deviation, UNKNOWN_SPEED) ** 2
+        covariance[:, 3, 3] = np.where(has_velocity, self.velocity_deviation, UNKNOWN_SPEED) ** 2
         covariance[:, 4, 4] = UNKNOWN_TURN**2
         return Estimates(state, covariance)
 

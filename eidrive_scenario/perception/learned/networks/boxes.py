@@ -75,5 +75,5 @@ class Targets:
         half = half / 2.0
         away = (points[None] - center[:, None]).abs()
         inside = (away <= half[:, None]).all(dim=2)
-        found = torch.zeros((self.boxes.shape[0], len(points)), dtype=torch.int32, device=points.device)
-        return found.index_add_(0, image, inside.int()) > 0
+        counts = torch.zeros((self.boxes.shape[0], len(points)), dtype=torch.int32, device=points.device)
+        return counts.index_add_(0, image, inside.int()) > 0

@@ -39,8 +39,8 @@ def suppress(boxes: Array, scores: Array, groups: Integers, limit: float, max_bo
         rectangles = np.concatenate([boxes[rows, :2], boxes[rows, 2:] - boxes[rows, :2]], axis=1)
         best = cv2.dnn.NMSBoxes(rectangles.tolist(), scores[rows].tolist(), 0.0, limit)
         kept.append(rows[np.asarray(best, np.int64)])
-    found = np.sort(np.concatenate(kept))
-    return np.asarray(found[np.argsort(-scores[found], kind="stable")][:max_boxes], dtype=np.int64)
+    remaining = np.sort(np.concatenate(kept))
+    return np.asarray(remaining[np.argsort(-scores[remaining], kind="stable")][:max_boxes], dtype=np.int64)
 
 
 def _area(boxes: Array) -> Array:

@@ -87,14 +87,14 @@ class YoloV5(nn.Module):
 
     def decode(self, outputs: list[Tensor]) -> Tensor:
         """Return (B, N, 5 + C): cx cy w h [px], objectness, probability of each class."""
-        found = []
+        predictions = []
         for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
             share = raw.sigmoid()
             cells = cell_corners(raw.shape[2], raw.shape[3], raw.device)
             center = (2.0 * share[..., :2] - 0.5 + cells) * stride
             size = (2.0 * share[..., 2:4]).square() * self.anchors[scale][None, :, None, None, :]
-            found.append(torch.cat([center, size, share[..., 4:]], dim=-1).flatten(1, 3))
-        return torch.cat(found, dim=1)
+            predictions.append(torch.cat([center, size, share[..., 4:]], dim=-1).flatten(1, 3))
+        return torch.cat(predictions, dim=1)
 
 
 def cell_corners(height: int, width: int, device: torch.device) -> Tensor:
@@ -171,21 +171,24 @@ class YoloLoss:
         for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
             raw = raw.float()
             height, width = raw.shape[2:4]
-            found = assign(targets, self._anchors[scale], stride, height, width)
+            assignment = assign(targets, self._anchors[scale], stride, height, width)
             expected = torch.zeros(raw.shape[:4], device=device)
-            count = len(found.classes)
+            count = len(assignment.classes)
             if count:
                 assigned += count
-                predictions = raw[found.image, found.anchor, found.line, found.column]
+                predictions = raw[assignment.image, assignment.anchor, assignment.line, assignment.column]
                 share = predictions[:, :4].sigmoid()
-                cells = torch.stack([found.column, found.line], dim=1)
+                cells = torch.stack([assignment.column, assignment.line], dim=1)
                 center = (2.0 * share[:, :2] - 0.5 + cells) * stride
-                size = (2.0 * share[:, 2:]).square() * self._anchors[scale][found.anchor]
-                fit = complete_iou(torch.cat([center, size], dim=1), found.boxes)
+                size = (2.0 * share[:, 2:]).square() * self._anchors[scale][assignment.anchor]
+                fit = complete_iou(torch.cat([center, size], dim=1), assignment.boxes)
                 box_loss = box_loss + (1.0 - fit).sum()
-                expected.index_put_((found.image, found.anchor, found.line, found.column), fit.detach().clamp(min=0.0))
+                expected.index_put_(
+                    (assignment.image, assignment.anchor, assignment.line, assignment.column),
+                    fit.detach().clamp(min=0.0),
+                )
                 one_hot = torch.zeros((count, self._classes), device=device)
-                one_hot[torch.arange(count, device=device), found.classes] = 1.0
+                one_hot[torch.arange(count, device=device), assignment.classes] = 1.0
                 class_loss = class_loss + binary_cross_entropy_with_logits(predictions[:, 5:], one_hot, reduction="sum")
             # Cells in an ignored object do not count.
             centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride

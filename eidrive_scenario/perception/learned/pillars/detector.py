@@ -150,9 +150,9 @@ class PillarDetector(Detector):
         )
         return self._objects(network, maps, self.feature_map, readings.time)
 
-    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+    def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show; 0 outside of the grid."""
-        shares = self._lidars.in_view(boxes, readings, found)
+        shares = self._lidars.in_view(boxes, readings, detections)
         for reading in list(readings.lidars.values())[:1]:
             offset = np.abs(grid_frame(reading).to_local(boxes[:, :2]))
             shares[offset.max(axis=1, initial=0.0) > CELLS * CELL / 2.0] = 0.0
