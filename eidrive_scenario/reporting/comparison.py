@@ -52,9 +52,9 @@ def _lines(comparison: Comparison) -> Iterator[str]:
         f"B - A: {counts.difference:+.1%} ({comparison.confidence:.0%}: {low:+.1%} to {high:+.1%}); "
         f"McNemar's exact test: p = {comparison.p_value:.3g}"
     )
-    for name, one in comparison.metrics.items():
-        interval = interval_text(one.low, one.high, "+.4g")
-        yield f"{name}: B - A {one.mean:+.4g} ({comparison.confidence:.0%}: {interval}; {one.pairs} pairs)"
+    for name, paired in comparison.metrics.items():
+        interval = interval_text(paired.low, paired.high, "+.4g")
+        yield f"{name}: B - A {paired.mean:+.4g} ({comparison.confidence:.0%}: {interval}; {paired.pairs} pairs)"
     if comparison.is_not_worse:
         yield f"B is not worse than A by {comparison.margin:.1%} or more (p = {comparison.p_worse:.3g})"
     elif comparison.is_worse:
@@ -103,12 +103,12 @@ def as_json(named: NamedComparison) -> dict[str, Any]:
         "conclusion": comparison.conclusion,
         "metrics": {
             name: {
-                "pairs": one.pairs,
-                "difference": one.mean,
-                "low": None if math.isnan(one.low) else one.low,
-                "high": None if math.isnan(one.high) else one.high,
+                "pairs": paired.pairs,
+                "difference": paired.mean,
+                "low": None if math.isnan(paired.low) else paired.low,
+                "high": None if math.isnan(paired.high) else paired.high,
             }
-            for name, one in comparison.metrics.items()
+            for name, paired in comparison.metrics.items()
         },
     }
 
@@ -159,8 +159,8 @@ def _rows(comparisons: Sequence[NamedComparison]) -> Iterator[_Row]:
         yield _Row(name, cells, comparison.conclusion, remark, (low, high, counts.difference))
 
 
-def _difference(one: PairedDifference | None) -> str:
-    return "" if one is None else f"{one.mean:+.4g} ({interval_text(one.low, one.high, '+.4g')})"
+def _difference(paired: PairedDifference | None) -> str:
+    return "" if paired is None else f"{paired.mean:+.4g} ({interval_text(paired.low, paired.high, '+.4g')})"
 
 
 def _metrics(named: NamedComparison) -> Mapping[str, Any]:

@@ -354,13 +354,13 @@ def _tooltips(
     height = 72.0 * MAP_HEIGHT
     across = axes.transData.transform([(edge, 0.0) for edge in cell_edges(xs)])[:, 0]
     down = height - axes.transData.transform([(0.0, edge) for edge in cell_edges(ys)])[:, 1]
-    found = []
+    rectangles = []
     for (column, row), rate in sorted(rates.items()):
         values = ", ".join(
-            f"{title} {name[place]}" for title, name, place in zip(titles, names, (column, row), strict=True)
+            f"{title} {name[index]}" for title, name, index in zip(titles, names, (column, row), strict=True)
         )
         text = f"{values}: {rate.successes} of {rate.trials} passed, 95 % interval {rate.low:.2f} to {rate.high:.2f}"
-        place = f'x="{across[column]:.2f}" y="{down[row + 1]:.2f}"'
+        corner = f'x="{across[column]:.2f}" y="{down[row + 1]:.2f}"'
         size = f'width="{across[column + 1] - across[column]:.2f}" height="{down[row] - down[row + 1]:.2f}"'
-        found.append(f'<rect {place} {size} fill="transparent"><title>{escape(text)}</title></rect>')
-    return "".join(found)
+        rectangles.append(f'<rect {corner} {size} fill="transparent"><title>{escape(text)}</title></rect>')
+    return "".join(rectangles)

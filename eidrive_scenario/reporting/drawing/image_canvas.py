@@ -80,9 +80,9 @@ class ImageCanvas(Canvas):
         height, width = self.image.shape[:2]
         if not (-width < left < width and 0 <= base < 2 * height):
             return  # OpenCV crashes far away
-        text, place = _drawable(text), (round(left), round(base))
+        text, origin = _drawable(text), (round(left), round(base))
         for ink, thickness in ((WHITE, 3), (color, 1)):
-            cv2.putText(self.image, text, place, FONT, FONT_SCALE * size, _bgr(ink), thickness, cv2.LINE_AA)
+            cv2.putText(self.image, text, origin, FONT, FONT_SCALE * size, _bgr(ink), thickness, cv2.LINE_AA)
 
     def label_size(self, text: str, size: float = 1.0) -> tuple[float, float]:
         (width, height), _ = cv2.getTextSize(_drawable(text), FONT, FONT_SCALE * size, 1)

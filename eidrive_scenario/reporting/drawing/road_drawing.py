@@ -58,10 +58,10 @@ def bridge_spans(strips: Sequence[Strip]) -> Iterator[tuple[int, float, float]]:
     cells = _cells(strips)
     flat = np.concatenate([cell.ravel() for cell in cells])
     heights = np.concatenate([np.tile(strip.heights, len(strip.points)) for strip in strips])
-    known, place = np.unique(flat, return_inverse=True)
-    ground = np.full(len(known), np.inf)
-    np.minimum.at(ground, place, heights)
-    above = heights - ground[place] >= CLEARANCE
+    occupied, cell_of_point = np.unique(flat, return_inverse=True)
+    ground = np.full(len(occupied), np.inf)
+    np.minimum.at(ground, cell_of_point, heights)
+    above = heights - ground[cell_of_point] >= CLEARANCE
     start = 0
     for index, strip, cell in zip(usual, strips, cells, strict=True):
         covers = above[start : start + cell.size].reshape(cell.shape).any(axis=0)
@@ -128,7 +128,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
     edges = [part.edges() for part in parts]
     ground = _drawn(zip(parts, edges, strict=True), window, spacing)
     raised: dict[int, list[tuple[_Part, Sequence[_Edges]]]] = {}
-    strips = [part.strip(found) for part, found in zip(parts, edges, strict=True)]
+    strips = [part.strip(part_edges) for part, part_edges in zip(parts, edges, strict=True)]
     for index, start, end in bridge_spans(strips):
         over = parts[index]._replace(stations=equidistant(start, end, spacing))
         height = over.road.elevation.value((start + end) / 2.0)

@@ -113,7 +113,7 @@ class ScenarioPicture:
             raise SettingError(Diagnostic(f"--station: no station {station!r}", suggestion(station, sectors)))
         chosen = station or next(iter([*drivers, *sectors]), "")
         settings = simulation.stack.settings.values()
-        areas = [np.array(area) for one in settings for area in one.planner_settings.areas]
+        areas = [np.array(area) for agent in settings for area in agent.planner_settings.areas]
         shadow = _shadow(simulation, view, chosen, sectors[chosen]) if chosen else ()
         paths, zones = tuple(_paths(simulation, outline)), tuple(_zones(simulation, outline))
         return cls(view, paths, zones, sectors, chosen, tuple(shadow), tuple(areas))

@@ -76,8 +76,8 @@ class RecordedStation:
             reason = "; ".join(report.lines()) or "record the run again"
             raise InputError(Diagnostic("the recording shows no actor", reason, str(recording.path)))
         if name is not None and name not in actors:
-            known = ", ".join([*stations, *(actor for actor in actors if actor not in stations)][:12])
-            raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {known}"))
+            available = ", ".join([*stations, *(actor for actor in actors if actor not in stations)][:12])
+            raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {available}"))
         self.name = name or next(iter([*driven, *stations, *actors]))
         self._entry = actors.get(self.name, (0.0, 0.0))
         decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result, actors)

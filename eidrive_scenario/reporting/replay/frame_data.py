@@ -138,7 +138,7 @@ class Timeline:
         changed, self._changed = self._changed, set()
         if not changed:
             return []
-        return [[path, found.kind, found.intervals] for path, found in self._elements.items() if path in changed]
+        return [[path, element.kind, element.intervals] for path, element in self._elements.items() if path in changed]
 
 
 _LARGEST_PAGE = 64 * 2**20

@@ -145,8 +145,8 @@ def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[s
         approach = closest_approach(result.metrics, [verdict.value for verdict in result.criteria], names)
         if approach is not None:
             return approach
-    found: dict[str, Any] | None = data["decisive"]
-    return found
+    decisive: dict[str, Any] | None = data["decisive"]
+    return decisive
 
 
 def _roads(roads: RoadDrawing) -> dict[str, Any]:
@@ -314,23 +314,23 @@ def run_settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
 
 def station_settings(settings: Mapping[str, Any]) -> dict[str, AgentSettings]:
     """Return the settings of stations with a report timeout other than the default."""
-    found: dict[str, AgentSettings] = {}
+    by_station: dict[str, AgentSettings] = {}
     stations = settings.get("stations")
     for name, station in stations.items() if isinstance(stations, Mapping) else ():
         timeout = station.get("report_timeout") if isinstance(station, Mapping) else None
         if timeout not in (None, DEFAULT_SETTINGS.report_timeout):
             with suppress(ValidationError):  # in a damaged recording
-                found[name] = AgentSettings(report_timeout=timeout)
-    return found
+                by_station[name] = AgentSettings(report_timeout=timeout)
+    return by_station
 
 
 def _object(text: str) -> dict[str, Any] | None:
     """Parse a JSON object of the metadata. Return None for other texts."""
     try:
-        found = load_json(text.encode(), max_depth=30)
+        value = load_json(text.encode(), max_depth=30)
     except ValueError:
         return None
-    return found if isinstance(found, dict) else None
+    return value if isinstance(value, dict) else None
 
 
 def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:

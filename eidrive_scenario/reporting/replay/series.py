@@ -94,15 +94,15 @@ class SeriesBuilder:
 
     def take(self) -> dict[str, Values]:
         """Return the columns by station since the last call, without those that have no value."""
-        found: dict[str, Values] = {}
+        series: dict[str, Values] = {}
         for name, columns in self._columns.items():
             lists = {key: _pad(columns[key], self._frames) for key in ("speed", "gap", "ttc")}
-            found[name] = {key: values for key, values in lists.items() if any(value is not None for value in values)}
+            series[name] = {key: values for key, values in lists.items() if any(value is not None for value in values)}
             for key in _BY_SENDER:
                 if columns[key]:
-                    found[name][key] = {sender: _pad(values, self._frames) for sender, values in columns[key].items()}
+                    series[name][key] = {sender: _pad(values, self._frames) for sender, values in columns[key].items()}
         self._columns, self._frames = {}, 0
-        return found
+        return series
 
     @property
     def contact(self) -> Values | None:
@@ -146,7 +146,7 @@ def closest_approach(
     values  those of the verdicts of the run: a criterion measures either the distance of the centers or that of the
             bodies, and the time among its metrics is that of the measured one
     """
-    found = []
+    approaches = []
     for name, time in metrics.items():
         if name.startswith("min_distance.") and name.endswith(".time") and time is not None and math.isfinite(time):
             pair = name.removeprefix("min_distance.").removesuffix(".time")
@@ -156,20 +156,20 @@ def closest_approach(
             measured = both[-1] if both else center
             if measured is not None and math.isfinite(measured):
                 ends = "centers" if measured == center else "bodies"
-                found.append((measured, time, _pair_text(pair, names), ends))
-    if not found:
+                approaches.append((measured, time, _pair_text(pair, names), ends))
+    if not approaches:
         return None
-    distance, time, pair, ends = min(found)
+    distance, time, pair, ends = min(approaches)
     return {"time": round(time, 4), "text": f"closest approach of {pair}: {distance:.2f} m between {ends}"}
 
 
 def _pair_text(pair: str, names: Collection[str]) -> str:
     """Return the text of the two names in `A.B`; the same text if a dot in a name leaves them unknown."""
     parts = pair.split(".")
-    splits = [(".".join(parts[:row]), ".".join(parts[row:])) for row in range(1, len(parts))]
-    known = [split for split in splits if split[0] in names and split[1] in names]
-    found = known or (splits if len(splits) == 1 else [])
-    return " and ".join(found[0]) if found else pair
+    splits = [(".".join(parts[:count]), ".".join(parts[count:])) for count in range(1, len(parts))]
+    named = [split for split in splits if split[0] in names and split[1] in names]
+    possible = named or (splits if len(splits) == 1 else [])
+    return " and ".join(possible[0]) if possible else pair
 
 
 def _rounded(value: float, digits: int) -> float | None:

@@ -88,10 +88,10 @@ def scenario_matrix(groups: Sequence[RunGroup]) -> Matrix | None:
     """Return the matrix of scenarios and settings; None for one scenario, one setting or too many settings."""
     names = [(group.scenario, _name(group)) for group in groups]
     detailed = len(set(names)) < len(names)
-    found: dict[str, dict[str, list[ReportedRun]]] = {}
+    table: dict[str, dict[str, list[ReportedRun]]] = {}
     for group in groups:
-        found.setdefault(group.scenario, {}).setdefault(_name(group, detailed=detailed), []).extend(group.distinct)
-    return _matrix("scenario", found, least_rows=2)
+        table.setdefault(group.scenario, {}).setdefault(_name(group, detailed=detailed), []).extend(group.distinct)
+    return _matrix("scenario", table, least_rows=2)
 
 
 def _name(group: RunGroup, *, detailed: bool = False) -> str:
@@ -109,23 +109,23 @@ def parameter_matrix(runs: Sequence[ReportedRun], varied: Sequence[str]) -> Matr
         return None
     down = varied[1] if len(varied) == 2 else ""
     across, along = _label(runs, varied[0]), _label(runs, down) if down else lambda run: "passed"
-    found: dict[str, dict[str, list[ReportedRun]]] = {}
+    table: dict[str, dict[str, list[ReportedRun]]] = {}
     for run in runs:
-        found.setdefault(along(run), {}).setdefault(across(run), []).append(run)
-    columns = {name for cells in found.values() for name in cells}
-    if not all(run.is_swept for run in runs) and len(runs) <= max(len(columns), len(found)):
+        table.setdefault(along(run), {}).setdefault(across(run), []).append(run)
+    columns = {name for cells in table.values() for name in cells}
+    if not all(run.is_swept for run in runs) and len(runs) <= max(len(columns), len(table)):
         return None
-    return _matrix(f"{down} \\ {varied[0]}" if down else varied[0], found, least_rows=1)
+    return _matrix(f"{down} \\ {varied[0]}" if down else varied[0], table, least_rows=1)
 
 
 def axis_matrix(groups: Sequence[RunGroup], axis: str) -> Matrix | None:
     """Return the matrix of the groups of a scenario over the axis of a sweep, with one row per group."""
     across = _label([run for group in groups for run in group.distinct], axis)
-    found: dict[str, dict[str, list[ReportedRun]]] = {}
+    table: dict[str, dict[str, list[ReportedRun]]] = {}
     for group, name in zip(groups, group_names(groups), strict=True):
         for run in group.distinct:
-            found.setdefault(name, {}).setdefault(across(run), []).append(run)
-    return _matrix(axis, found, least_rows=1, ordered=False)
+            table.setdefault(name, {}).setdefault(across(run), []).append(run)
+    return _matrix(axis, table, least_rows=1, ordered=False)
 
 
 def group_names(groups: Sequence[RunGroup]) -> list[str]:
@@ -143,13 +143,13 @@ def _label(runs: Sequence[ReportedRun], name: str) -> Callable[[ReportedRun], st
 
 
 def _matrix(
-    corner: str, found: Mapping[str, Mapping[str, Sequence[ReportedRun]]], least_rows: int, *, ordered: bool = True
+    corner: str, table: Mapping[str, Mapping[str, Sequence[ReportedRun]]], least_rows: int, *, ordered: bool = True
 ) -> Matrix | None:
-    columns = sorted({name for cells in found.values() for name in cells}, key=_order)
-    if len(found) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(found) * len(columns) > MOST_CELLS:
+    columns = sorted({name for cells in table.values() for name in cells}, key=_order)
+    if len(table) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(table) * len(columns) > MOST_CELLS:
         return None
-    names = sorted(found, key=_order) if ordered else list(found)
-    rows = [(name, tuple([success_rate(found[name].get(column, ())) for column in columns])) for name in names]
+    names = sorted(table, key=_order) if ordered else list(table)
+    rows = [(name, tuple([success_rate(table[name].get(column, ())) for column in columns])) for name in names]
     return Matrix(corner, tuple(columns), tuple(rows))
 
 
@@ -247,13 +247,13 @@ def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> Char
     levels = levels_of(runs, axis)
     if levels is None or (not runs[0].is_swept and len(levels.centers) == len(runs)):
         return None
-    found: dict[int, list[bool]] = defaultdict(list)
+    verdicts: dict[int, list[bool]] = defaultdict(list)
     for run in runs:
         if run.is_judged:
-            found[levels.index(run)].append(run.passed)
-    if not found:
+            verdicts[levels.index(run)].append(run.passed)
+    if not verdicts:
         return None
-    rates = {level: wilson(sum(passed), len(passed)) for level, passed in sorted(found.items())}
+    rates = {level: wilson(sum(passed), len(passed)) for level, passed in sorted(verdicts.items())}
     return ChartSeries(
         name,
         color,
@@ -293,7 +293,7 @@ def _maps(group: RunGroup) -> Iterator[tuple[Levels, Levels, dict[tuple[int, int
             for run in (run for run in group.distinct if run.is_judged):
                 passed[columns.index(run), rows.index(run)].append(run.passed)
             if passed:
-                yield columns, rows, {place: wilson(sum(verdicts), len(verdicts)) for place, verdicts in passed.items()}
+                yield columns, rows, {cell: wilson(sum(verdicts), len(verdicts)) for cell, verdicts in passed.items()}
 
 
 def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, Figure]]:

@@ -79,8 +79,8 @@ class ReportedRun(BaseModel):
         """Return the value of an axis of a sweep or of a parameter, as a number if it is one; None without it."""
         if name in self.axes:
             return self.axes[name]
-        found = typed(self.parameters[name]) if name in self.parameters else None
-        return found if found is None or isinstance(found, int | float) else str(found)
+        value = typed(self.parameters[name]) if name in self.parameters else None
+        return value if value is None or isinstance(value, int | float) else str(value)
 
     @property
     def is_swept(self) -> bool:
@@ -209,31 +209,31 @@ def _kept_result(run: StoredRun, store: Path) -> tuple[Path, Mapping[str, Any]] 
 
 
 def _as_result(run: StoredRun) -> dict[str, Any]:
-    """Return a row in the format of `--json`, without reasons and units of criteria, and texts of warnings."""
-    row = run.result
-    count = row.get("warnings")
+    """Return a stored run in the format of `--json`, without reasons and units of criteria, and texts of warnings."""
+    result = run.result
+    count = result.get("warnings")
     settings = json.loads(run.settings) if run.settings else {}
-    names = [name.removesuffix(".passed") for name in row if name.endswith(".passed")]
+    names = [name.removesuffix(".passed") for name in result if name.endswith(".passed")]
     criteria = [
-        {"name": name, **{end[1:]: row.get(name + end) for end in _ENDINGS}}
+        {"name": name, **{end[1:]: result.get(name + end) for end in _ENDINGS}}
         for name in names
-        if row.get(f"{name}.passed") is not None
+        if result.get(f"{name}.passed") is not None
     ]
     return {
         "scenario": run.scenario,
         "run": run.run,
         "seed": run.seed,
-        "channel": str(row.get("channel", "")),
-        "passed": row.get("passed"),
-        "end_reason": row.get("end_reason"),
+        "channel": str(result.get("channel", "")),
+        "passed": result.get("passed"),
+        "end_reason": result.get("end_reason"),
         "criteria": criteria,
-        "metrics": {name: value for name, value in row.items() if _is_metric(name, value)},
+        "metrics": {name: value for name, value in result.items() if _is_metric(name, value)},
         "warnings": [f"{count} warning{'' if count == 1 else 's'}, printed by the command of the run"] if count else [],
         "parameters": settings.get("parameters", {}),
         "settings": settings,
-        "settings_sha256": row.get("settings_sha256", ""),
-        "trace_hash": row.get("trace_hash", ""),
-        "simulated_s": row.get("simulated_s", 0.0),
+        "settings_sha256": result.get("settings_sha256", ""),
+        "trace_hash": result.get("trace_hash", ""),
+        "simulated_s": result.get("simulated_s", 0.0),
         "command": run.command,
     }
 

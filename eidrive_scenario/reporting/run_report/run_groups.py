@@ -61,12 +61,12 @@ class RunGroup:
     @property
     def distinct(self) -> tuple[ReportedRun, ...]:
         """Runs each once: of a run in several folders the first, or the first with a replay."""
-        found: dict[object, ReportedRun] = {}
+        distinct: dict[object, ReportedRun] = {}
         for index, run in enumerate(self.runs):
             key = (run.settings_sha256, run.trace_hash) if run.settings_sha256 else index
-            if key not in found or (run.replay and not found[key].replay):
-                found[key] = run
-        return tuple(found.values())
+            if key not in distinct or (run.replay and not distinct[key].replay):
+                distinct[key] = run
+        return tuple(distinct.values())
 
 
 def group_runs(runs: Sequence[ReportedRun]) -> list[RunGroup]:
@@ -83,15 +83,17 @@ def group_runs(runs: Sequence[ReportedRun]) -> list[RunGroup]:
 def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     axes = _numeric_axes(runs)
     settings = [_comparable(run, axes) for run in runs]
-    names = dict.fromkeys(name for one in settings for name in one)
-    differing = [name for name in names if len({one.get(name, "") for one in settings}) > 1]
+    names = dict.fromkeys(name for of_run in settings for name in of_run)
+    differing = [name for name in names if len({of_run.get(name, "") for of_run in settings}) > 1]
     points = [_point(run, axes) for run in runs]
-    differing = [name for name in differing if not _depends_on_axes([one.get(name, "") for one in settings], points)]
-    found: dict[tuple[str, ...], list[ReportedRun]] = {}
-    for run, one in zip(runs, settings, strict=True):
-        found.setdefault((run.channel, *(one.get(name, "") for name in differing)), []).append(run)
-    chosen = _differing_options([(channel, members[0]) for (channel, *_), members in found.items()])
-    short = len({(key[0], *options.items()) for key, options in zip(found, chosen, strict=True)}) == len(found)
+    differing = [
+        name for name in differing if not _depends_on_axes([of_run.get(name, "") for of_run in settings], points)
+    ]
+    grouped: dict[tuple[str, ...], list[ReportedRun]] = {}
+    for run, of_run in zip(runs, settings, strict=True):
+        grouped.setdefault((run.channel, *(of_run.get(name, "") for name in differing)), []).append(run)
+    chosen = _differing_options([(channel, members[0]) for (channel, *_), members in grouped.items()])
+    short = len({(key[0], *options.items()) for key, options in zip(grouped, chosen, strict=True)}) == len(grouped)
     return [
         RunGroup(
             scenario,
@@ -110,7 +112,7 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
             tuple(members),
             axes,
         )
-        for ((channel, *values), members), options in zip(found.items(), chosen, strict=True)
+        for ((channel, *values), members), options in zip(grouped.items(), chosen, strict=True)
     ]
 
 
@@ -139,7 +141,7 @@ def _depends_on_axes(values: Sequence[str], points: Sequence[_Point]) -> bool:
         if at_point.setdefault((texts, numbers), value) != value:
             return False
         in_sweep.setdefault((sweep, texts), set()).add(value)
-    return any(len(found) > 1 for found in in_sweep.values())
+    return any(len(distinct) > 1 for distinct in in_sweep.values())
 
 
 def _differing_options(first: Sequence[tuple[str, ReportedRun]]) -> list[dict[str, str]]:
@@ -149,9 +151,9 @@ def _differing_options(first: Sequence[tuple[str, ReportedRun]]) -> list[dict[st
         given = {name: text for name in _OPTIONS if (text := flow_text(run.settings.get(name, []))) not in _EMPTY}
         swept = {name: value for name, value in run.axes.items() if isinstance(value, str) and value != channel}
         options.append({**given, **swept})
-    names = dict.fromkeys(name for one in options for name in one)
-    differing = [name for name in names if len({one.get(name, "") for one in options}) > 1]
-    return [{name: shorten(one[name], _SHOWN) for name in differing if name in one} for one in options]
+    names = dict.fromkeys(name for of_group in options for name in of_group)
+    differing = [name for name in names if len({of_group.get(name, "") for of_group in options}) > 1]
+    return [{name: shorten(of_group[name], _SHOWN) for name in differing if name in of_group} for of_group in options]
 
 
 def _numeric_axes(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
@@ -162,8 +164,8 @@ def _numeric_axes(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
             values.setdefault(name, set()).add(value)
     return tuple(
         name
-        for name, found in values.items()
-        if len(found) > 1 and all(isinstance(value, int | float) for value in found)
+        for name, distinct in values.items()
+        if len(distinct) > 1 and all(isinstance(value, int | float) for value in distinct)
     )
 
 

@@ -56,7 +56,7 @@ def channel_text(*settings: Mapping[str, Any]) -> str:
 
     A value in which the channels differ is `varies: 0.1, 0.2`.
     """
-    profiles = [found for one in settings if isinstance(found := one.get("channel_profile"), Mapping)]
+    profiles = [profile for of_run in settings if isinstance(profile := of_run.get("channel_profile"), Mapping)]
     hidden = ("name", "description")
     shown = [{key: item for key, item in profile.items() if key not in hidden} for profile in profiles]
     return shorten(flow_text(_common(shown))) if shown else ""

@@ -125,7 +125,7 @@ def init_boxes(storyboard: Storyboard) -> list[Box]:
         lines.setdefault(behavior.actor_name or "global actions", []).append(
             BoxLine(Role.CONTENT, "", behavior.describe())
         )
-    return [Box("init", name, (name,), lines=tuple(dict.fromkeys(found))) for name, found in lines.items()]
+    return [Box("init", name, (name,), lines=tuple(dict.fromkeys(content))) for name, content in lines.items()]
 
 
 def stop_lines(storyboard: Storyboard) -> tuple[BoxLine, ...]:
@@ -197,9 +197,9 @@ def _waits(trigger: Trigger, elements: ReferenceMatch[StoryElement]) -> Iterator
 
 
 def _group_lines(group: ManeuverGroupElement) -> list[BoxLine]:
-    actions = [one for one in _walk(group) if isinstance(one, ActionElement)]
-    actors = dict.fromkeys(name for one in actions for name in one.actors if name is not None)
-    if any(one.triggering is not None for one in actions):
+    actions = [action for action in _walk(group) if isinstance(action, ActionElement)]
+    actors = dict.fromkeys(name for action in actions for name in action.actors if name is not None)
+    if any(action.triggering is not None for action in actions):
         actors["triggering entities of the act"] = None
     return [BoxLine(Role.ACTORS, "", ", ".join(actors))] if actors else []
 
@@ -299,7 +299,7 @@ def layout_diagram(stories: Sequence[Box], x: float, y: float) -> DiagramLayout:
         tree, bottom = _place(story, columns, bottom)
         placed.append(tree)
         bottom += GAP
-    boxes = {one.box.path: one for tree in placed for one in tree.walk()}
+    boxes = {node.box.path: node for tree in placed for node in tree.walk()}
     return DiagramLayout(placed, _arrows(boxes, columns), columns, right - GUTTER, bottom)
 
 
