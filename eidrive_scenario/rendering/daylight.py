@@ -121,8 +121,8 @@ def _low(elevation: float) -> float:
 
 
 def _unit(color: Array) -> Array:
-    found: Array = color / float(color @ LUMA)
-    return found
+    unit: Array = color / float(color @ LUMA)
+    return unit
 
 
 SIZE = 512
@@ -143,8 +143,8 @@ def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
     level = np.maximum(z, np.float32(0.0))
     scale = np.float32((SIZE - 2) / 2) / (np.float32(1.0) + level)
     middle = np.float32((SIZE - 1) / 2)
-    found: Floats = np.asarray(cv2.remap(dome, x * scale + middle, y * scale + middle, cv2.INTER_LINEAR))
-    return found
+    light: Floats = np.asarray(cv2.remap(dome, x * scale + middle, y * scale + middle, cv2.INTER_LINEAR))
+    return light
 
 
 @lru_cache(maxsize=16)
@@ -220,8 +220,8 @@ def _cie(coefficients: tuple[float, ...], x: Array, y: Array, z: Array, sun: Arr
     chi = np.arccos(np.clip(x * towards[0] + y * towards[1] + z * towards[2], -1.0, 1.0))
     gradation = 1.0 + a * np.exp(b / np.maximum(z, 0.01))
     indicatrix = 1.0 + c * (np.exp(d * chi) - np.exp(d * np.pi / 2)) + e * np.cos(chi) ** 2
-    found: Array = gradation * indicatrix
-    return found
+    luminance: Array = gradation * indicatrix
+    return luminance
 
 
 def _scaled(relative: Array, z: Array, illuminance: float) -> Array:
@@ -230,8 +230,8 @@ def _scaled(relative: Array, z: Array, illuminance: float) -> Array:
     inside = np.hypot(*np.meshgrid(axis, axis)) <= 1.0
     solid_angle = (1.0 + z) ** 2 / ((SIZE - 2) / 2) ** 2
     given = float((relative * z * solid_angle)[inside].sum())
-    found: Array = relative * (illuminance / max(given, 1e-12))
-    return found
+    luminance: Array = relative * (illuminance / max(given, 1e-12))
+    return luminance
 
 
 @lru_cache(maxsize=8)

@@ -57,21 +57,21 @@ def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
 
     Lamps without a LightStateAction follow the weather: low beam and tail lamps are on in the dark and in thick air.
     """
-    found: dict[str, Light] = {}
+    by_material: dict[str, Light] = {}
     for name, light in _lights(spec, appearance, weather).items():
         brightness = light.brightness(time)
         for material, luminance in _SHINES.get(name, ()) if brightness > 0.0 else ():
             shown = _colored(luminance, light, brightness)
-            found[material] = max(shown, found.get(material, shown), key=max)
-    return found
+            by_material[material] = max(shown, by_material.get(material, shown), key=max)
+    return by_material
 
 
 def headlights(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> tuple[float, bool] | None:
     """Return the brightness of the headlamps in [0, 1], and whether they are on high beam; None if they are off."""
     lights = _lights(spec, appearance, weather)
-    found = {name: lights[name].brightness(time) for name in _BEAMS if name in lights}
-    brightest = max(found.values(), default=0.0)
-    return (brightest, found.get("highBeam", 0.0) > 0.0) if brightest > 0.0 else None
+    beams = {name: lights[name].brightness(time) for name in _BEAMS if name in lights}
+    brightest = max(beams.values(), default=0.0)
+    return (brightest, beams.get("highBeam", 0.0) > 0.0) if brightest > 0.0 else None
 
 
 def _lights(spec: ActorSpec, appearance: Appearance, weather: Weather) -> Mapping[str, LightState]:
@@ -143,10 +143,10 @@ def intensity(aside: Array, above: Array, high: bool) -> Array:
     carpet = np.exp(-((aside / 0.55) ** 2) - (below / 0.16) ** 2)
     edge = np.clip(below / 0.006 + 0.5, 0.0, 1.0)
     stray = ABOVE_CUT_OFF * np.exp(-((aside / 0.5) ** 2) - (above / 0.35) ** 2)
-    found: Array = LOW_BEAM * (0.85 * spot + 0.15 * carpet) * edge + stray * (1.0 - edge)
+    total: Array = LOW_BEAM * (0.85 * spot + 0.15 * carpet) * edge + stray * (1.0 - edge)
     if high:
-        found = found + HIGH_BEAM * np.exp(-((aside / 0.12) ** 2) - (above / 0.06) ** 2)
-    return found
+        total = total + HIGH_BEAM * np.exp(-((aside / 0.12) ** 2) - (above / 0.06) ** 2)
+    return total
 
 
 _BESIDE_THE_CAMERA = 4.0
@@ -172,9 +172,9 @@ def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: Cam
     points[seen] = np.arange(places.shape[1])
     normals, light = surfaces.normal[triangle[seen]], np.zeros((2, places.shape[1]), dtype=np.float32)
     for beam in beams:
-        place = beam.position - view.place
-        is_beside = float(np.linalg.norm(place)) < _BESIDE_THE_CAMERA
-        frame = np.ascontiguousarray(np.vstack([place, beam.axes.T]), dtype=np.float32)
+        offset = beam.position - view.position
+        is_beside = float(np.linalg.norm(offset)) < _BESIDE_THE_CAMERA
+        frame = np.ascontiguousarray(np.vstack([offset, beam.axes.T]), dtype=np.float32)
         _shine(points, places, normals, frame, _table(beam.high), np.float32(2.0 * beam.brightness), is_beside, light)
     with np.errstate(divide="ignore"):
         distance = view.own[2].reshape(view.shape) / cover.nearness
@@ -249,18 +249,18 @@ def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats
     grid = np.full(seen.shape, np.float32(-1.0))
     grid[seen] = values
     greatest = np.asarray(cv2.dilate(grid, _SQUARE), dtype=np.float32)
-    known: Floats = np.where(grid < 0.0, np.float32(np.inf), grid)
-    least = np.asarray(cv2.erode(known, _SQUARE), dtype=np.float32)
+    sampled_or_far: Floats = np.where(grid < 0.0, np.float32(np.inf), grid)
+    least = np.asarray(cv2.erode(sampled_or_far, _SQUARE), dtype=np.float32)
     grid = np.where(grid < 0.0, np.maximum(greatest, np.float32(0.0)), grid)
     sampled = np.where(seen, distance[::2, ::2], np.float32(0.0))
     with np.errstate(invalid="ignore"):
         near = np.abs(_doubled(sampled, distance.shape) - distance) < np.float32(0.06) * distance
     whole = _doubled(grid, distance.shape)
-    found: Floats = np.where(near, whole, np.minimum(_doubled(least, distance.shape), whole))
-    return found
+    spread: Floats = np.where(near, whole, np.minimum(_doubled(least, distance.shape), whole))
+    return spread
 
 
 def _doubled(grid: Floats, shape: tuple[int, ...]) -> Floats:
     """Return a grid of every second pixel in both directions at all pixels."""
-    found: Floats = np.repeat(np.repeat(grid, 2, axis=0)[: shape[0]], 2, axis=1)[:, : shape[1]]
-    return found
+    doubled: Floats = np.repeat(np.repeat(grid, 2, axis=0)[: shape[0]], 2, axis=1)[:, : shape[1]]
+    return doubled

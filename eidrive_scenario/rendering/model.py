@@ -95,8 +95,8 @@ class MeshInstance:
     @cached_property
     def center(self) -> Array:
         """Center (3,) of the sphere of radius `model.radius` in the world [m]."""
-        found: Array = self.rotation @ self.model.center + self.position
-        return found
+        center: Array = self.rotation @ self.model.center + self.position
+        return center
 
 
 def linear(color: Color) -> Light:

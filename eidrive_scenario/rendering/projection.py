@@ -26,7 +26,7 @@ class CameraView:
     def __init__(self, pose: Array, pinhole: Pinhole) -> None:
         self.pose = pose
         self.pinhole = pinhole
-        self.place: Array = pose[:3, 3]
+        self.position: Array = pose[:3, 3]
         self.shape = (pinhole.height, pinhole.width)
         self.turn = np.ascontiguousarray(pose[:3, :3], dtype=np.float32)
         self.own = _own_rays(pinhole)
@@ -213,5 +213,5 @@ def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
 def _crossing(first: Array, second: Array, near: float) -> Array:
     """Return the intersections of edges between corners (3, N) with the near plane."""
     share = (near - first[2]) / (second[2] - first[2])
-    found: Array = first + share * (second - first)
-    return found
+    corners: Array = first + share * (second - first)
+    return corners

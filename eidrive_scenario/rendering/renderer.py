@@ -132,29 +132,29 @@ class Renderer:
         grid = shadow_grid(light.towards, view) if light.sun.any() else None
         at = Circumstances(view, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
-        known = self._known(subjects, at) if self.MOST_KEPT > 0 else None
-        canvas = _whole(subjects, felt, at, ground) if known is None else _renewed(known, subjects, felt, at, ground)
+        cached = self._cached(subjects, at) if self.MOST_KEPT > 0 else None
+        canvas = _whole(subjects, felt, at, ground) if cached is None else _renewed(cached, subjects, felt, at, ground)
         whole = canvas.light.reshape(*view.shape, 3)
         if weather.lamps_on:
             whole = _with_glare(whole)
         return Radiance(whole, canvas.depth.reshape(view.shape), canvas.label.reshape(view.shape))
 
-    def _known(self, subjects: Subjects, at: Circumstances) -> _Kept | None:
+    def _cached(self, subjects: Subjects, at: Circumstances) -> _Kept | None:
         """Return the cached scenery if the previous image of this camera had the same content."""
         looks = tuple(
             (each.model, each.position.tobytes(), each.label, tuple(each.glow.items())) for each in subjects.scenery
         )
         key = (at.view.pose.tobytes(), at.view.pinhole, at.weather, looks)
-        found = self._kept.pop(key, None)
-        if found is None:
+        scenery = self._kept.pop(key, None)
+        if scenery is None:
             if key not in self._shown:
                 self._shown[key] = None
                 _forget_first(self._shown, self.MOST_SHOWN)
                 return None
-            found = _scenery(subjects, at)
-        self._kept[key] = found
+            scenery = _scenery(subjects, at)
+        self._kept[key] = scenery
         _forget_first(self._kept, self.MOST_KEPT)
-        return found
+        return scenery
 
 
 def _forget_first(memory: dict[object, Any], most: int) -> None:
@@ -238,28 +238,28 @@ def _scenery(subjects: Subjects, at: Circumstances) -> _Kept:
     return _Kept(cover, lit, canvas, heights)
 
 
-def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
+def _renewed(cached: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
     """Return the image, redrawn in areas of actors and their shadows, or completely if neighbors emit light too."""
     view = at.view
     staged = cull_and_project(subjects.actors, view.pose, view.pinhole)
-    lit = together(known.lit, lit_surfaces(staged.surfaces, at.light, at.weather))
-    cover, first = Cover(known.cover.triangle.copy(), known.cover.nearness.copy()), len(known.lit.surfaces.finish)
+    lit = together(cached.lit, lit_surfaces(staged.surfaces, at.light, at.weather))
+    cover, first = Cover(cached.cover.triangle.copy(), cached.cover.nearness.copy()), len(cached.lit.surfaces.finish)
     cover.draw(staged.x, staged.y, staged.nearness, first)
     open_sky = dimmed(_dimming(subjects), cover, lit.upright, view)
     changed = ((open_sky < 1.0) | (cover.triangle >= first)).ravel()
     heights = None
-    if at.grid is not None and known.heights is not None:
-        heights = at.grid.drawn([*subjects.actors, *subjects.unseen], known.heights)
+    if at.grid is not None and cached.heights is not None:
+        heights = at.grid.drawn([*subjects.actors, *subjects.unseen], cached.heights)
     shadows = Shadows.of(at.grid, heights)
-    if known.heights is not None:
-        unchanged = np.flatnonzero(~changed & (known.cover.triangle.ravel() >= 0))
-        shadows.mark_new(known.heights, view.places(unchanged, known.cover.nearness), unchanged, changed)
+    if cached.heights is not None:
+        unchanged = np.flatnonzero(~changed & (cached.cover.triangle.ravel() >= 0))
+        shadows.mark_new(cached.heights, view.places(unchanged, cached.cover.nearness), unchanged, changed)
     visible = _Visible(cover, lit, shadows, open_sky)
     if beams or at.weather.wetness > 0.0:
         canvas = _Canvas.blank(changed.size)
         _draw(canvas, visible, beams, at, ground)
         return canvas
-    canvas = _Canvas._make(values.copy() for values in known.canvas)
+    canvas = _Canvas._make(values.copy() for values in cached.canvas)
     _paint(canvas, np.flatnonzero(changed), visible, None, at)
     return canvas
 
@@ -274,5 +274,5 @@ def _with_glare(image: Floats) -> Floats:
     spread = cv2.GaussianBlur(small, (0, 0), max(width / 4 / 50.0, 0.8)) * 0.7
     spread += cv2.GaussianBlur(small, (0, 0), max(width / 4 / 14.0, 1.5)) * 0.3
     wide = cv2.resize(spread, (width, height), interpolation=cv2.INTER_LINEAR)
-    found: Floats = np.asarray(image * np.float32(1.0 - GLARE) + wide * np.float32(GLARE), dtype=np.float32)
-    return found
+    scattered: Floats = np.asarray(image * np.float32(1.0 - GLARE) + wide * np.float32(GLARE), dtype=np.float32)
+    return scattered

@@ -49,19 +49,21 @@ class Roadside:
     def __init__(self, pieces: Sequence[RoadObjectBody], heads: Sequence[SignalHead]) -> None:
         self._still: Model | None = _standing(pieces)
         self._heads = tuple(heads)
-        self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
+        self._positions = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
         self._unlit = [
-            MeshInstance(head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), place, FIRST_SIGNAL_LABEL - row)
-            for row, (head, place) in enumerate(zip(heads, self._places, strict=True))
+            MeshInstance(
+                head_model(head), rotation_matrix(head.pose.h, 0.0, 0.0), position, FIRST_SIGNAL_LABEL - number
+            )
+            for number, (head, position) in enumerate(zip(heads, self._positions, strict=True))
         ]
 
     def instances(self, viewpoint: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
         """Return all objects within sight of a camera at `viewpoint` (3,), with the signal states at `time` [s]."""
         instances = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
-        near = np.flatnonzero(np.linalg.norm(self._places - viewpoint, axis=1) < IN_SIGHT)
-        for row in near.tolist():
-            glow = _glow(self._heads[row], states.get(self._heads[row].signal.id), time)
-            instances.append(replace(self._unlit[row], glow=glow))
+        near = np.flatnonzero(np.linalg.norm(self._positions - viewpoint, axis=1) < IN_SIGHT)
+        for number in near.tolist():
+            glow = _glow(self._heads[number], states.get(self._heads[number].signal.id), time)
+            instances.append(replace(self._unlit[number], glow=glow))
         return instances
 
 

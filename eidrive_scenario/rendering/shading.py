@@ -96,7 +96,7 @@ def shade(
         albedo = among.surfaces.albedo[triangle[lamp_lit]]
         luminance[lamp_lit] += albedo * shone[lamp_lit, None] * LAMP_COLOR
     wet = np.float32(1.0 - DARKENING * min(2.0 * at.weather.wetness, 1.0))
-    origin = (at.view.place[:2] % 4096.0).astype(np.float32)
+    origin = (at.view.position[:2] % 4096.0).astype(np.float32)
     factors = np.where(SOAKS, wet, np.float32(1.0))
     _add_grain(luminance, places, finish, GRAIN, factors, origin, patches(), grit())
     _add_mirrors(luminance, triangle, places, among.surfaces, at, sun)
@@ -237,8 +237,8 @@ def label_pixels(
 
 
 def _single(color: Array) -> Floats:
-    found: Floats = color.astype(np.float32)
-    return found
+    single: Floats = color.astype(np.float32)
+    return single
 
 
 _ROW = 256

@@ -156,7 +156,7 @@ def shadow_grid(towards: Array, view: CameraView) -> ShadowGrid | None:
     scale = min(pixels / float((high - low).max()), 20.0)
     width, height = (max(math.ceil(extent * scale), 2) for extent in (high - low).tolist())
     base = float((seen @ towards).min()) - _DEPTH
-    return ShadowGrid(axes, towards, low, high, width, height, scale, base, view.place)
+    return ShadowGrid(axes, towards, low, high, width, height, scale, base, view.position)
 
 
 def _seen_ground(view: CameraView) -> Array:
@@ -225,7 +225,7 @@ def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.boo
     share = np.ones(view.shape, dtype=np.float32)
     for body in bodies:
         half = body.model.half
-        middle = body.rotation @ np.array([*body.model.center[:2], 0.0]) + body.position - view.place
+        middle = body.rotation @ np.array([*body.model.center[:2], 0.0]) + body.position - view.position
         away = math.sqrt(float(middle @ middle))
         if 2.0 * float(half[0]) * view.pinhole.focal < _FEWEST_PIXELS * away:
             continue
@@ -287,10 +287,10 @@ def _ahead(corners: Array, near: float) -> Array:
     """Return the part (M, 3) of a polygon (N, 3) in the camera frame beyond the near plane."""
     if (corners[:, 2] >= near).all():
         return corners
-    found = []
+    clipped = []
     for first, second in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if first[2] >= near:
-            found.append(first)
+            clipped.append(first)
         if (first[2] >= near) != (second[2] >= near):
-            found.append(first + (near - first[2]) / (second[2] - first[2]) * (second - first))
-    return np.array(found).reshape(-1, 3)
+            clipped.append(first + (near - first[2]) / (second[2] - first[2]) * (second - first))
+    return np.array(clipped).reshape(-1, 3)

@@ -37,8 +37,8 @@ def _layered(name: str, layers: Sequence[tuple[float, float]]) -> Floats:
     for deviation, weight in layers:
         layer = _blurred(draws, deviation)
         total += weight * layer / layer.std()
-    found: Floats = (total / total.std()).astype(np.float32)
-    return found
+    noise: Floats = (total / total.std()).astype(np.float32)
+    return noise
 
 
 @lru_cache(maxsize=1)
@@ -52,8 +52,8 @@ def grit() -> Floats:
     """Return uncorrelated noise (SIZE, SIZE) of mean 0 and deviation 1."""
     draws = generator(0, "grit").standard_normal((SIZE, SIZE), dtype=np.float32)
     layer = _blurred(draws, 0.7)
-    found: Floats = (layer / layer.std()).astype(np.float32)
-    return found
+    noise: Floats = (layer / layer.std()).astype(np.float32)
+    return noise
 
 
 @lru_cache(maxsize=1)
@@ -89,13 +89,13 @@ def add_reflections(
     sky = sample(dome, x, y, np.abs(z))
     some = numbers[cover.triangle[::2, ::2] >= 0]
     image = mirrored(
-        light[some], view.places(some, cover.nearness), sky, ground - float(view.place[2]), view.pose, small
+        light[some], view.places(some, cover.nearness), sky, ground - float(view.position[2]), view.pose, small
     )
     image = np.asarray(cv2.resize(blurred(image), view.shape[::-1], interpolation=cv2.INTER_LINEAR))
     share = reflectance(np.abs(view.directions(on_road)[2]))
-    place = (view.place % 4096.0).astype(np.float32)
+    position = (view.position % 4096.0).astype(np.float32)
     x, y, _, _ = view.places(on_road, cover.nearness)
-    share *= puddles(x + place[0], y + place[1], wetness, hollows())
+    share *= puddles(x + position[0], y + position[1], wetness, hollows())
     before, dim = light[on_road], open_sky.ravel()[on_road, None]
     light[on_road] = before + share[:, None] * (image.reshape(-1, 3)[on_road] * dim - before)
 
@@ -147,8 +147,8 @@ def blurred(image: Floats) -> Floats:
 
 def reflectance(cosine: Floats) -> Floats:
     """Return the reflectance of water by the cosine of the angle of incidence (Schlick 1994)."""
-    found: Floats = np.float32(WATER) + np.float32(1.0 - WATER) * (np.float32(1.0) - cosine) ** 5
-    return found
+    reflected: Floats = np.float32(WATER) + np.float32(1.0 - WATER) * (np.float32(1.0) - cosine) ** 5
+    return reflected
 
 
 def puddles(x: Floats, y: Floats, wetness: float, table: NDArray[np.float32]) -> Floats:
@@ -159,5 +159,5 @@ def puddles(x: Floats, y: Floats, wetness: float, table: NDArray[np.float32]) ->
     noise = table[(y * 12.0).astype(np.int64) & mask, (x * 12.0).astype(np.int64) & mask]
     film = np.float32(0.25 * min(2.0 * wetness, 1.0))
     pool = np.clip((noise + np.float32(2.6 * wetness - 1.6)) * np.float32(1.5), np.float32(0.0), np.float32(1.0))
-    found: Floats = film + (np.float32(1.0) - film) * pool
-    return found
+    smoothness: Floats = film + (np.float32(1.0) - film) * pool
+    return smoothness

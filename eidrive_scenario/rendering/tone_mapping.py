@@ -43,8 +43,8 @@ def white_of_mean(mean: float) -> float:
 def _luma(luminance: Floats) -> Floats:
     """Return the luminance (H, W) of an image (H, W, 3)."""
     red, green, blue = (np.float32(part) for part in LUMA)
-    found: Floats = luminance[..., 0] * red + luminance[..., 1] * green + luminance[..., 2] * blue
-    return found
+    luma: Floats = luminance[..., 0] * red + luminance[..., 1] * green + luminance[..., 2] * blue
+    return luma
 
 
 class PixelNoise(NamedTuple):
@@ -75,11 +75,11 @@ def _tone_map(
     tones: NDArray[np.uint8], image: NDArray[np.uint8],
 ) -> None:  # fmt: skip
     zero, one, steps = np.float32(0.0), np.float32(1.0), np.float32(len(tones) - 1)
-    for place in range(len(light)):
-        signal = light[place] * scale
+    for pixel in range(len(light)):
+        signal = light[pixel] * scale
         if len(numbers):
-            signal += np.sqrt(max(zero, signal) * variance[1] + variance[0]) * normal[numbers[place]]
-        image[place] = tones[int(min(max(zero, signal), one) * steps)]
+            signal += np.sqrt(max(zero, signal) * variance[1] + variance[0]) * normal[numbers[pixel]]
+        image[pixel] = tones[int(min(max(zero, signal), one) * steps)]
 
 
 def ideal_image(seen: Radiance) -> CameraImage:
