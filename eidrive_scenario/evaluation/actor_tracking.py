@@ -67,31 +67,31 @@ class LaneTracker:
     def center(self, view: WorldView, row: int) -> LaneLocation | None:
         """Return the lane under the center of an actor; None off all lanes."""
         x, y, *_ = view.plain_boxes[row]
-        place = self.roads.locate_at(x, y, self._hint, view.states[row].z)
-        self._hint = place
-        return place if place is not None and self.roads.on_road(place) else None
+        location = self.roads.locate_at(x, y, self._hint, view.states[row].z)
+        self._hint = location
+        return location if location is not None and self.roads.on_road(location) else None
 
     def forget(self) -> None:
         """Forget the previous lane, after a teleport."""
         self._hint = None
 
-    def lane(self, place: LaneLocation) -> Lane:
+    def lane(self, location: LaneLocation) -> Lane:
         """Return the lane of a location."""
-        return self.roads.road(place.road).section_at(place.s).lanes[place.lane]
+        return self.roads.road(location.road).section_at(location.s).lanes[location.lane]
 
-    def key(self, place: LaneLocation) -> LaneKey:
+    def key(self, location: LaneLocation) -> LaneKey:
         """Return the lane of a location as a node of the lane graph."""
-        return LaneKey(place.road, self.roads.road(place.road).section_at(place.s).index, place.lane)
+        return LaneKey(location.road, self.roads.road(location.road).section_at(location.s).index, location.lane)
 
     def rows_at(self, points: Sequence[Point]) -> list[set[int]]:
         """Return the rows in `roads.tables` of all lanes under each point."""
         x, y, z = np.array(points, dtype=float).reshape(-1, 3).T
         rows, _, indices = self.roads.overlapped_lanes(x, y, z)
-        found: list[set[int]] = [set() for _ in points]
+        lanes: list[set[int]] = [set() for _ in points]
         for row, index in zip(rows.tolist(), indices.tolist(), strict=True):
             if self.roads.tables.lane_id[row]:
-                found[index].add(row)
-        return found
+                lanes[index].add(row)
+        return lanes
 
     def are_against(self, points: Sequence[Point], yaw: float) -> list[bool]:
         """Return whether each point is in lanes whose traffic drives against a heading [rad], outside of junctions."""

@@ -77,17 +77,17 @@ REQUIRED = ("DrivenDistanceTest", "MaxVelocityTest", "AverageVelocityTest", "Yie
 def translation(condition: Condition) -> tuple[str, dict[str, Any]] | None:
     """Return the name of the criterion and its settings; None for a class that is not supported."""
     name = condition.name.removeprefix(CRITERION_PREFIX)
-    found = CLASSES.get(name)
-    if found is None:
+    mapping = CLASSES.get(name)
+    if mapping is None:
         return None
-    settings = dict(found.fixed)
+    settings = dict(mapping.fixed)
     by_value = condition.by_value_condition
     parameter = by_value.parameter_condition if by_value is not None else None
     value = parameter.value if parameter is not None else ""
-    if found.arguments and (value or name in REQUIRED):
+    if mapping.arguments and (value or name in REQUIRED):
         argument = parameter.parameter_ref if parameter is not None else ""
-        settings[found.arguments.get(argument, next(iter(found.arguments.values())))] = _number(value)
-    return found.kind, settings
+        settings[mapping.arguments.get(argument, next(iter(mapping.arguments.values())))] = _number(value)
+    return mapping.kind, settings
 
 
 def _number(value: str) -> Any:
@@ -170,9 +170,11 @@ def parse_criteria(
     Raise SettingError with file and line of every error.
     """
     data = load_yaml(text, source=source, line=line)
-    known = key_lines(text, 1 if line is None else line)
+    known_lines = key_lines(text, 1 if line is None else line)
     shown = repr(text.strip())
-    return declare_criteria(data, known, context, source=source, line=line, scope=scope, command=CRITERION, shown=shown)
+    return declare_criteria(
+        data, known_lines, context, source=source, line=line, scope=scope, command=CRITERION, shown=shown
+    )
 
 
 def declare_criteria(
@@ -230,7 +232,7 @@ def build_criteria(declarations: Iterable[CriterionDeclaration], taken: Collecti
 
 
 def _items(
-    entries: list[dict[Any, Any]], known: Mapping[str, int], *, several: bool
+    entries: list[dict[Any, Any]], known_lines: Mapping[str, int], *, several: bool
 ) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
     """Yield kind and settings of each criterion, and the lines of its settings; the empty key has its own line."""
     paths = {
@@ -238,8 +240,8 @@ def _items(
         for index, entry in enumerate(entries)
         for kind, settings in entry.items()
     }
-    lines: dict[str, dict[str, int]] = {path: {"": known[path]} if path in known else {} for path in paths}
-    for key, number in known.items():
+    lines: dict[str, dict[str, int]] = {path: {"": known_lines[path]} if path in known_lines else {} for path in paths}
+    for key, number in known_lines.items():
         for dot in (position for position, character in enumerate(key) if character == "."):
             if key[:dot] in lines:
                 lines[key[:dot]][key[dot + 1 :]] = number
@@ -251,10 +253,10 @@ def _items(
 def _declare(
     kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int], origins: Mapping[str, str]
 ) -> CriterionDeclaration:
-    known = registry("criteria")
-    if kind not in known:
-        raise SettingError(Diagnostic(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
-    criterion_type = known.load(kind, Criterion)
+    criteria = registry("criteria")
+    if kind not in criteria:
+        raise SettingError(Diagnostic(f"unknown criterion {kind!r}", suggestion(kind, criteria), source, line))
+    criterion_type = criteria.load(kind, Criterion)
     settings = {} if settings is None else settings
     if not isinstance(settings, dict):
         fields = criterion_type.settings_type.model_fields.items()
@@ -270,17 +272,17 @@ def _declare(
 def _check_context(criterion: Criterion, context: CriteriaContext, source: str, line: int | None) -> None:
     """Raise SettingError if the scenario lacks what a criterion requires."""
     name = criterion.name
-    for kind, names, known in (
+    for kind, names, declared in (
         ("entity", criterion.subjects, context.entities),
         ("monitor", criterion.monitors, context.monitors),
     ):
-        unknown = [subject for subject in names if known is not None and subject not in known]
+        unknown = [subject for subject in names if declared is not None and subject not in declared]
         if unknown:
             raise SettingError(
                 [
                     Diagnostic(
                         f"criterion {name!r}: unknown {kind} {subject!r}",
-                        suggestion(subject, known) if known else f"the scenario declares no {kind}",
+                        suggestion(subject, declared) if declared else f"the scenario declares no {kind}",
                         source,
                         line,
                     )
@@ -334,7 +336,7 @@ def stop_trigger_declarations(scenario: Scenario) -> list[CriterionDeclaration]:
 
 def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
     """Return warnings about criteria of ScenarioRunner that this engine does not evaluate."""
-    found = []
+    diagnostics = []
     for condition in criteria_of(scenario.storyboard):
         translated = translation(condition)
         name = condition.name.removeprefix(CRITERION_PREFIX)
@@ -347,8 +349,8 @@ def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
         else:
             continue
         message = f"criterion {name!r} is not evaluated"
-        found.append(Diagnostic.at(condition, message, hint))
-    return found
+        diagnostics.append(Diagnostic.at(condition, message, hint))
+    return diagnostics
 
 
 def _lacks_roads(kind: str, scenario: Scenario) -> bool:
@@ -386,7 +388,7 @@ def progress_warnings(
     """
     declared = list(criteria)
     has_exit = any(command.type in EXITS for command in scenario.custom_commands)
-    demanded = any(one.demands_progress and not drivers.isdisjoint(one.subjects) for one in declared)
+    demanded = any(criterion.demands_progress and not drivers.isdisjoint(criterion.subjects) for criterion in declared)
     if not declared or not drivers or has_exit or demanded:
         return ()
     names = " or ".join(sorted(drivers))

@@ -188,11 +188,11 @@ def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
         raise InvalidResult(criterion, "metrics", f"returned {metrics!r} (expected numbers by name)")
     plain: dict[str, float] = {}
     for name, number in metrics.items():
-        found = _plain_number(number)
-        if not isinstance(name, str) or found is None:
+        value = _plain_number(number)
+        if not isinstance(name, str) or value is None:
             text = f"returned {name!r}: {quoted(number)} (expected numbers by name)"
             raise InvalidResult(criterion, "metrics", text)
-        plain[name] = found
+        plain[name] = value
     return plain
 
 
@@ -201,10 +201,10 @@ def _plain_number(number: object) -> float | None:
     if not isinstance(number, int | Real | np.bool_):
         return None
     try:
-        found = float(number)
+        as_float = float(number)
     except OverflowError:
         return None
-    return number if isinstance(number, int) and not isinstance(number, bool) else found
+    return number if isinstance(number, int) and not isinstance(number, bool) else as_float
 
 
 class CriteriaObserver:
@@ -316,13 +316,13 @@ def describe_criteria() -> Iterator[tuple[str, str, str, str]]:
 
     The definition of a criterion that does not load is its class and its error.
     """
-    known = registry("criteria")
-    for name in known:
+    criteria = registry("criteria")
+    for name in criteria:
         try:
-            found: type[Criterion] = known.load(name, Criterion)
-            yield name, found.unit or "-", _settings(found.settings_type), _definition(found)
+            criterion_type: type[Criterion] = criteria.load(name, Criterion)
+            yield name, criterion_type.unit or "-", _settings(criterion_type.settings_type), _definition(criterion_type)
         except EidriveError as error:
-            yield name, "-", "", f"{known.value(name)}: {str(error).splitlines()[0]}"
+            yield name, "-", "", f"{criteria.value(name)}: {str(error).splitlines()[0]}"
 
 
 def _settings(model: type[CriterionSettings]) -> str:
@@ -338,7 +338,7 @@ def _default(field: FieldInfo) -> str:
     return "?" if field.default is None else f": {str(field.default).lower()}"
 
 
-def _definition(found: type[Criterion]) -> str:
+def _definition(criterion_type: type[Criterion]) -> str:
     """Return the first sentence of the documentation of a class."""
-    text = " ".join((inspect.getdoc(found) or "").split("\n\n")[0].split())
+    text = " ".join((inspect.getdoc(criterion_type) or "").split("\n\n")[0].split())
     return text.removeprefix("Criterion that ").split(". ")[0].rstrip(".")

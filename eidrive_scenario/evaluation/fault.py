@@ -88,13 +88,13 @@ def approached_side(before: WorldView, of: str, other: str) -> Side | None:
         (cos * dx + sin * dy, cos * vx + sin * vy, (body[3] + along) / 2.0, ("front", "rear")),
         (cos * dy - sin * dx, cos * vy - sin * vx, (body[4] + across) / 2.0, ("left", "right")),
     )
-    longest, found = 0.0, None
+    longest, side = 0.0, None
     for offset, speed, reach, (positive, negative) in ways:
         gap, closing = abs(offset) - reach, -math.copysign(speed, offset * speed)
         time = gap / closing if closing > 0.0 else 0.0
         if time > longest:
-            longest, found = time, positive if offset > 0.0 else negative
-    return found
+            longest, side = time, positive if offset > 0.0 else negative
+    return side
 
 
 def judge_impact(
@@ -112,8 +112,9 @@ def judge_impact(
         side = approached_side(before, of, other)
     side = side or side_of(view.plain_boxes[row], x, y, partner)
     if _speed(view, before, of) <= STOPPED:
-        place = None if lanes is None else _blocked_place(view, row, lanes)
-        return Impact(side, place is not None, "it had stopped" if place is None else f"it had stopped {place}")
+        obstruction = None if lanes is None else _obstruction(view, row, lanes)
+        reason = "it had stopped" if obstruction is None else f"it had stopped {obstruction}"
+        return Impact(side, obstruction is not None, reason)
     if other not in view.rows or _speed(view, before, other) <= STOPPED:
         return Impact(side, True, "the other one had stopped")
     state, there = view.states[row], view.plain_boxes[view.rows[other]]
@@ -130,7 +131,7 @@ def judge_impact(
     return Impact(side, False, "it was in one lane")
 
 
-def _blocked_place(view: WorldView, row: int, lanes: LaneTracker) -> str | None:
+def _obstruction(view: WorldView, row: int, lanes: LaneTracker) -> str | None:
     """Return the place where a body stands in the way of others, at which it must not stop; None if it does not."""
     body = np.array(view.plain_boxes[row])
     places = points_of_boxes(body[None], BODY_GRID)[0]
@@ -150,7 +151,7 @@ def leaves_lane(view: WorldView, row: int, lanes: LaneTracker) -> bool:
     Left and right corners must share a lane, at the front and at the rear; both ends may be in different lanes.
     """
     drivable = lanes.roads.tables.lane_drivable
-    under = [{lane for lane in found if drivable[lane]} for found in lanes.rows_at(corners(view, row))]
+    under = [{lane for lane in at_corner if drivable[lane]} for at_corner in lanes.rows_at(corners(view, row))]
     front_left, rear_left, rear_right, front_right = under
     return not (front_left & front_right and rear_left & rear_right)
 

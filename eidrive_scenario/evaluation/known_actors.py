@@ -64,7 +64,7 @@ def known_actors(
         boxes = boxes[objects.confidence >= min_confidence]
     others = [row for row, name in enumerate(view.names) if name != station]
     pairs = nearest_pairs(boxes, view.boxes[others].reshape(-1, 7), within)
-    return {view.names[others[place]]: distance for _, place, distance in pairs}
+    return {view.names[others[index]]: distance for _, index, distance in pairs}
 
 
 Point = tuple[float, float]
@@ -147,8 +147,8 @@ class FalseTracks:
 
     def brakings(self, station: str) -> Brakings:
         """Return the brakings of a station."""
-        known = self._stations.get(station)
-        return Brakings(0, 0) if known is None else Brakings(known.brakings, known.without_cause)
+        observed = self._stations.get(station)
+        return Brakings(0, 0) if observed is None else Brakings(observed.brakings, observed.without_cause)
 
     def metrics(self) -> dict[str, float]:
         """Return `false_tracks.NAME.per_minute`, `.brakings` and `.brakings_without_cause` of each station."""
@@ -164,7 +164,7 @@ class FalseTracks:
 def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> Sequence[int]:
     """Return the rows of objects without a true actor within GATE."""
     bodies = view.plain_boxes
-    found = []
+    unmatched = []
     for row, box in enumerate(boxes):
         x, y = box[0], box[1]
         for index, body in enumerate(bodies):
@@ -173,8 +173,8 @@ def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> S
                 break
         else:
             if not any(index != own and _beside(x, y, body) for index, body in enumerate(bodies)):
-                found.append(row)
-    return found
+                unmatched.append(row)
+    return unmatched
 
 
 def _beside(x: float, y: float, body: Sequence[float]) -> bool:

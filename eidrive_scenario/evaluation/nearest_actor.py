@@ -113,18 +113,18 @@ def nearest_pair(
     first, second = (grid.ravel() for grid in np.meshgrid(moving, rows, indexing="ij"))
     centers = np.hypot(boxes[first, 0] - boxes[second, 0], boxes[first, 1] - boxes[second, 1])
     least = np.where(first == second, math.inf, centers - radius[first] - radius[second])
-    found: tuple[float, str, str] | None = None
+    nearest: tuple[float, str, str] | None = None
     near = (least < below).nonzero()[0]
     for index in near[np.argsort(least[near], kind="stable")].tolist():
         if least[index] >= below:
             break
-        one, other = view.names[first[index]], view.names[second[index]]
-        if trailers.get(one) == other or trailers.get(other) == one:
+        name, other = view.names[first[index]], view.names[second[index]]
+        if trailers.get(name) == other or trailers.get(other) == name:
             continue
         gap = box_distance(boxes[first[index]], boxes[second[index]])
         if 0.0 < gap < below:
-            below, found = gap, (gap, one, other)
-    return found
+            below, nearest = gap, (gap, name, other)
+    return nearest
 
 
 def min_time_to_collision(view: WorldView, name: str, limit: float, attached: Collection[str] = ()) -> float:

@@ -57,12 +57,12 @@ class RouteProgress:
         candidates = np.flatnonzero(near)
         nearest = float(away[candidates].min())
         limit = nearest + SAME if self._last is None else nearest
-        row = int(candidates[away[candidates] <= limit][0])
+        index = int(candidates[away[candidates] <= limit][0])
         if self._last is None:  # the nearest point of the first pass near the actor
-            part = candidates[(candidates >= row) & (along[candidates] <= along[row] + BEHIND)]
-            row = int(part[np.argmin(away[part])])
-        self._last = float(along[row])
-        return Place(self._last, float(away[row]))
+            part = candidates[(candidates >= index) & (along[candidates] <= along[index] + BEHIND)]
+            index = int(part[np.argmin(away[part])])
+        self._last = float(along[index])
+        return Place(self._last, float(away[index]))
 
     def forget(self) -> None:
         """Forget the last place, after a teleport: the next one is searched on the whole route."""
@@ -84,8 +84,8 @@ def route_through(points: Sequence[Point], roads: RoadNetwork | None) -> Array:
 
     Between two points without a route over lanes it is straight as well.
     """
-    found = [point for start, end in pairwise(points) for point in _over_lanes(start, end, roads) or (start, end)]
-    return np.array([(point[0], point[1]) for point in found])
+    route = [point for start, end in pairwise(points) for point in _over_lanes(start, end, roads) or (start, end)]
+    return np.array([(point[0], point[1]) for point in route])
 
 
 def _over_lanes(start: Point, end: Point, roads: RoadNetwork | None) -> list[Sequence[float]]:

@@ -42,7 +42,7 @@ class StopLineCrossings:
 
     def __init__(self, roads: RoadNetwork, kind: Kind) -> None:
         self.lines = tuple(line for line in stop_lines(roads) if line.kind == kind)
-        self._places = np.array([(line.x, line.y) for line in self.lines]).reshape(-1, 2)
+        self._positions = np.array([(line.x, line.y) for line in self.lines]).reshape(-1, 2)
         self._pending: list[_Pending] = []
 
     def interrupt(self) -> None:
@@ -53,7 +53,7 @@ class StopLineCrossings:
         """Return the stop lines within a distance of a point in x and y."""
         if not self.lines:
             return []
-        rows = np.flatnonzero(np.abs(self._places - point).max(axis=1) <= reach)
+        rows = np.flatnonzero(np.abs(self._positions - point).max(axis=1) <= reach)
         return [self.lines[row] for row in rows.tolist()]
 
     def crossings(self, before: Point, now: Point, heading: float, time: float) -> list[Crossing]:
@@ -61,31 +61,31 @@ class StopLineCrossings:
 
         before, now  position of the point in the previous frame and in this one; heading  of the actor [rad]
         """
-        found = self._decide(before, now)
+        crossings = self._decide(before, now)
         for line in self.near(now):
             if not crosses(line, before, now, heading):
                 continue
             if line.beyond is None:
-                found.append(Crossing(line.signal, time))
+                crossings.append(Crossing(line.signal, time))
             else:
                 left = math.dist(now, line.beyond) + PAST
                 self._pending.append(_Pending(line, time, left))
-        return list({crossing.signal: crossing for crossing in reversed(found)}.values())
+        return list({crossing.signal: crossing for crossing in reversed(crossings)}.values())
 
     def _decide(self, before: Point, now: Point) -> list[Crossing]:
         """Return the crossings whose route has become certain; drop those of other routes."""
-        found: list[Crossing] = []
+        crossings: list[Crossing] = []
         kept: list[_Pending] = []
         for pending in self._pending:
             assert pending.line.beyond is not None
             left = pending.left - math.dist(before, now)
             if _distance(before, now, pending.line.beyond) <= ON_PATH:
-                found.append(Crossing(pending.line.signal, pending.time))
+                crossings.append(Crossing(pending.line.signal, pending.time))
             elif left > 0.0:
                 kept.append(pending._replace(left=left))
-        decided = {crossing.signal for crossing in found}
+        decided = {crossing.signal for crossing in crossings}
         self._pending = [pending for pending in kept if pending.line.signal not in decided]
-        return found
+        return crossings
 
 
 def crosses(line: StopLine, before: Point, now: Point, heading: float) -> bool:

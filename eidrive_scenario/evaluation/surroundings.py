@@ -68,28 +68,28 @@ class LaneChains:
         self._reach = reach
         self._chains: dict[tuple[LaneKey, int], LaneChain] = {}
 
-    def chain(self, place: LaneLocation, direction: int) -> LaneChain:
+    def chain(self, location: LaneLocation, direction: int) -> LaneChain:
         """Return the chain of the lane of an actor that moves in a direction of s."""
-        road = self._roads.roads[place.road]
-        key = LaneKey(place.road, road.section_at(place.s).index, place.lane)
-        known = self._chains.get((key, direction))
-        if known is None:
-            known = self._chains[key, direction] = self._build(key, direction)
-        return known
+        road = self._roads.roads[location.road]
+        key = LaneKey(location.road, road.section_at(location.s).index, location.lane)
+        chain = self._chains.get((key, direction))
+        if chain is None:
+            chain = self._chains[key, direction] = self._build(key, direction)
+        return chain
 
     def center(self, chain: RoadOfChain, number: str, s: float) -> float:
         """Return t of the center of the chain on one of its roads [m]; beyond its lanes that of the end of the last."""
         road = self._roads.roads[number]
         section = road.section_at(s)
         if section.index not in chain.lanes:
-            section = road.sections[min(chain.lanes, key=lambda known: abs(known - section.index))]
+            section = road.sections[min(chain.lanes, key=lambda candidate: abs(candidate - section.index))]
             s = min(max(s, section.s), section.end)
         return lane_t(road, section, section.lanes[chain.lanes[section.index]], s)[0]
 
     def _build(self, key: LaneKey, direction: int) -> LaneChain:
         first = self._roads.roads[key.road]
         lanes = {key.road: {key.section: key.lane}}
-        places = {key.road: (0.0, direction, first.length)}
+        extents = {key.road: (0.0, direction, first.length)}
         behind: LaneKey | None = key
         while behind is not None:  # the lanes before the actor on its road
             behind = self._next_section(behind, -direction)
@@ -100,15 +100,15 @@ class LaneChains:
             following = self._next_section(last, way)
             if following is None:
                 ways = list(self._roads.links.beyond(last, way))
-                if len(ways) != 1 or ways[0][0].road in places:
+                if len(ways) != 1 or ways[0][0].road in extents:
                     break
                 following, way = ways[0]
                 road = self._roads.roads[following.road]
-                places[following.road], lanes[following.road] = (length, way, road.length), {}
+                extents[following.road], lanes[following.road] = (length, way, road.length), {}
                 length += road.length
             lanes[following.road][following.section] = following.lane
             last = following
-        roads = {number: RoadOfChain(*place, lanes[number]) for number, place in places.items()}
+        roads = {number: RoadOfChain(*extent, lanes[number]) for number, extent in extents.items()}
         return LaneChain(roads, length, *self._sample(roads))
 
     def _next_section(self, key: LaneKey, direction: int) -> LaneKey | None:
@@ -127,7 +127,7 @@ class LaneChains:
     def _sample(self, roads: Mapping[str, RoadOfChain]) -> tuple[Array, Array, Array]:
         """Return distances along the reference lines and along the lanes (N,), and points (N, 2)."""
         tables = self._roads.tables
-        along, rows, places = [], [], []
+        along, rows, positions = [], [], []
         for number, road in roads.items():
             count = max(int(np.ceil(road.length / SPACING)), 1)
             s = np.linspace(0.0, road.length, count + 1)[:: road.direction]
@@ -136,8 +136,8 @@ class LaneChains:
             keys = [LaneKey(number, section.index, self._lane_of(number, section.index, road)) for section in sections]
             borders = np.array([section.s for section in sections[1:]])
             rows.append(np.array([tables.row_of(key) for key in keys])[np.searchsorted(borders, s, side="right")])
-            places.append(s)
-        at_row, at_s = np.concatenate(rows), np.concatenate(places)
+            positions.append(s)
+        at_row, at_s = np.concatenate(rows), np.concatenate(positions)
         poses = tables.lane_poses(at_row, at_s, np.zeros(len(at_s)))
         points = np.column_stack([poses.x, poses.y])
         steps = np.hypot(*np.diff(points, axis=0).T)
@@ -150,7 +150,7 @@ class LaneChains:
         """Return the lane of the chain in a section, or the one nearest to its lanes in number."""
         if index in road.lanes:
             return road.lanes[index]
-        near = road.lanes[min(road.lanes, key=lambda known: abs(known - index))]
+        near = road.lanes[min(road.lanes, key=lambda candidate: abs(candidate - index))]
         numbers = [lane for lane in self._roads.roads[number].sections[index].lanes if lane]
         same = [lane for lane in numbers if (lane > 0) == (near > 0)] or numbers
         return min(same, key=lambda lane: abs(lane - near))
@@ -253,21 +253,22 @@ class Surroundings:
         if lane is not None:
             near = self._in_reach(view, row, near, *lane)
         for other in near:
-            found = self._relation(view, row, other, lane)
-            if found is not None:
-                yield found
+            relation = self._relation(view, row, other, lane)
+            if relation is not None:
+                yield relation
 
     def leader(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Relation | None:
         """Return the nearest actor ahead in the path of an actor, or None. `to` restricts the candidates."""
-        return min(
-            (found for found in self.relations(view, of, to) if found.leads), key=lambda each: each.gap, default=None
-        )
+        leaders = (relation for relation in self.relations(view, of, to) if relation.leads)
+        return min(leaders, key=lambda leader: leader.gap, default=None)
 
-    def _in_reach(self, view: WorldView, row: int, near: list[int], place: LaneLocation, direction: int) -> list[int]:
+    def _in_reach(
+        self, view: WorldView, row: int, near: list[int], location: LaneLocation, direction: int
+    ) -> list[int]:
         """Return the actors beside the lane and those in the straight path; the others are ignored."""
         assert self._chains is not None
-        chain = self._chains.chain(place, direction)
-        begun = chain.roads[place.road].along(place.s)
+        chain = self._chains.chain(location, direction)
+        begun = chain.roads[location.road].along(location.s)
         first, last = np.searchsorted(chain.along, (begun - 2.0 * BESIDE, begun + RANGE + SPACING)).tolist()
         boxes = view.boxes[near]
         offset = boxes[:, None, :2] - chain.points[first:last:STEP]
@@ -281,20 +282,20 @@ class Surroundings:
         """Return the location of an actor on its lane and its direction in s; None off the road."""
         if self._roads is None:
             return None
-        place, yaw = self._locate(view, row), view.plain_boxes[row][6]
-        if place is None or not self._roads.on_road(place):
+        location, yaw = self._locate(view, row), view.plain_boxes[row][6]
+        if location is None or not self._roads.on_road(location):
             return None
-        heading = self._roads.road_pose_at(place.road, place.s).h
-        return place, 1 if math.cos(yaw - heading) >= 0.0 else -1
+        heading = self._roads.road_pose_at(location.road, location.s).h
+        return location, 1 if math.cos(yaw - heading) >= 0.0 else -1
 
     def _relation(
         self, view: WorldView, row: int, other: int, lane: tuple[LaneLocation, int] | None
     ) -> Relation | None:
         """Return the relation to another actor; None if the road bends away before it."""
-        found = self._straight(view, row, other) if lane is None else self._along_lane(view, row, other, *lane)
-        if found is None:
+        bodies = self._straight(view, row, other) if lane is None else self._along_lane(view, row, other, *lane)
+        if bodies is None:
             return None
-        a, b = found
+        a, b = bodies
         ahead, left = b.along - a.along, b.left - a.left
         return Relation(
             other=view.names[other],
@@ -309,9 +310,9 @@ class Surroundings:
             wrong_way=lane is not None and self._wrong_way(*lane),
         )
 
-    def _wrong_way(self, place: LaneLocation, direction: int) -> bool:
+    def _wrong_way(self, location: LaneLocation, direction: int) -> bool:
         assert self._roads is not None
-        return self._roads.driving_direction(place.road, place.lane) != direction
+        return self._roads.driving_direction(location.road, location.lane) != direction
 
     def _straight(self, view: WorldView, row: int, other: int) -> tuple[_Body, _Body]:
         own, there = view.plain_boxes[row], view.plain_boxes[other]
@@ -320,23 +321,23 @@ class Surroundings:
         return _body(view, row, 0.0, 0.0, yaw), _body(view, other, cos * dx + sin * dy, cos * dy - sin * dx, yaw)
 
     def _along_lane(
-        self, view: WorldView, row: int, other: int, place: LaneLocation, direction: int
+        self, view: WorldView, row: int, other: int, location: LaneLocation, direction: int
     ) -> tuple[_Body, _Body] | None:
         """Return both bodies in the coordinates of the lane."""
         assert self._chains is not None
         own, body = view.plain_boxes[row], view.plain_boxes[other]
         there = self._locate(view, other)
-        chain = self._chains.chain(place, direction)
-        begun = chain.roads[place.road].along(place.s)
+        chain = self._chains.chain(location, direction)
+        begun = chain.roads[location.road].along(location.s)
         road = None if there is None else chain.roads.get(there.road)
         if there is None or road is None:
             distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
             bends_away = there is not None and CLOSE < distance < chain.length - begun
             return None if bends_away else self._straight(view, row, other)
         along = chain.distance(road.along(there.s)) - chain.distance(begun)
-        left = (there.t - self._chains.center(road, there.road, there.s)) * road.direction - place.offset * direction
+        left = (there.t - self._chains.center(road, there.road, there.s)) * road.direction - location.offset * direction
         return (
-            _body(view, row, 0.0, 0.0, self._heading(place, direction)),
+            _body(view, row, 0.0, 0.0, self._heading(location, direction)),
             _body(view, other, along, left, self._heading(there, road.direction)),
         )
 
@@ -344,13 +345,13 @@ class Surroundings:
         assert self._roads is not None
         name = view.names[row]
         x, y, z, *_ = view.plain_boxes[row]
-        place = self._roads.locate_at(x, y, self._hints.get(name), z)
-        self._hints[name] = place
-        return place
+        location = self._roads.locate_at(x, y, self._hints.get(name), z)
+        self._hints[name] = location
+        return location
 
-    def _heading(self, place: LaneLocation, direction: int) -> float:
+    def _heading(self, location: LaneLocation, direction: int) -> float:
         assert self._roads is not None
-        heading = self._roads.road_pose_at(place.road, place.s).h
+        heading = self._roads.road_pose_at(location.road, location.s).h
         return heading if direction > 0 else heading + math.pi
 
 
