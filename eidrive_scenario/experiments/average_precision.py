@@ -153,5 +153,5 @@ def recall_at(matches: Sequence[Matches], objects: int, score: float) -> float:
     """Return the share of objects that detections of at least this score find; NaN without objects."""
     if objects == 0:
         return float("nan")
-    found = sum(int((entry.correct & entry.counted & (entry.scores >= score)).sum()) for entry in matches)
-    return found / objects
+    true_positives = sum(int((entry.correct & entry.counted & (entry.scores >= score)).sum()) for entry in matches)
+    return true_positives / objects

@@ -145,7 +145,7 @@ class _Judge:
         if command.type == CRITERION:
             context = CriteriaContext(has_roads=self._roads is not None)
             declarations = parse_criteria(command.content, context, source=source)
-            self._add(build_criteria(declarations, [one.name for one in self._criteria]))
+            self._add(build_criteria(declarations, [criterion.name for criterion in self._criteria]))
         elif command.type in EXITS:
             self._exit = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)
 
@@ -188,12 +188,12 @@ class _Judge:
         )
 
 
-def _differences(found: Sequence[Verdict], recorded: Sequence[Verdict]) -> list[str]:
+def _differences(judged: Sequence[Verdict], recorded: Sequence[Verdict]) -> list[str]:
     """Return a warning for each verdict that differs from that of the run, for example by another version."""
     earlier = {verdict.name: verdict for verdict in recorded}
     return [
         f"verdict {verdict.name!r} differs from that of the run: {_text(verdict)}, in the run {_text(held)}"
-        for verdict in found
+        for verdict in judged
         if (held := earlier.get(verdict.name)) != verdict
     ]
 

@@ -109,13 +109,13 @@ class JobQueue:
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._waiting: dict[tuple[str, int], deque[int]] = {}
-        for row, job in enumerate(jobs):
-            self._waiting.setdefault((job.scenario, job.seed), deque()).append(row)
+        for index, job in enumerate(jobs):
+            self._waiting.setdefault((job.scenario, job.seed), deque()).append(index)
         self._untouched = deque(self._waiting)
         self._of_worker: dict[int, tuple[str, int]] = {}
 
     def next_job(self, worker: int) -> int | None:
-        """Return the row of the next job of a worker, None if all are started.
+        """Return the index of the next job of a worker, None if all are started.
 
         Without untouched groups, a worker takes jobs of the largest one.
         """
@@ -127,11 +127,11 @@ class JobQueue:
         if group is None:
             return None
         self._of_worker[worker] = group
-        rows = self._waiting[group]
-        row = rows.popleft()
-        if not rows:
+        indices = self._waiting[group]
+        index = indices.popleft()
+        if not indices:
             del self._waiting[group]
-        return row
+        return index
 
     def _largest(self) -> tuple[str, int] | None:
         return max(self._waiting, key=lambda group: len(self._waiting[group]), default=None)
@@ -146,19 +146,19 @@ def _in_processes(jobs: Sequence[J], task: Callable[[J], T], workers: int, end: 
     running: dict[Future[T], tuple[int, int]] = {}
 
     def start(worker: int) -> None:
-        row = queue.next_job(worker)
-        if row is not None:
-            running[pools[worker].submit(task, jobs[row])] = worker, row
+        index = queue.next_job(worker)
+        if index is not None:
+            running[pools[worker].submit(task, jobs[index])] = worker, index
 
     try:
         for worker in range(workers):
             start(worker)
         while running:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                worker, row = running.pop(future)
-                results[row] = end(future.result())
+                worker, index = running.pop(future)
+                results[index] = end(future.result())
                 start(worker)
-        return tuple(results[row] for row in range(len(jobs)))
+        return tuple(results[index] for index in range(len(jobs)))
     except BrokenProcessPool as error:
         raise SimulationError("a worker process died; run with one worker to see the error") from error
     finally:

@@ -45,8 +45,8 @@ def record_mode(value: bool | str) -> RecordMode:
     try:
         return RecordMode(value)
     except ValueError:
-        known = ", ".join(mode.value for mode in RecordMode)
-        raise SettingError(Diagnostic(f"record is {value!r}", f"give one of {known}")) from None
+        modes = ", ".join(mode.value for mode in RecordMode)
+        raise SettingError(Diagnostic(f"record is {value!r}", f"give one of {modes}")) from None
 
 
 def run_and_save(

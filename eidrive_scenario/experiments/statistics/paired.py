@@ -104,8 +104,8 @@ def _margins(deviation: float, left_out: Array, confidence: float) -> tuple[floa
     return deviation * (1.0 - _exponential(-half_width)), deviation * (_exponential(half_width) - 1.0)
 
 
-def _combined(one: float, other: float, correlation: float) -> float:
-    return math.sqrt(max(0.0, one**2 + other**2 - 2.0 * correlation * one * other))
+def _combined(first: float, second: float, correlation: float) -> float:
+    return math.sqrt(max(0.0, first**2 + second**2 - 2.0 * correlation * first * second))
 
 
 def _exponential(logarithm: float) -> float:

@@ -122,8 +122,8 @@ def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
 
 def check_different(axes: Sequence[Axis]) -> None:
     """Raise SettingError if two axes have one name."""
-    for row, axis in enumerate(axes):
-        if axis_identity(axis.name) in [axis_identity(other.name) for other in axes[:row]]:
+    for index, axis in enumerate(axes):
+        if axis_identity(axis.name) in [axis_identity(other.name) for other in axes[:index]]:
             raise _error(axis.name, "the axis is given twice")
 
 
@@ -267,7 +267,9 @@ def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = 
         source = load_distribution(scenario).scenario if is_distribution else scenario
         declared = load_scenario(source).document.parameter_declarations
         if declared is not None:
-            names = {one.name for one in declared.parameter_declaration if one.parameter_type in _WHOLE}
+            names = {
+                parameter.name for parameter in declared.parameter_declaration if parameter.parameter_type in _WHOLE
+            }
     return tuple(_typed_axis(axis, names) for axis in axes)
 
 

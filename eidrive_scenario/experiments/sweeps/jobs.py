@@ -52,7 +52,7 @@ def digest_of(scenario: Path, resolved: ResolvedSettings) -> str:
     """Return the digest of the file of a scenario or distribution, and of the inputs among resolved settings."""
     inputs = resolved.as_json()
     content = {name: inputs[name] for name in _INPUTS}
-    content |= {"file": sha256_of(scenario.read_bytes()), "code": [_code(one) for one in resolved.extensions.values()]}
+    content |= {"file": sha256_of(scenario.read_bytes()), "code": list(map(_code, resolved.extensions.values()))}
     return sha256_of(canonical_json(content).encode())
 
 
@@ -138,18 +138,18 @@ def _contents_of_runs(scenario: Path, runs: Iterable[int], settings: RunSettings
     expansion = load_distribution(scenario)
     texts = {}
     for number in runs:
-        named = tuple(one for one in expansion[number].parameters.items() if not is_number(one[1]))
+        named = tuple(parameter for parameter in expansion[number].parameters.items() if not is_number(parameter[1]))
         if named:
             texts[number] = named
     with_text: dict[tuple[str, str], list[int]] = {}
     for number, named in texts.items():
-        for one in named:
-            tried = with_text.setdefault(one, [])
+        for parameter in named:
+            tried = with_text.setdefault(parameter, [])
             if len(tried) < MOST_TRIED:
                 tried.append(number)
-    digests = {one: _first_valid(scenario, numbers, settings) for one, numbers in with_text.items()}
+    digests = {parameter: _first_valid(scenario, numbers, settings) for parameter, numbers in with_text.items()}
     return {
-        (RUN, number): sha256_of(canonical_json([digests[one] for one in named]).encode())
+        (RUN, number): sha256_of(canonical_json([digests[parameter] for parameter in named]).encode())
         for number, named in texts.items()
     }
 
@@ -247,7 +247,7 @@ class SweepPlan:
         """Return a run at a point, which need not be one of the plan."""
         settings = settings_at(without_run(point), self.settings, self.profile)
         run = int(point[RUN]) if RUN in point else None
-        contents = {name: found for name in point if (found := self.contents.get((name, point[name]))) is not None}
+        contents = {name: digest for name in point if (digest := self.contents.get((name, point[name]))) is not None}
         inputs = {"inputs": self.inputs, "contents": contents}
         content = {**inputs, "run": run, "seed": seed, "settings": _plain(settings)}
         return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
@@ -340,10 +340,10 @@ def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunS
         raise SettingError(Diagnostic(f"--vary: {RUN!r} is the number of a run of a distribution", hint))
     given = dict.fromkeys(settings.parameters, "--param")
     given |= {name.removeprefix(PARAMETER): "--vary" for name in names if not is_setting(name)}
-    for name, place in load_distribution(scenario).varied.names.items() if is_distribution else ():
+    for name, element in load_distribution(scenario).varied.names.items() if is_distribution else ():
         if name in given:
             text = f"{given[name]}: the distribution varies parameter {name!r}"
-            raise SettingError(Diagnostic.at(place, text, "remove the option"))
+            raise SettingError(Diagnostic.at(element, text, "remove the option"))
 
 
 def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:

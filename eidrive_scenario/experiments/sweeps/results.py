@@ -148,14 +148,14 @@ def mixed_versions(runs: Iterable[StoredRun]) -> str:
 
     A store has runs of one version of the engine, but combined stores and packages of extensions may differ.
     """
-    found: dict[str, dict[str, int]] = {}
+    packages: dict[str, dict[str, int]] = {}
     for run in runs:
         for name, version in _part_of_settings(run, _Versions).versions.items():
-            counts = found.setdefault(name, {})
+            counts = packages.setdefault(name, {})
             counts[version] = counts.get(version, 0) + 1
     texts = [
         f"{name} {', '.join(f'{version} ({count})' for version, count in sorted(counts.items()))}"
-        for name, counts in sorted(found.items())
+        for name, counts in sorted(packages.items())
         if len(counts) > 1
     ]
     return f"the success rates mix runs of different versions: {'; '.join(texts)}" if texts else ""
@@ -204,13 +204,13 @@ def summaries(
     if unknown:
         hint = f"expected {', '.join(names)}" if names else "the runs vary by their seeds only"
         raise SettingError(Diagnostic(f"--by: no axis {unknown[0]!r}", hint))
-    found = []
+    summarized = []
     key = _ranks(map(dict, groups))
     for point, counts in sorted(groups.items(), key=lambda group: key(dict(group[0]))):
         trials = counts[PASSED] + counts[FAILED]
         rate = INTERVALS[interval](counts[PASSED], trials, confidence) if trials else None
-        found.append(PointSummary(dict(point), {name: count for name, count in counts.items() if count}, rate))
-    return found
+        summarized.append(PointSummary(dict(point), {name: count for name, count in counts.items() if count}, rate))
+    return summarized
 
 
 def _varied_parameters(run: StoredRun) -> dict[str, Any]:
@@ -249,14 +249,16 @@ def _part_of_settings(run: StoredRun, kind: type[_Part]) -> _Part:
 
 def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:
     """Return the sort key of points: along each axis numbers in ascending order, then texts in order of appearance."""
-    places: dict[str, dict[Any, int]] = {}
+    ranks: dict[str, dict[Any, int]] = {}
     for point in points:
         for name, value in point.items():
-            places.setdefault(name, {}).setdefault(value, len(places[name]))
+            ranks.setdefault(name, {}).setdefault(value, len(ranks[name]))
 
     def key(point: Mapping[str, Any]) -> list[tuple[int, float]]:
-        found = [(held, point.get(name)) for name, held in places.items()]
-        return [(0, value) if isinstance(value, int | float) else (1, held.get(value, -1)) for held, value in found]
+        values = [(rank_of, point.get(name)) for name, rank_of in ranks.items()]
+        return [
+            (0, value) if isinstance(value, int | float) else (1, rank_of.get(value, -1)) for rank_of, value in values
+        ]
 
     return key
 

@@ -21,7 +21,7 @@ from eidrive_scenario.experiments.sweeps.axes import Axis, Point, Scalar
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
 
-PLACES = 241
+BOUNDARIES = 241
 """Number of tested boundaries, over the range and half of its length on either side."""
 WIDTHS = 12
 """Number of tested widths."""
@@ -67,22 +67,22 @@ class BoundarySearch:
             raise ValueError(f"bound: not between 0 and 1 (got {bound})")
         self.low, self.high = low, high
         length = high - low
-        self._places = np.linspace(low - length / 2.0, high + length / 2.0, PLACES)
+        self._boundaries = np.linspace(low - length / 2.0, high + length / 2.0, BOUNDARIES)
         widths = length * np.geomspace(NARROWEST, WIDEST, WIDTHS)
-        place, width, sign, lapse = np.meshgrid(self._places, widths, (-1.0, 1.0), LAPSES, indexing="ij")
+        boundary, width, sign, lapse = np.meshgrid(self._boundaries, widths, (-1.0, 1.0), LAPSES, indexing="ij")
         self._tried = np.linspace(low, high, TRIED)
         # The rate at the boundary is the bound, except for the lapses.
         share = np.clip((bound - lapse / 2.0) / (1.0 - lapse), 1e-6, 1.0 - 1e-6)
-        self._shape = place, width, sign, lapse, logit(share)
+        self._shape = boundary, width, sign, lapse, logit(share)
         self._rates = np.stack([self._rate(x) for x in self._tried])
-        self._log = np.zeros(place.shape)
+        self._log = np.zeros(boundary.shape)
         self.runs = 0
 
     def _rate(self, x: float) -> Array:
         from scipy.special import expit
 
-        place, width, sign, lapse, level = self._shape
-        return np.asarray(lapse / 2.0 + (1.0 - lapse) * expit(sign * (x - place) / width + level))
+        boundary, width, sign, lapse, level = self._shape
+        return np.asarray(lapse / 2.0 + (1.0 - lapse) * expit(sign * (x - boundary) / width + level))
 
     def add(self, x: float, success: bool) -> None:
         """Add the outcome of a run at a value."""
@@ -106,8 +106,8 @@ class BoundarySearch:
         """Return the value with the minimum expected entropy of the boundary, and its likelier outcome."""
         posterior = _normalized(log)
         weighted = self._rates * posterior
-        success = weighted.reshape(TRIED, PLACES, -1).sum(axis=2)
-        total = posterior.reshape(PLACES, -1).sum(axis=1)
+        success = weighted.reshape(TRIED, BOUNDARIES, -1).sum(axis=2)
+        total = posterior.reshape(BOUNDARIES, -1).sum(axis=1)
         rate = success.sum(axis=1)
         entropy = _entropy(success) + _entropy(total[None] - success)
         best = int(np.argmin(entropy))
@@ -116,15 +116,15 @@ class BoundarySearch:
     def estimate(self, confidence: float = 0.95) -> Boundary:
         """Return the estimate with its central credible interval."""
         posterior = _normalized(self._log)
-        marginal = posterior.reshape(PLACES, -1).sum(axis=1)
+        marginal = posterior.reshape(BOUNDARIES, -1).sum(axis=1)
         cumulated = np.cumsum(marginal)
-        step = self._places[1] - self._places[0]
-        ends = self._places + step / 2.0
+        step = self._boundaries[1] - self._boundaries[0]
+        ends = self._boundaries + step / 2.0
         low, middle, high = (
             float(np.interp(share, cumulated, ends))
             for share in ((1.0 - confidence) / 2.0, 0.5, (1.0 + confidence) / 2.0)
         )
-        is_inside = (self._places >= self.low) & (self._places <= self.high)
+        is_inside = (self._boundaries >= self.low) & (self._boundaries <= self.high)
         inside = float(marginal[is_inside].sum())
         rising = float(posterior[:, :, 1].sum())
         value = middle if self.low <= middle <= self.high else math.nan
@@ -178,16 +178,16 @@ def find_boundary(
     while started < runs:
         values = [axis.nearest(value) for value in search.proposals(min(BATCH, runs - started))]
         jobs = [
-            plan.job(started + row, {**plan.points[0], axis.name: value}, started + row + 1)
-            for row, value in enumerate(values)
+            plan.job(started + index, {**plan.points[0], axis.name: value}, started + index + 1)
+            for index, value in enumerate(values)
         ]
-        found = execute(jobs)
+        executed = execute(jobs)
         started += len(jobs)
         verdicts = [
-            (value, run.status == PASSED) for value, run in zip(values, found, strict=True) if _has_verdict(run)
+            (value, run.status == PASSED) for value, run in zip(values, executed, strict=True) if _has_verdict(run)
         ]
         if not verdicts:
-            raise _without_verdict(found)
+            raise _without_verdict(executed)
         for value, passed in verdicts:
             search.add(value, passed)
         boundary = search.estimate()
@@ -239,32 +239,32 @@ def falsify(
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of the options of the sampler
         sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
     study = optuna.create_study(sampler=sampler)
-    found: list[StoredRun] = []
+    executed: list[StoredRun] = []
     different: dict[str, StoredRun] = {}
     failed: list[StoredRun] = []
-    while len(found) < runs:
-        trials = [study.ask(_distributions(optuna, axes)) for _ in range(min(BATCH, runs - len(found)))]
+    while len(executed) < runs:
+        trials = [study.ask(_distributions(optuna, axes)) for _ in range(min(BATCH, runs - len(executed)))]
         jobs = [
-            plan.job(len(found) + row, {**plan.points[0], **_values(axes, trial.params)}, plan.seeds[0])
-            for row, trial in enumerate(trials)
+            plan.job(len(executed) + index, {**plan.points[0], **_values(axes, trial.params)}, plan.seeds[0])
+            for index, trial in enumerate(trials)
         ]
-        rows = execute(jobs)
-        if not any(_has_verdict(row) for row in rows):
-            raise _without_verdict(rows)
-        for trial, row in zip(trials, rows, strict=True):
-            value = _objective(row, objective) if _has_verdict(row) else None
+        batch = execute(jobs)
+        if not any(_has_verdict(run) for run in batch):
+            raise _without_verdict(batch)
+        for trial, run in zip(trials, batch, strict=True):
+            value = _objective(run, objective) if _has_verdict(run) else None
             if value is None:
                 study.tell(trial, state=optuna.trial.TrialState.FAIL)
             else:
                 study.tell(trial, value)
-        found += rows
-        if objective is not None and not any(objective in row.result for row in found):
-            known = sorted({name for row in found for name, value in row.result.items() if _is_number(value)})
-            raise SettingError(Diagnostic(f"--objective: no run has {objective!r}", f"known: {', '.join(known)}"))
-        different = {row.key: row for row in found}
-        failed = [row for row in different.values() if row.status == FAILED]
+        executed += batch
+        if objective is not None and not any(objective in run.result for run in executed):
+            names = sorted({name for run in executed for name, value in run.result.items() if _is_number(value)})
+            raise SettingError(Diagnostic(f"--objective: no run has {objective!r}", f"known: {', '.join(names)}"))
+        different = {run.key: run for run in executed}
+        failed = [run for run in different.values() if run.status == FAILED]
         shown(len(different), len(failed))
-    valued = [(value, row) for row in found if (value := _objective(row, objective)) is not None]
+    valued = [(value, run) for run in executed if (value := _objective(run, objective)) is not None]
     least = min(valued, key=lambda pair: pair[0])[1] if valued else None
     return Falsification(len(different), len(failed), tuple(most_different(failed, axes, shown_failures)), least)
 
@@ -276,29 +276,29 @@ def most_different(runs: Sequence[StoredRun], axes: Sequence[Axis], count: int) 
     """
     if len(runs) <= count:
         return list(runs)
-    places = np.array([_place(run.point, axes) for run in runs])
+    coordinates = np.array([_coordinates(run.point, axes) for run in runs])
     chosen = [0]
-    away = _distances(places, places[0])
+    away = _distances(coordinates, coordinates[0])
     while len(chosen) < count:
         chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, _distances(places, places[chosen[-1]]))
-    return [runs[row] for row in chosen]
+        away = np.minimum(away, _distances(coordinates, coordinates[chosen[-1]]))
+    return [runs[index] for index in chosen]
 
 
-def _place(point: Point, axes: Sequence[Axis]) -> list[float]:
+def _coordinates(point: Point, axes: Sequence[Axis]) -> list[float]:
     """Return the coordinates of a point: one for an interval, one for each value of a list."""
-    found: list[float] = []
+    coordinates: list[float] = []
     for axis in axes:
         value = point[axis.name]
         if axis.is_interval:
-            found.append((float(value) - axis.low) / (axis.high - axis.low))
+            coordinates.append((float(value) - axis.low) / (axis.high - axis.low))
         else:
-            found += [float(value == one) / np.sqrt(2.0) for one in axis.values]
-    return found
+            coordinates += [float(value == other) / np.sqrt(2.0) for other in axis.values]
+    return coordinates
 
 
-def _distances(places: Array, place: Array) -> Array:
-    return np.asarray(np.linalg.norm(places - place, axis=1))
+def _distances(points: Array, point: Array) -> Array:
+    return np.asarray(np.linalg.norm(points - point, axis=1))
 
 
 def _objective(run: StoredRun, name: str | None) -> float | None:

@@ -209,13 +209,13 @@ class ResultStore:
 
     def rows(self, keys: Sequence[str]) -> list[StoredRun]:
         """Return the runs with these keys in their order. Raise KeyError if one is missing."""
-        found = []
+        runs = []
         for key in keys:
             rows = [*self._select("SELECT * FROM runs WHERE key = ?", key)]
             if not rows:
                 raise KeyError(key)
-            found.append(self._run(rows[0]))
-        return found
+            runs.append(self._run(rows[0]))
+        return runs
 
     def _select(self, statement: str, *values: str) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of a query. Raise SettingError if the file is damaged."""
