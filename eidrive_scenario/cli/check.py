@@ -74,17 +74,17 @@ def check(
             print_error(error, "check", path)
             aborted.append(error)
             continue
-        for level, found in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
-            for diagnostic in found:
+        for level, diagnostics in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
+            for diagnostic in diagnostics:
                 if diagnostic not in printed[level]:
                     echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")
-            printed[level].update(dict.fromkeys(found))
+            printed[level].update(dict.fromkeys(diagnostics))
         if isinstance(report, DistributionCheckReport) and report.runs:
             echo(f"{path}: {_count(report.runs, 'run')}")
     print_unused_projects(printed["error"])
     if sarif is not None:
         _write_sarif(sarif, printed, aborted)
-    counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in printed.items())]
+    counts = [_count(len(files), "file"), *(_count(len(diagnostics), level) for level, diagnostics in printed.items())]
     echo(", ".join(counts if printed["note"] else counts[:-1]))
     if aborted:
         raise typer.Exit(ABORTED)
@@ -148,12 +148,12 @@ def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
             except InputError as error:
                 missing += error.diagnostics
             continue
-        found = _files_below(given, SCENARIO_SUFFIX) or _files_below(given, ROADS_SUFFIX)
-        if not found:
+        selected = _files_below(given, SCENARIO_SUFFIX) or _files_below(given, ROADS_SUFFIX)
+        if not selected:
             missing.append(
                 Diagnostic(f"no {SCENARIO_SUFFIX} or {ROADS_SUFFIX} file in {given!r}", "give another folder")
             )
-        yield from found
+        yield from selected
 
 
 def _files_below(folder: str, suffix: str) -> list[Path]:

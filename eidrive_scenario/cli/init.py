@@ -63,7 +63,7 @@ def _package(name: str) -> str:
 
 def _write(source: Traversable, folder: Path, package: str, written: list[Path]) -> None:
     """Write the files of a folder of the template, and append their paths to `written`."""
-    for entry in sorted(source.iterdir(), key=lambda one: one.name):
+    for entry in sorted(source.iterdir(), key=lambda file: file.name):
         if entry.is_dir():
             if entry.name != "__pycache__":
                 _write(entry, folder / entry.name, package, written)
@@ -82,6 +82,6 @@ def _remove(written: list[Path], folder: Path, above: list[Path]) -> None:
         for path in written:
             path.unlink(missing_ok=True)
     below = {parent for path in written for parent in path.parents if folder in parent.parents}
-    for path in (*sorted(below, key=lambda one: -len(one.parts)), *above):
+    for path in (*sorted(below, key=lambda directory: -len(directory.parts)), *above):
         with suppress(OSError):
             path.rmdir()

@@ -69,14 +69,14 @@ def takes_run_options(
         del own["settings"]
         parameters: dict[str, inspect.Parameter] = {}
 
-        def place(name: str) -> None:
+        def add_options_before(name: str) -> None:
             for option in options:
                 if before.get(option.name, at) == name:
-                    place(option.name)
+                    add_options_before(option.name)
                     parameters[option.name] = _parameter(option)
 
         for name, parameter in own.items():
-            place(name)
+            add_options_before(name)
             parameters[name] = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
 
         @wraps(function)

@@ -107,9 +107,9 @@ _CHOICE = re.compile(r"Value error, '(.*)' is not one of (.*)\.", re.DOTALL)
 
 def _restate_choice(error: BaseException) -> None:
     """Replace the message of typer about an unknown value of a list by one with the most similar value."""
-    found = _CHOICE.fullmatch(str(getattr(error, "message", "")))
-    if found is not None:
-        word, choices = found[1], re.findall(r"'([^']*)'", found[2])
+    match = _CHOICE.fullmatch(str(getattr(error, "message", "")))
+    if match is not None:
+        word, choices = match[1], re.findall(r"'([^']*)'", match[2])
         similar = most_similar(word, choices)
         hint = f"known: {', '.join(choices)}" if similar is None else f"did you mean {similar!r}?"
         error.message = f"unknown value {quoted(word)}; {hint}"  # type: ignore[attr-defined]
@@ -147,7 +147,9 @@ def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
     from eidrive_scenario.extensions.registry import GROUPS, singular
 
     unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model"))
-    sources = dict.fromkeys(one.source for one in diagnostics if one.source and one.message.startswith(unknown))
+    sources = dict.fromkeys(
+        diagnostic.source for diagnostic in diagnostics if diagnostic.source and diagnostic.message.startswith(unknown)
+    )
     notices: dict[str, None] = {}
     for path in map(Path, sources):
         if (folder := unused_project(path)) is not None:
@@ -185,8 +187,8 @@ def _attribute(error: BaseException) -> BaseException:
 
     try:
         report_extension(error)
-    except ExtensionError as found:
-        return found
+    except ExtensionError as attributed:
+        return attributed
     return error
 
 

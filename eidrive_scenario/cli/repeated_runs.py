@@ -112,8 +112,8 @@ def decision_code(test: RatioTest, codes: Sequence[int], *, json: bool) -> int |
         return None
     rate = anytime_interval(passed, len(codes), 1.0 - test.false_pass)
     if json:
-        found = {"at_least": test.bad, "decision": str(decision), "passed": passed, "runs": len(codes)}
-        echo(json_text.dumps({"success_rate": {**found, "low": rate.low, "high": rate.high}}))
+        numbers = {"at_least": test.bad, "decision": str(decision), "passed": passed, "runs": len(codes)}
+        echo(json_text.dumps({"success_rate": {**numbers, "low": rate.low, "high": rate.high}}))
     else:
         echo(decision_text(test, decision, rate))
     return PASSED if decision is Decision.PASSED else FAILED

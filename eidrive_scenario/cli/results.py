@@ -49,56 +49,55 @@ def results(
     if not 0.0 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
     check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
-    found = list(stored_runs(stores))
+    runs = list(stored_runs(stores))
     names = None if by is None else [name.strip() for name in by.split(",")]
-    rows = summaries(found, by=names, interval=interval, confidence=confidence)
-    mixed = (indistinct(found), mixed_versions(found))
-    warnings = (*(f"{one}; a new store keeps them apart" for one in mixed if one), warned(found))
+    points = summaries(runs, by=names, interval=interval, confidence=confidence)
+    mixed = (indistinct(runs), mixed_versions(runs))
+    warnings = (*(f"{text}; a new store keeps them apart" for text in mixed if text), warned(runs))
     print_warnings([warning for warning in warnings if warning])
     if csv is not None:
-        write_csv(found, csv)
+        write_csv(runs, csv)
     if parquet is not None:
-        write_parquet(found, parquet)
+        write_parquet(runs, parquet)
     if json:
-        for row in rows:
-            echo(json_text.dumps(_as_json(row)))
+        for point in points:
+            echo(json_text.dumps(_as_json(point)))
     elif failures:
-        for run in found:
+        for run in runs:
             if run.status != PASSED_RUN:
                 echo(f"{run.status}: {run.command or f'{run.scenario}, run {run.run}, seed {run.seed}'}")
                 if run.error:
                     echo("  " + run.error.replace("\n", "\n  "))
     else:
-        _print_table(rows, interval, confidence)
+        _print_table(points, interval, confidence)
 
 
-def _as_json(row: PointSummary) -> dict[str, object]:
-    rate = row.rate
+def _as_json(summary: PointSummary) -> dict[str, object]:
+    rate = summary.rate
     limits = {} if rate is None else {"success_rate": rate.share, "low": rate.low, "high": rate.high}
-    return {"point": dict(row.point), "runs": dict(row.counts), **limits}
+    return {"point": dict(summary.point), "runs": dict(summary.counts), **limits}
 
 
-def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float) -> None:
+def _print_table(summaries: Sequence[PointSummary], interval: str, confidence: float) -> None:
     from rich.table import Table
 
     from eidrive_scenario.cli.console import console
 
-    axes = list(dict.fromkeys(name for row in rows for name in row.point))
-    statuses = [
-        status for status in dict.fromkeys(status for row in rows for status in row.counts) if status != "passed"
-    ]
+    axes = list(dict.fromkeys(name for summary in summaries for name in summary.point))
+    counted = dict.fromkeys(status for summary in summaries for status in summary.counts)
+    statuses = [status for status in counted if status != "passed"]
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in axes:
         table.add_column(name, overflow="fold")
     for name in ("runs", "passed", *statuses, "success rate", f"{confidence:.0%} {interval}"):
         table.add_column(name, justify="right")
-    for row in rows:
-        rate = row.rate
+    for summary in summaries:
+        rate = summary.rate
         table.add_row(
-            *(_short(row.point.get(name, "")) for name in axes),
-            str(sum(row.counts.values())),
-            str(row.counts.get("passed", 0)),
-            *(str(row.counts.get(status, 0)) for status in statuses),
+            *(_short(summary.point.get(name, "")) for name in axes),
+            str(sum(summary.counts.values())),
+            str(summary.counts.get("passed", 0)),
+            *(str(summary.counts.get(status, 0)) for status in statuses),
             "" if rate is None else f"{rate.share:.1%}",
             "" if rate is None else f"{rate.low:.1%} to {rate.high:.1%}",
         )
@@ -173,8 +172,8 @@ def compare(
         hint = "give two, or --between NAME, such as --between channel, for the values of an axis"
         raise SettingError(Diagnostic(f"the number of stores is {len(stores)}", hint))
     if json:
-        for one in comparisons:
-            echo(json_text.dumps(as_json(one)))
+        for named in comparisons:
+            echo(json_text.dumps(as_json(named)))
     elif markdown:
         echo(as_markdown(comparisons))
     else:
@@ -183,5 +182,7 @@ def compare(
     if html is not None:
         write_comparison(comparisons, html)
         echo(str(html), err=json or markdown)
-    is_not_worse = all(one.comparison is not None and one.comparison.conclusion == NOT_WORSE for one in comparisons)
+    is_not_worse = all(
+        named.comparison is not None and named.comparison.conclusion == NOT_WORSE for named in comparisons
+    )
     raise typer.Exit(PASSED if is_not_worse else FAILED)

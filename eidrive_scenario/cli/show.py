@@ -81,8 +81,8 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
 
         lines = _columns([(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()])
     else:
-        known = registry(what.value)
-        lines = _columns([(name, known.value(name)) for name in known])
+        extensions = registry(what.value)
+        lines = _columns([(name, extensions.value(name)) for name in extensions])
     for line in lines:
         echo(line)
 

@@ -125,27 +125,27 @@ class Search:
         if self.boundary is None:
             self._falsify(plan, execute)
             return
-        found = find_boundary(
+        boundary = find_boundary(
             plan,
             self.boundary,
             execute,
             bound=self.bound,
             tolerance=self.tolerance,
             runs=self.runs,
-            shown=lambda one: echo(_estimate(one), err=True),
+            shown=lambda boundary: echo(_estimate(boundary), err=True),
         )
         name = self.boundary.name
-        if math.isnan(found.value) or found.inside < 0.5:
-            echo(f"{name}: the success rate does not cross {self.bound:g} in the range ({found.runs} runs)")
+        if math.isnan(boundary.value) or boundary.inside < 0.5:
+            echo(f"{name}: the success rate does not cross {self.bound:g} in the range ({boundary.runs} runs)")
             return
-        change = "rises" if found.rising > 0.5 else "falls"
+        change = "rises" if boundary.rising > 0.5 else "falls"
         echo(
-            f"{name}: the success rate {change} through {self.bound:g} at {found.value:.4g} "
-            f"(95 %: {found.low:.4g} to {found.high:.4g}; {found.runs} runs)"
+            f"{name}: the success rate {change} through {self.bound:g} at {boundary.value:.4g} "
+            f"(95 %: {boundary.low:.4g} to {boundary.high:.4g}; {boundary.runs} runs)"
         )
 
     def _falsify(self, plan: SweepPlan, execute: Execute) -> None:
-        found = falsify(
+        falsification = falsify(
             plan,
             self.space,
             execute,
@@ -153,15 +153,15 @@ class Search:
             objective=self.objective,
             shown=lambda done, failed: echo(f"{done} runs, {failed} failed", err=True),
         )
-        echo(f"{found.failed} of {found.runs} runs failed")
-        for run in found.failures:
+        echo(f"{falsification.failed} of {falsification.runs} runs failed")
+        for run in falsification.failures:
             echo(run.command)
-        if not found.failures and found.least is not None:
-            echo(f"nearest to a failure: {found.least.command}")
+        if not falsification.failures and falsification.least is not None:
+            echo(f"nearest to a failure: {falsification.least.command}")
 
 
-def _estimate(one: Boundary) -> str:
-    return f"{one.runs} runs: {one.low:.4g} to {one.high:.4g}"
+def _estimate(boundary: Boundary) -> str:
+    return f"{boundary.runs} runs: {boundary.low:.4g} to {boundary.high:.4g}"
 
 
 INTERVAL = 30.0
