@@ -72,18 +72,18 @@ def describe_scenarios() -> list[LibraryScenario]:
 
 def _description(path: Path) -> str:
     """Return the description in the FileHeader of a scenario without line breaks and control characters."""
-    found: list[str] = []
+    descriptions: list[str] = []
 
     def visit(_: int, tag: str, attributes: Mapping[str, str]) -> bool:
         if tag == "FileHeader":
-            found.append(attributes.get("description", ""))
-        return bool(found)
+            descriptions.append(attributes.get("description", ""))
+        return bool(descriptions)
 
     try:
         first_elements(read_regular_file(path, _MAX_BYTES), _MAX_ELEMENTS, visit)
     except (OSError, ValueError):  # a file without a header that is damaged further on
         return ""
-    return "".join(letter for letter in " ".join("".join(found).split()) if letter.isprintable())
+    return "".join(letter for letter in " ".join("".join(descriptions).split()) if letter.isprintable())
 
 
 def resolve_scenario(name: str | Path) -> Path:
@@ -194,17 +194,17 @@ def definition(path: Path) -> Definition:
         "Entities": "scenario",
         "Storyboard": "scenario",
     }
-    found: list[Definition] = []
+    definitions: list[Definition] = []
 
     def visit(depth: int, tag: str, _: Mapping[str, str]) -> bool:
         if depth == 1 and tag != "OpenSCENARIO":
-            found.append("roads" if tag == "OpenDRIVE" else "other")
+            definitions.append("roads" if tag == "OpenDRIVE" else "other")
         elif depth == 2 and tag in kinds:
-            found.append(kinds[tag])
-        return bool(found)
+            definitions.append(kinds[tag])
+        return bool(definitions)
 
     try:
         content = read_regular_file(path, _MAX_BYTES)
-        return found[0] if first_elements(content, _MAX_ELEMENTS, visit) else "scenario"
+        return definitions[0] if first_elements(content, _MAX_ELEMENTS, visit) else "scenario"
     except (OSError, ValueError):
         return "unreadable"

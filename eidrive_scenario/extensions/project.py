@@ -92,7 +92,7 @@ def conftest_above(path: Path) -> Path | None:
     """Return the nearest `conftest.py` in the folder of a file or above, or None."""
     try:
         folder = path.absolute().parent
-        return next((file for one in (folder, *folder.parents) if (file := one / "conftest.py").is_file()), None)
+        return next((file for above in (folder, *folder.parents) if (file := above / "conftest.py").is_file()), None)
     except (OSError, ValueError):
         return None
 
@@ -125,18 +125,18 @@ def entry_points_of(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
     content = _table(path) or {}
     folders = _texts(path, content, "pythonpath", 'write a list of folders, such as ["."]')
     groups = content.get("project", {}).get("entry-points", {})
-    found: dict[str, tuple[EntryPoint, ...]] = {}
+    by_group: dict[str, tuple[EntryPoint, ...]] = {}
     for group, points in groups.items() if isinstance(groups, dict) else ():
         if not group.startswith(_GROUP) or not isinstance(points, dict):
             continue
         for name, value in points.items():
             if not isinstance(value, str) or ":" not in value or EntryPoint.pattern.match(value) is None:
                 raise _error(path, f"entry point {name}: {quoted(str(value))}", "write package.module:Object")
-        found[group.removeprefix(_GROUP)] = tuple(EntryPoint(name, value, group) for name, value in points.items())
+        by_group[group.removeprefix(_GROUP)] = tuple(EntryPoint(name, value, group) for name, value in points.items())
     for entry in reversed(folders):
-        if (place := str((folder / entry).resolve())) not in sys.path:
-            sys.path.insert(0, place)
-    return found
+        if (directory := str((folder / entry).resolve())) not in sys.path:
+            sys.path.insert(0, directory)
+    return by_group
 
 
 @cache
@@ -153,10 +153,10 @@ def modules_of(folder: Path) -> tuple[str, ...]:
 
 def _texts(path: Path, content: dict[str, Any], name: str, hint: str) -> list[str]:
     """Return a list of texts in the table `tool.eidrive`. Raise SettingError for another value."""
-    found = content.get("tool", {}).get("eidrive", {}).get(name, [])
-    if not isinstance(found, list) or not all(isinstance(entry, str) for entry in found):
-        raise _error(path, f"tool.eidrive.{name}: {quoted(str(found))}", hint)
-    return found
+    texts = content.get("tool", {}).get("eidrive", {}).get(name, [])
+    if not isinstance(texts, list) or not all(isinstance(entry, str) for entry in texts):
+        raise _error(path, f"tool.eidrive.{name}: {quoted(str(texts))}", hint)
+    return texts
 
 
 def _table(path: Path) -> dict[str, Any] | None:

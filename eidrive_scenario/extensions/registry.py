@@ -56,10 +56,10 @@ class Registry:
     An extension is imported on its first use. Raise RegistryError if two extensions have the same name.
     """
 
-    def __init__(self, kind: str, found: list[EntryPoint] | None = None) -> None:
+    def __init__(self, kind: str, points: list[EntryPoint] | None = None) -> None:
         self.kind = kind
         self._points: dict[str, EntryPoint] = {}
-        for point in _declared(kind) if found is None else found:
+        for point in _declared(kind) if points is None else points:
             other = self._points.get(point.name)
             if other is not None and other.value != point.value:
                 raise RegistryError(
@@ -153,8 +153,8 @@ def _declared(kind: str) -> tuple[EntryPoint, ...]:
 @cache
 def _installed(folders: tuple[str, ...]) -> dict[str, tuple[EntryPoint, ...]]:
     """Return the entry points of all packages in the folders of `sys.path` by kind; each file is read once."""
-    found = entry_points()
-    return {kind: tuple(found.select(group=f"eidrive_scenario.{kind}")) for kind in GROUPS}
+    installed = entry_points()
+    return {kind: tuple(installed.select(group=f"eidrive_scenario.{kind}")) for kind in GROUPS}
 
 
 _registries: dict[str, Registry] = {}
@@ -239,8 +239,8 @@ def use_project(folder: str) -> None:
 
 def distributions(used: Iterable[tuple[str, str]]) -> dict[str, str]:
     """Return the distributions of third-party extensions by `group.name`, of these pairs of group and name."""
-    found = {f"{kind}.{name}": registry(kind).distribution(name) for kind, name in sorted(used)}
-    return {name: distribution for name, distribution in found.items() if distribution is not None}
+    by_extension = {f"{kind}.{name}": registry(kind).distribution(name) for kind, name in sorted(used)}
+    return {name: distribution for name, distribution in by_extension.items() if distribution is not None}
 
 
 def singular(kind: str) -> str:
@@ -261,18 +261,18 @@ def construct(extension_class: Any, *arguments: Any, **keywords: Any) -> Any:
 def third_party_files() -> dict[str, dict[str, Registration]]:
     """Return the registrations of loaded third-party extensions, by file and qualified name of their classes."""
     files: dict[str, dict[str, Registration]] = {}
-    for extension_class, known in _loaded.items():
+    for extension_class, registered in _loaded.items():
         file = getattr(sys.modules.get(extension_class.__module__), "__file__", None)
         if file is not None and not is_built_in(extension_class):
-            files.setdefault(file, {})[extension_class.__qualname__] = known
+            files.setdefault(file, {})[extension_class.__qualname__] = registered
     return files
 
 
 def registration(extension_class: type) -> Registration | None:
     """Return the registration of a class or of its nearest loaded base class, or None."""
-    for one in extension_class.__mro__:
-        if one in _loaded:
-            return _loaded[one]
+    for base in extension_class.__mro__:
+        if base in _loaded:
+            return _loaded[base]
     return None
 
 
@@ -283,7 +283,7 @@ def is_built_in(extension_class: type) -> bool:
 
 def _signature_mismatches(extension_class: type) -> Iterator[str]:
     """Yield methods of a third-party class that cannot be called like the methods that they override."""
-    bases = [one for one in extension_class.__mro__ if is_built_in(one)]
+    bases = [base for base in extension_class.__mro__ if is_built_in(base)]
     for own_class in extension_class.__mro__:
         if own_class in bases:
             continue

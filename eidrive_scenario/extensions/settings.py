@@ -74,14 +74,14 @@ def validate_nested(model: type[S], data: Any) -> S:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found: list[InitErrorDetails] = []
-        for one in error.errors(include_url=False):
-            details = InitErrorDetails(type=one["type"], loc=one["loc"], input=one["input"], ctx=one.get("ctx", {}))
-            if one["type"] == "extra_forbidden" and "hint" not in details["ctx"]:
-                hint = suggestion(str(one["loc"][-1]), _known_keys(model, one["loc"][:-1]))
+        errors: list[InitErrorDetails] = []
+        for raw in error.errors(include_url=False):
+            details = InitErrorDetails(type=raw["type"], loc=raw["loc"], input=raw["input"], ctx=raw.get("ctx", {}))
+            if raw["type"] == "extra_forbidden" and "hint" not in details["ctx"]:
+                hint = suggestion(str(raw["loc"][-1]), _known_keys(model, raw["loc"][:-1]))
                 details["type"] = PydanticCustomError("extra_forbidden", "unknown setting", {"hint": hint})
-            found.append(details)
-        raise ValidationError.from_exception_data(error.title, found) from None
+            errors.append(details)
+        raise ValidationError.from_exception_data(error.title, errors) from None
 
 
 def _diagnostic(
@@ -166,16 +166,16 @@ def _typed_path(loc: tuple[int | str, ...], data: Any) -> str:
 
     Parts that only pydantic adds are omitted: the types of a union, and a kind that equals the key before it.
     """
-    found: list[str] = []
+    keys: list[str] = []
     for part in loc:
         is_key = (
             part in data if isinstance(data, Mapping) else isinstance(data, (list, tuple)) and isinstance(part, int)
         )
-        if is_key or (isinstance(data, Mapping) and str(part) not in found[-1:]):
-            found.append(str(part))
+        if is_key or (isinstance(data, Mapping) and str(part) not in keys[-1:]):
+            keys.append(str(part))
         if is_key and (isinstance(data, Mapping) or int(part) < len(data)):
             data = data[part]
-    return ".".join(found)
+    return ".".join(keys)
 
 
 def _line_of(loc: tuple[int | str, ...], lines: Mapping[str, int], line: int | None) -> int | None:
@@ -240,11 +240,11 @@ def settings_type_of(kind: str, name: str, extension: object, base: type[E]) -> 
 
     kind, name  registry and registered name of the extension
     """
-    found = getattr(extension, "settings_type", None)
-    if isinstance(found, type) and issubclass(found, base):
-        return found
+    declared = getattr(extension, "settings_type", None)
+    if isinstance(declared, type) and issubclass(declared, base):
+        return declared
     described = registry(kind).describe(name)
-    raise RegistryError(f"{described}: settings_type is {found!r} (expected a class derived from {base.__name__})")
+    raise RegistryError(f"{described}: settings_type is {declared!r} (expected a class derived from {base.__name__})")
 
 
 def optional_settings_type(kind: str, name: str, extension: object) -> type[Settings] | None:
@@ -291,11 +291,11 @@ def validate_by_kind(
 
     Raise ValidationError if the name is unknown or the settings are invalid.
     """
-    known, name = registry(kind), value.get("kind")
-    if not (isinstance(name, str) and name in known):
-        hint = suggestion(str(name), [*known, *also])
+    extensions, name = registry(kind), value.get("kind")
+    if not (isinstance(name, str) and name in extensions):
+        hint = suggestion(str(name), [*extensions, *also])
         error = PydanticCustomError("value_error", "{hint}", {"hint": hint})
         raise ValidationError.from_exception_data(
             base.__name__, [InitErrorDetails(type=error, loc=("kind",), input=name)]
         )
-    return validate_nested(settings_type_of(kind, name, known.load(name, extension_base), base), value)
+    return validate_nested(settings_type_of(kind, name, extensions.load(name, extension_base), base), value)
