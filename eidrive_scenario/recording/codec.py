@@ -152,5 +152,5 @@ def _required_by_field(kind: type) -> dict[str, bool]:
     """Return the fields of a record in order, and whether each one has no default."""
     if issubclass(kind, msgspec.Struct):
         return {field.name: field.required for field in msgspec.structs.fields(kind)}
-    found = fields(kind)  # type: ignore[arg-type]
-    return {field.name: field.default is MISSING and field.default_factory is MISSING for field in found}
+    record_fields = fields(kind)  # type: ignore[arg-type]
+    return {field.name: field.default is MISSING and field.default_factory is MISSING for field in record_fields}

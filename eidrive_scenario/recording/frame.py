@@ -60,11 +60,11 @@ class Frame(msgspec.Struct, frozen=True):
         """Return the other bodies of the road train of an actor: its trailers, and the vehicles that tow it."""
         if not self.trailers:
             return frozenset()
-        found, added = {name}, {name}
+        road_train, added = {name}, {name}
         while added:
-            added = {other for pair in self.trailers.items() if added & {*pair} for other in pair} - found
-            found |= added
-        return frozenset(found - {name})
+            added = {other for pair in self.trailers.items() if added & {*pair} for other in pair} - road_train
+            road_train |= added
+        return frozenset(road_train - {name})
 
 
 MAX_TIME = 1e9

@@ -77,10 +77,10 @@ class _ArrayTexts:
         """Return a value of a type that msgspec does not support as one that it supports."""
         if type(value) is not np.ndarray:
             return _plain(value)
-        found = self._in_record.get(id(value))
-        if found is None:
-            found = self._in_record[id(value)] = value, self._text(value)
-        return found[1]
+        stored = self._in_record.get(id(value))
+        if stored is None:
+            stored = self._in_record[id(value)] = value, self._text(value)
+        return stored[1]
 
     def _text(self, value: Array) -> msgspec.Raw:
         if value.size > _LARGEST or value.dtype.hasobject:
@@ -114,11 +114,11 @@ def _check(kind: Any) -> Check | None:
     if kind is float:
         return isfinite
     if origin in (Union, types.UnionType):
-        return _optional(next((found for one in arguments if (found := _check(one)) is not None), None))
+        return _optional(next((check for argument in arguments if (check := _check(argument)) is not None), None))
     if origin is frozenset:
         raise TypeError(f"{kind!r}: the order of its members is undefined")
     if origin is tuple and arguments[-1] is not Ellipsis:
-        checks = [_check(one) for one in arguments]
+        checks = [_check(argument) for argument in arguments]
         return None if not any(checks) else lambda values: _all(checks, values)
     if origin in (tuple, Sequence):
         return _several(_check(arguments[0]))
@@ -146,10 +146,10 @@ def _record(kind: type) -> Check | None:
     """Return the check of a record, which reads only the fields with numbers."""
     hints = get_type_hints(kind)
     names = msgspec.structs.fields(kind) if issubclass(kind, msgspec.Struct) else fields(kind)  # type: ignore[arg-type]
-    found = [(field.name, check) for field in names if (check := _check(hints[field.name])) is not None]
-    numbers = [name for name, check in found if check is isfinite]
-    others = [(attrgetter(name), check) for name, check in found if check is not isfinite]
-    if not found:
+    checks = [(field.name, check) for field in names if (check := _check(hints[field.name])) is not None]
+    numbers = [name for name, check in checks if check is isfinite]
+    others = [(attrgetter(name), check) for name, check in checks if check is not isfinite]
+    if not checks:
         return None
     several = attrgetter(*numbers) if len(numbers) > 1 else None
     first = attrgetter(numbers[0]) if len(numbers) == 1 else None

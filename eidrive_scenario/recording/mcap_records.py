@@ -127,13 +127,13 @@ class McapFile:
                 return
             opcode, length = _HEAD.unpack(head)
             if opcode not in _KNOWN or offset + _HEAD.size + length > self._size:
-                found = self._next_chunk(offset + 1)
-                if found is None:
+                next_chunk = self._next_chunk(offset + 1)
+                if next_chunk is None:
                     self._damage.add("the rest of the file contains no readable record", f"from byte {offset} on")
                     return
-                self._damage.add("bytes do not form a record", f"{offset} to {found}")
+                self._damage.add("bytes do not form a record", f"{offset} to {next_chunk}")
                 sums.broken = True
-                offset = found
+                offset = next_chunk
                 continue
             if length > LARGEST_RECORD:
                 self._damage.add(f"a record is larger than {LARGEST_RECORD // 2**20} MiB", f"byte {offset}")

@@ -191,9 +191,9 @@ class _Reading:
 
     def finish(self, path: Path) -> Recording:
         """Return the recording. Raise InputError if package or format differ."""
-        found = self._metadata.get("format")
-        if found not in READABLE and (found is not None or not self._seal.frames):
-            got = "no format" if found is None else f"format {found[:20]!r}"
+        recorded_format = self._metadata.get("format")
+        if recorded_format not in READABLE and (recorded_format is not None or not self._seal.frames):
+            got = "no format" if recorded_format is None else f"format {recorded_format[:20]!r}"
             message = f"not a recording of this version of eidrive (got {got}; expected format {FORMAT!r})"
             raise InputError(Diagnostic(message, "give a recording that this version wrote", str(path)))
         self._check_seal()

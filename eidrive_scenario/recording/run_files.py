@@ -28,8 +28,8 @@ def recording_in(location: Path) -> Path:
     """
     if not os.path.isdir(location):
         return location
-    for found in ([location / RECORDING, partial_path(location / RECORDING)], _recordings_below(location)):
-        paths = [path for path in found if path.is_file()]
+    for candidates in ([location / RECORDING, partial_path(location / RECORDING)], _recordings_below(location)):
+        paths = [path for path in candidates if path.is_file()]
         if len(paths) == 1 or (paths and paths[0].parent == location):
             return paths[0]
         if paths:
@@ -43,11 +43,11 @@ def recording_in(location: Path) -> Path:
 
 def _recordings_below(folder: Path) -> list[Path]:
     """Return the recording of each folder; a partial one only without a complete one."""
-    found: dict[Path, Path] = {}
+    by_folder: dict[Path, Path] = {}
     for path in sorted([*folder.rglob(partial_path(Path(RECORDING)).name), *folder.rglob(RECORDING)]):
-        if path.name == RECORDING or path.parent not in found:
-            found[path.parent] = path
-    return list(found.values())
+        if path.name == RECORDING or path.parent not in by_folder:
+            by_folder[path.parent] = path
+    return list(by_folder.values())
 
 
 def is_partial(recording: Path) -> bool:

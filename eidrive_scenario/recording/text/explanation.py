@@ -133,9 +133,9 @@ class Explanation:
             if is_suffix(self.reference, element.record.path)
         ]
         if not self._subjects:
-            known = {element.name for element, _ in named} | {STORYBOARD}
+            names = {element.name for element, _ in named} | {STORYBOARD}
             raise SettingError(
-                Diagnostic(f"no event or act is named {self.reference!r}", suggestion(self.reference, known))
+                Diagnostic(f"no event or act is named {self.reference!r}", suggestion(self.reference, names))
             )
 
     def observe(self, frame: Frame) -> None:

@@ -187,7 +187,9 @@ class FinalState:
         """Do nothing: no file is open."""
 
     def _observe_changes(self, changes: tuple[StateChange, ...]) -> None:
-        end = next((one for one in changes if one.kind == _STORYBOARD and one.after is ElementState.COMPLETE), None)
+        end = next(
+            (change for change in changes if change.kind == _STORYBOARD and change.after is ElementState.COMPLETE), None
+        )
         for change in changes:
             start = self._running.pop(change.path, None)
             if change.after is ElementState.RUNNING:
@@ -205,8 +207,8 @@ class FinalState:
     def _lines(self, frame: Frame) -> Iterator[str]:
         now = frame.view.time
         yield f"storyboard: {self._storyboard(now)}"
-        events = [one for one in (self._running | self._interrupted).values() if one.kind == "event"]
-        shown = ", ".join(f"{one.path} since {one.time:.2f} s" for one in events[:_SHOWN])
+        events = [event for event in (self._running | self._interrupted).values() if event.kind == "event"]
+        shown = ", ".join(f"{event.path} since {event.time:.2f} s" for event in events[:_SHOWN])
         more = f" and {len(events) - _SHOWN} more" if len(events) > _SHOWN else ""
         yield f"running events: {shown or 'none'}{more}"
         if self._last is not None:
