@@ -50,12 +50,12 @@ class ActionDecoder:
         """
         decided = OWN_DECISIONS
         for action in self._actions:
-            one = given
+            decision = given
             if len(self._actions) > 1:
                 if not isinstance(given, Mapping) or action.kind not in given:
                     raise _outside(given, "a mapping with the keys " + ", ".join(each.kind for each in self._actions))
-                one = given[action.kind]
-            decided = self._decode(action, one, perceived, decided)
+                decision = given[action.kind]
+            decided = self._decode(action, decision, perceived, decided)
         return decided
 
     def _decode(

@@ -138,9 +138,9 @@ def object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: fl
     filled[:, 0] = 1.0
     filled[:, 1:3] = (boxes[:, :2] - ego.position[:2]) @ axes
     velocity = objects.velocity[rows] @ axes
-    known = np.isfinite(velocity[:, 0]) & np.isfinite(velocity[:, 1])
-    filled[:, 3:5] = np.where(np.reshape(known, (-1, 1)), velocity, 0.0)
-    filled[:, 5] = known
+    has_velocity = np.isfinite(velocity[:, 0]) & np.isfinite(velocity[:, 1])
+    filled[:, 3:5] = np.where(np.reshape(has_velocity, (-1, 1)), velocity, 0.0)
+    filled[:, 5] = has_velocity
     filled[:, 6:8] = boxes[:, 3:5]
     heading = boxes[:, 6] - ego.yaw
     filled[:, 8], filled[:, 9] = np.cos(heading), np.sin(heading)
@@ -256,23 +256,23 @@ class ObservationEncoder:
     def _selected(self) -> Mapping[str, tuple[Part, Array, Array]]:
         """Return conversion, lower and upper bounds in SI units of the selected parts."""
         settings = self.settings
-        found: dict[str, tuple[Part, Array, Array]] = {}
+        parts: dict[str, tuple[Part, Array, Array]] = {}
         if settings.ego:
-            found["ego"] = self._ego, _EGO_LOW, _EGO_HIGH
+            parts["ego"] = self._ego, _EGO_LOW, _EGO_HIGH
         if settings.route is not None:
             reach = settings.route.length + 10.0
             high = np.tile([1.0, reach, reach], (settings.route.points, 1))
-            found["route"] = self._route_ahead, high * [0.0, -1.0, -1.0], high
+            parts["route"] = self._route_ahead, high * [0.0, -1.0, -1.0], high
         for name, table in (("tracks", settings.tracks), ("own", settings.own)):
             if table is not None:
                 low, high = (np.tile(bound, (table.count, 1)) for bound in column_bounds(table.range))
-                found[name] = self._table_part(name, table), low, high
+                parts[name] = self._table_part(name, table), low, high
         if settings.senders:
             high = np.tile([1.0, MAX_AGE], (len(self._senders), 1))
-            found["senders"] = self._ages, np.zeros_like(high), high
+            parts["senders"] = self._ages, np.zeros_like(high), high
         if settings.grid is not None:
-            found["grid"] = self._grid, *grid_bounds(settings.grid)
-        return found
+            parts["grid"] = self._grid, *grid_bounds(settings.grid)
+        return parts
 
     @property
     def needs_route(self) -> bool:
@@ -297,14 +297,14 @@ class ObservationEncoder:
         """
         self._route, self._control = route, control or Control()
         values = np.zeros(len(self._scale))
-        for encode, place, _ in self._parts.values():
+        for encode, span, _ in self._parts.values():
             first = encode(perceived)
-            values[place.start : place.start + len(first)] = first
+            values[span.start : span.start + len(first)] = first
         values /= self._scale
-        found = values.astype(np.float32)
-        np.maximum(found, self._low, out=found)
-        np.minimum(found, self._high, out=found)
-        return self._in_parts(found)
+        observation = values.astype(np.float32)
+        np.maximum(observation, self._low, out=observation)
+        np.minimum(observation, self._high, out=observation)
+        return self._in_parts(observation)
 
     def zeros(self) -> Any:
         """Return the observation of a station that is not present."""
@@ -314,7 +314,7 @@ class ObservationEncoder:
         """Return values as the space has them; flat ones are in the order of the parts already."""
         if self.settings.flat:
             return values
-        return {name: values[place].reshape(shape) for name, (_, place, shape) in self._parts.items()}
+        return {name: values[span].reshape(shape) for name, (_, span, shape) in self._parts.items()}
 
     def _ego(self, perceived: StationPerception) -> Sequence[float]:
         ego, control = perceived.ego, self._control

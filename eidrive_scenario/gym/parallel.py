@@ -74,8 +74,8 @@ class EidriveParallelEnv(ScenarioEnvironment, ParallelEnv[str, Any, Any]):  # ty
             self._generator, _ = gymnasium.utils.seeding.np_random(seed)
         self.close()
         self._left = set()
-        known = {key: value for key, value in (options or {}).items() if key in OPTIONS}
-        episode = self._episode = self._runs.start(int(self._generator.integers(MAX_SEED)), known)
+        supported = {key: value for key, value in (options or {}).items() if key in OPTIONS}
+        episode = self._episode = self._runs.start(int(self._generator.integers(MAX_SEED)), supported)
         self.agents = self._present(episode)
         if not self.agents:
             raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
@@ -127,12 +127,12 @@ class EidriveParallelEnv(ScenarioEnvironment, ParallelEnv[str, Any, Any]):  # ty
         observations, rewards, ends, limits, infos = outcome
         for name in [*acting, *entering]:
             interface, has_left = self._interfaces[name], name in self._left
-            found = [*terms.get(name, ())]
+            reward_terms = [*terms.get(name, ())]
             info: dict[str, Any] = {"time": episode.start.view.time}
             if result is not None:
-                found.append(interface.rewards.terms_of_end(result))
+                reward_terms.append(interface.rewards.terms_of_end(result))
                 info |= final_info(result)
-            info["reward_terms"] = summed = sum_terms(found)
+            info["reward_terms"] = summed = sum_terms(reward_terms)
             truncated = episode.is_truncated and not has_left
             terminated = not truncated and (result is not None or has_left)
             observations[name] = interface.encoder.zeros() if has_left else interface.observe(episode)

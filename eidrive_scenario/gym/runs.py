@@ -53,10 +53,12 @@ class Runs:
         self.ticks_per_step = ticks_per_step
         self._duration = None if max_steps is None else max_steps * ticks_per_step * self.settings.dt
         with Simulation(self._source, settings=self.settings, load_weights=False) as simulation:
-            known, drivers = tuple(simulation.stack.controllable), tuple(simulation.stack.possible_drivers)
-            names = _stations(stations, known, drivers, single=single)
+            controllable, drivers = tuple(simulation.stack.controllable), tuple(simulation.stack.possible_drivers)
+            names = _stations(stations, controllable, drivers, single=single)
             self.interfaces = {name: StationInterface(name, interfaces, simulation) for name in names}
-        self._planners = {name: one.planner for name, one in self.interfaces.items() if one.planner is not None}
+        self._planners = {
+            name: interface.planner for name, interface in self.interfaces.items() if interface.planner is not None
+        }
         self._colliding = [name for name in names if terminate_on_collision and name in drivers]
         self._episode(DEFAULT_SEED, self.settings, load_weights=False).close()
 
@@ -111,19 +113,19 @@ def _check_steps(max_steps: int | None, ticks_per_step: int) -> None:
 
 
 def _stations(
-    chosen: Sequence[str] | None, known: Sequence[str], drivers: Sequence[str], *, single: bool
+    chosen: Sequence[str] | None, controllable: Sequence[str], drivers: Sequence[str], *, single: bool
 ) -> tuple[str, ...]:
     """Return the controlled stations. Raise SettingError if there is none, or if one does not exist."""
-    if not known:
+    if not controllable:
         message = "the scenario has no station"
         raise SettingError(Diagnostic(message, "give an entity a driving stack: RunSettings(drive='Ego')"))
     if chosen is not None:
-        unknown = next((name for name in chosen if name not in known), None)
+        unknown = next((name for name in chosen if name not in controllable), None)
         if unknown is not None or not chosen:
             message = f"the scenario has no station {quoted(unknown or '')}"
-            raise SettingError(Diagnostic(message, suggestion(str(unknown), known)))
+            raise SettingError(Diagnostic(message, suggestion(str(unknown), controllable)))
         return tuple(dict.fromkeys(chosen))
-    candidates = drivers or (known if single else ())
+    candidates = drivers or (controllable if single else ())
     if not candidates:
         raise SettingError(Diagnostic("the scenario has no station that drives", "name the stations"))
     if single and len(candidates) > 1:

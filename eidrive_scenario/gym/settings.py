@@ -89,10 +89,10 @@ def parse_actions(given: Any) -> tuple[ActionSettings, ...]:
     Raise SettingError for any other value.
     """
     several = isinstance(given, Iterable) and not isinstance(given, str | Mapping | Settings)
-    actions = tuple(_parse(one) for one in (given if several else [given]))
-    driving = [one.kind for one in actions if one.kind in DRIVING]
+    actions = tuple(_parse(action) for action in (given if several else [given]))
+    driving = [action.kind for action in actions if action.kind in DRIVING]
     if not actions or len(driving) > 1 or len(actions) - len(driving) > 1:
-        message = f"action has the kinds {', '.join(one.kind for one in actions) or 'none'}"
+        message = f"action has the kinds {', '.join(action.kind for action in actions) or 'none'}"
         raise SettingError(Diagnostic(message, "give at most one that drives, and one of send and share"))
     return actions
 

@@ -149,8 +149,8 @@ class StationInterface:
 def sum_terms(terms: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return the sums of terms by name."""
     total: dict[str, float] = {}
-    for one in terms:
-        for name, value in one.items():
+    for of_source in terms:
+        for name, value in of_source.items():
             total[name] = total.get(name, 0.0) + value
     return total
 
