@@ -37,7 +37,7 @@ class RoadLintContext(LintContext):
         self.roads = roads
         self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=empty_view())
 
-    def place(self, position: model.Position) -> ResolvedPosition | None:
+    def resolve(self, position: model.Position) -> ResolvedPosition | None:
         """Return the resolved position; None if it depends on an entity. Raise InputError if it does not exist."""
         if referenced_entities(position):
             return None
@@ -55,7 +55,7 @@ class RoadLintContext(LintContext):
         for element in self.elements:
             if isinstance(element, model.Position):
                 try:
-                    self.place(element)
+                    self.resolve(element)
                 except InputError as error:
                     yield id(element), error
 
@@ -139,13 +139,13 @@ def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield lane changes to a lane that no road has."""
     if context.roads is None:
         return
-    known = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
+    lanes = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
     for element in context.elements:
         target = (
             element.lane_change_target.absolute_target_lane if isinstance(element, model.LaneChangeAction) else None
         )
-        if target is not None and target.value.strip() not in known - {"0"}:
-            shown = ", ".join(sorted(known - {"0"}, key=int))
+        if target is not None and target.value.strip() not in lanes - {"0"}:
+            shown = ", ".join(sorted(lanes - {"0"}, key=int))
             yield at(target, f"lane {target.value!r} exists on no road", f"known: {shown}")
 
 
@@ -153,7 +153,7 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield traffic signals that the road network does not contain."""
     if context.roads is None:
         return
-    known = set(context.roads.signals)
+    signals = set(context.roads.signals)
     for element in context.elements:
         if isinstance(element, model.TrafficSignalState):
             name = element.traffic_signal_id
@@ -161,8 +161,8 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
             name = element.name
         else:
             continue
-        if name not in known and _ADDRESS not in name:
-            hint = suggestion(name, known) if known else "the road file defines none"
+        if name not in signals and _ADDRESS not in name:
+            hint = suggestion(name, signals) if signals else "the road file defines none"
             yield at(element, f"traffic signal {name!r} does not exist in the road network", hint)
 
 
@@ -223,10 +223,10 @@ def _curve(context: RoadLintContext, trajectory: model.Trajectory) -> Trajectory
     """Return the trajectory in the world frame; None if a point depends on an entity or cannot be resolved."""
 
     def pose(position: model.Position) -> Pose:
-        place = context.place(position)
-        if place is None:
+        resolved = context.resolve(position)
+        if resolved is None:
             raise _RelativePosition
-        return place.pose
+        return resolved.pose
 
     spline = trajectory.shape.clothoid_spline
     if spline is not None and spline.clothoid_spline_segment[0].position_start is None:
@@ -242,13 +242,13 @@ def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     if context.roads is None:
         return
     waypoints: list[model.Waypoint | model.AcquirePositionAction] = [
-        one for route in _routes(context) for one in route.waypoint
+        waypoint for route in _routes(context) for waypoint in route.waypoint
     ]
     waypoints += [element for element in context.elements if isinstance(element, model.AcquirePositionAction)]
     for waypoint in waypoints:
-        if id(waypoint.position) in context.unresolved or (place := context.place(waypoint.position)) is None:
+        if id(waypoint.position) in context.unresolved or (resolved := context.resolve(waypoint.position)) is None:
             continue
-        gap = context.outside([place.pose.x], [place.pose.y])[0]
+        gap = context.outside([resolved.pose.x], [resolved.pose.y])[0]
         if gap > MARGIN:
             what = "waypoint" if isinstance(waypoint, model.Waypoint) else "destination"
             yield at(waypoint, f"the {what} is {gap:.1f} m outside the road", "move it onto a lane")
@@ -260,9 +260,9 @@ def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
         return
     for route in _routes(context):
         positions = [waypoint.position for waypoint in route.waypoint]
-        if any(id(position) in context.unresolved or context.place(position) is None for position in positions):
+        if any(id(position) in context.unresolved or context.resolve(position) is None for position in positions):
             continue
-        build = partial(build_route, route, context.roads, context.place, again=True)  # type: ignore[arg-type]
+        build = partial(build_route, route, context.roads, context.resolve, again=True)  # type: ignore[arg-type]
         try:
             build()
         except InputError as error:
@@ -285,15 +285,17 @@ def _has_wrong_way_driver(context: RoadLintContext, roads: RoadNetwork, route: m
     drivers = {
         name
         for action, actors in context.performances
-        if any(isinstance(one, model.AssignRouteAction) and _route_of(context, one) is route for one in action.walk())
+        if any(
+            isinstance(part, model.AssignRouteAction) and _route_of(context, part) is route for part in action.walk()
+        )
         for name in actors
     }
     positions = [route.waypoint[0].position]
     for action, actors in context.performances:
         if drivers.intersection(actors):
-            positions += [one.position for one in action.walk() if isinstance(one, model.TeleportAction)]
-    resolved = [context.place(position) for position in positions if id(position) not in context.unresolved]
-    return any(faces_traffic(roads, place) for place in resolved if place is not None)
+            positions += [part.position for part in action.walk() if isinstance(part, model.TeleportAction)]
+    resolved = [context.resolve(position) for position in positions if id(position) not in context.unresolved]
+    return any(faces_traffic(roads, position) for position in resolved if position is not None)
 
 
 def _routes(context: RoadLintContext) -> Iterator[model.Route]:

@@ -57,15 +57,15 @@ class CheckReport:
     notes: tuple[Diagnostic, ...] = field(default=(), kw_only=True)
 
     @classmethod
-    def collect(cls, found: Iterable[tuple[Level, Diagnostic]], **fields: Any) -> Self:
+    def collect(cls, diagnostics: Iterable[tuple[Level, Diagnostic]], **fields: Any) -> Self:
         """Build the report from the diagnostics of a check; `fields` are the further fields of a subclass.
 
         Every level lists each diagnostic once, in the order of the file, up to MAX_DIAGNOSTICS.
         """
         by_level: dict[Level, list[Diagnostic]] = {level: [] for level in Level}
-        for level, diagnostic in found:
+        for level, diagnostic in diagnostics:
             by_level[level].append(diagnostic)
         errors, warnings, notes = (
-            tuple(limit_diagnostics(sort_diagnostics(diagnostics))) for diagnostics in by_level.values()
+            tuple(limit_diagnostics(sort_diagnostics(of_level))) for of_level in by_level.values()
         )
         return cls(errors, warnings, notes=notes, **fields)

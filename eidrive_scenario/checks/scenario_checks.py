@@ -66,10 +66,10 @@ def run_road_file_rules(roads: RoadNetwork, ignored: Collection[str] = ()) -> It
 
 def check_rule_names(ignored: Collection[str]) -> None:
     """Raise SettingError if `ignored` has an unknown name."""
-    known = {rule.name for rule in ALL_RULES}
+    names = {rule.name for rule in ALL_RULES}
     for name in ignored:
-        if name not in known:
-            raise SettingError(Diagnostic(f"unknown rule {name!r}", suggestion(name, known)))
+        if name not in names:
+            raise SettingError(Diagnostic(f"unknown rule {name!r}", suggestion(name, names)))
 
 
 def _run(rules: Iterable[Rule[S]], context: S, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
@@ -117,7 +117,7 @@ def scenario_diagnostics(
             hint = f"{HOW_TO_JUDGE} of `eidrive run`"
             yield Level.NOTE, Diagnostic(UNJUDGED, hint, str(scenario.path or ""))
     except InputError as error:
-        yield from (found for found in _errors(error) if found[1] not in errors)
+        yield from ((level, diagnostic) for level, diagnostic in _errors(error) if diagnostic not in errors)
 
 
 def added_sources(settings: RunSettings | None) -> tuple[str | Path, ...]:
@@ -202,10 +202,10 @@ def check_distribution(
         expansion = load_distribution(path)
     except InputError as error:
         return DistributionCheckReport.collect((Level.ERROR, diagnostic) for diagnostic in error.diagnostics)
-    found = _DistributionDiagnostics(expansion, ignored, settings)
-    if not any(level is Level.ERROR for level, _ in found):
-        found.read_runs()
-    return DistributionCheckReport.collect(found, runs=len(expansion))
+    diagnostics = _DistributionDiagnostics(expansion, ignored, settings)
+    if not any(level is Level.ERROR for level, _ in diagnostics):
+        diagnostics.read_runs()
+    return DistributionCheckReport.collect(diagnostics, runs=len(expansion))
 
 
 class _DistributionDiagnostics:
@@ -217,14 +217,14 @@ class _DistributionDiagnostics:
         self._expansion = expansion
         self._ignored = ignored
         self._added = added_sources(settings)
-        self._found: dict[tuple[Level, Diagnostic], None] = {}
+        self._diagnostics: dict[tuple[Level, Diagnostic], None] = {}
         self._add(Level.WARNING, expansion.warnings)
-        self._found.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored, settings)))
-        self._known_rules = {_location(diagnostic) for _, diagnostic in self._found if diagnostic.rule}
+        self._diagnostics.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored, settings)))
+        self._known_rules = {_location(diagnostic) for _, diagnostic in self._diagnostics if diagnostic.rule}
         self._read: set[int] = set()
 
     def __iter__(self) -> Iterator[tuple[Level, Diagnostic]]:
-        return iter(self._found)
+        return iter(self._diagnostics)
 
     def read_runs(self) -> None:
         """Read the runs of all listed values, and further ones spread over all combinations."""
@@ -254,15 +254,20 @@ class _DistributionDiagnostics:
 
     def _add_invalid_run(self, error: InputError, every_value: bool) -> None:
         """Add the errors of a run that cannot be read; of a spread run only those at new locations."""
-        known = {_location(diagnostic) for _, diagnostic in self._found}
-        diagnostics = [one for one in error.diagnostics if every_value or _location(one) not in known]
+        locations = {_location(diagnostic) for _, diagnostic in self._diagnostics}
+        diagnostics = [
+            diagnostic for diagnostic in error.diagnostics if every_value or _location(diagnostic) not in locations
+        ]
         if isinstance(error, ConstraintError):
-            self._add(Level.WARNING, (replace(one, hint=f"{one.hint}; such runs are skipped") for one in diagnostics))
+            skipped = [
+                replace(diagnostic, hint=f"{diagnostic.hint}; such runs are skipped") for diagnostic in diagnostics
+            ]
+            self._add(Level.WARNING, skipped)
         else:
             self._add(Level.ERROR, diagnostics)
 
     def _add(self, level: Level, diagnostics: Iterable[Diagnostic]) -> None:
-        self._found.update(dict.fromkeys((level, diagnostic) for diagnostic in diagnostics))
+        self._diagnostics.update(dict.fromkeys((level, diagnostic) for diagnostic in diagnostics))
 
 
 def _location(diagnostic: Diagnostic) -> tuple[str, str, int | None]:

@@ -31,8 +31,8 @@ def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
         if not isinstance(node.element, model.Event) or not context.actors(node):
             continue
         leaves = [(action, _with_duration(action)) for action in node.element.action]
-        for (first, one), (second, other) in combinations(leaves, 2):
-            shared = _domains(one) & _domains(other)
+        for (first, first_leaf), (second, second_leaf) in combinations(leaves, 2):
+            shared = _domains(first_leaf) & _domains(second_leaf)
             if shared:
                 yield at(
                     second,
@@ -46,8 +46,10 @@ def _with_duration(action: model.Action) -> model.Element | None:
     """Return the specific action of a private action that has a duration."""
     if action.private_action is None:
         return None
-    leaf = next((one for one in action.private_action.walk() if type(one) in _DOMAINS), None)
-    if leaf is None or any(isinstance(one, model.TransitionDynamics) and is_immediate(one) for one in leaf.walk()):
+    leaf = next((element for element in action.private_action.walk() if type(element) in _DOMAINS), None)
+    if leaf is None or any(
+        isinstance(element, model.TransitionDynamics) and is_immediate(element) for element in leaf.walk()
+    ):
         return None
     return leaf
 
@@ -114,6 +116,6 @@ def _times(shape: model.Polyline) -> Iterator[Diagnostic]:
         if vertex.time is None:
             message = "Timing has no effect: this vertex has no time, so the actor keeps its speed"
             yield at(vertex, message, f"specify {model.TIME_ATTRIBUTES[model.Polyline]}")
-    known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
-    if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
-        yield at(shape, f"all vertices have the time {known[0]:g} s", "specify when each vertex is passed")
+    times = [vertex.time for vertex in shape.vertex if vertex.time is not None]
+    if len(times) == len(shape.vertex) and all(time == times[0] for time in times):
+        yield at(shape, f"all vertices have the time {times[0]:g} s", "specify when each vertex is passed")

@@ -103,8 +103,10 @@ class ReachabilityAnalysis:
         dependents: dict[Node, list[Node]] = {}
         for node in self._outline.nodes:
             for trigger in (node.start, stop_trigger(node)):
-                conditions = [one for group in (trigger.condition_group if trigger else ()) for one in group.condition]
-                for other in dict.fromkeys(node for one in conditions for node in self._states.dependencies(one)):
+                groups = trigger.condition_group if trigger else ()
+                conditions = [condition for group in groups for condition in group.condition]
+                others = [other for condition in conditions for other in self._states.dependencies(condition)]
+                for other in dict.fromkeys(others):
                     dependents.setdefault(other, []).append(node)
         return dependents
 
@@ -138,10 +140,10 @@ class ReachabilityAnalysis:
                     yield TriggerAnalysis(node, trigger, starts, first, groups)
 
     def _analyze(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> GroupAnalysis:
-        conditions = tuple(self._analyze_condition(one, owner, starts, first) for one in group.condition)
+        conditions = tuple(self._analyze_condition(condition, owner, starts, first) for condition in group.condition)
         intervals = clip_before(ALWAYS, first)
-        for one in conditions:
-            intervals = intersection(intervals, one.intervals)
+        for condition in conditions:
+            intervals = intersection(intervals, condition.intervals)
         return GroupAnalysis(group, conditions, intervals)
 
     def _analyze_condition(self, condition: Condition, owner: Node, starts: bool, first: float) -> ConditionAnalysis:

@@ -62,7 +62,7 @@ def _used(root: etree._Element) -> set[str]:
 
 def ineffective_parameter_actions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield ParameterActions whose parameter no condition reads; `$name` is replaced when the file is read."""
-    read = {one.parameter_ref for one in context.elements if isinstance(one, model.ParameterCondition)}
+    read = {element.parameter_ref for element in context.elements if isinstance(element, model.ParameterCondition)}
     for element in context.elements:
         if isinstance(element, model.ParameterAction) and element.parameter_ref not in read:
             yield at(
@@ -126,7 +126,7 @@ def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
         directory = getattr(location, "directory", None)
         if directory is None:
             continue
-        place = absolute(resolve_path(directory.path, folder))
-        if not any(file == place or file.parent == place for file in used):
-            missing = "" if os.path.exists(place) else ", which does not exist"
+        location_path = absolute(resolve_path(directory.path, folder))
+        if not any(file == location_path or file.parent == location_path for file in used):
+            missing = "" if os.path.exists(location_path) else ", which does not exist"
             yield at(location, f"no entry of the {kind} {directory.path!r} is used{missing}", "remove it")

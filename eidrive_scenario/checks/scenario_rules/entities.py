@@ -15,32 +15,32 @@ from eidrive_scenario.openscenario.validation.names import scenario_objects
 def _objects(context: LintContext) -> Iterator[model.ScenarioObject]:
     """Yield the scenario objects of the file that are not trailers of another entity."""
     entities = context.scenario.document.entities
-    for one, _ in scenario_objects(entities, context.scenario.entries):
-        if one.name in context.scenario.entities and one.name not in context.trailers:
-            yield one
+    for entity, _ in scenario_objects(entities, context.scenario.entries):
+        if entity.name in context.scenario.entities and entity.name not in context.trailers:
+            yield entity
 
 
 def _referenced_entities(context: LintContext) -> set[str]:
-    names = {one for name in context.referenced.get("entity", set()) for one in context.members(name)}
+    names = {member for name in context.referenced.get("entity", set()) for member in context.members(name)}
     return names | context.command_words
 
 
 def unused_entities(context: LintContext) -> Iterator[Diagnostic]:
     """Yield entities without a reference and without a controller, which may use its entity."""
     referenced = _referenced_entities(context)
-    for one in _objects(context):
-        if one.name not in referenced | context.placed and not one.object_controller:
-            yield at(one, f"entity {one.name!r} is never used", "place it with a TeleportAction, or remove it")
+    for entity in _objects(context):
+        if entity.name not in referenced | context.placed and not entity.object_controller:
+            yield at(entity, f"entity {entity.name!r} is never used", "place it with a TeleportAction, or remove it")
 
 
 def unplaced_entities(context: LintContext) -> Iterator[Diagnostic]:
     """Yield entities that are referenced but never placed."""
     referenced = _referenced_entities(context)
-    for one in _objects(context):
-        if one.name in referenced and one.name not in context.placed:
+    for entity in _objects(context):
+        if entity.name in referenced and entity.name not in context.placed:
             yield at(
-                one,
-                f"entity {one.name!r} is never in the world: no action places it",
+                entity,
+                f"entity {entity.name!r} is never in the world: no action places it",
                 "add a TeleportAction in Init, or an AddEntityAction",
             )
 
@@ -112,12 +112,15 @@ def self_references(context: LintContext) -> Iterator[Diagnostic]:
 
 def unknown_traffic(context: LintContext) -> Iterator[Diagnostic]:
     """Yield TrafficStopActions with a traffic name that no other action defines."""
-    actions = [element for element in context.elements if isinstance(element, model.TrafficAction)]
-    started = {one.traffic_name for one in actions if one.traffic_stop_action is None and one.traffic_name is not None}
-    for one in actions:
-        if one.traffic_stop_action is not None and one.traffic_name is not None and one.traffic_name not in started:
-            message = f"TrafficStopAction: no traffic action is named {one.traffic_name!r}"
-            yield at(one, message, suggestion(one.traffic_name, started))
+    named = [
+        (element, element.traffic_name)
+        for element in context.elements
+        if isinstance(element, model.TrafficAction) and element.traffic_name is not None
+    ]
+    started = {name for action, name in named if action.traffic_stop_action is None}
+    for action, name in named:
+        if action.traffic_stop_action is not None and name not in started:
+            yield at(action, f"TrafficStopAction: no traffic action is named {name!r}", suggestion(name, started))
 
 
 def unconnected_trailers(context: LintContext) -> Iterator[Diagnostic]:

@@ -111,16 +111,16 @@ class Outline:
         if name in self.scenario.entities:
             return (name,)
         entities = self.scenario.document.entities
-        found: list[str] = []
+        members: list[str] = []
         for selection in entities.entity_selection if entities else ():
             if selection.name != name:
                 continue
             for ref in selection.members.entity_ref:
                 if ref.entity_ref not in (name, *enclosing):
-                    found += self.members(ref.entity_ref, (*enclosing, name))
+                    members += self.members(ref.entity_ref, (*enclosing, name))
             for by_type in selection.members.by_type:
-                found += self.scenario.entities_by_type.get(by_type.object_type, ())
-        return tuple(dict.fromkeys(found)) or (name,)
+                members += self.scenario.entities_by_type.get(by_type.object_type, ())
+        return tuple(dict.fromkeys(members)) or (name,)
 
     def actors(self, node: Node) -> tuple[str, ...]:
         """Return the actors of a storyboard element that the file lists."""
@@ -185,7 +185,7 @@ class Outline:
         }
         entities = self.scenario.document.entities
         objects = entities.scenario_object if entities else ()
-        external = {one.name for one in objects if one.external_object_reference is not None}
+        external = {entity.name for entity in objects if entity.external_object_reference is not None}
         return frozenset(teleported | added | external | self.trailers)
 
     @cached_property
@@ -203,13 +203,13 @@ class Outline:
     @cached_property
     def referenced(self) -> dict[str, set[str]]:
         """Return the names to which elements refer, by kind ("entity", "variable", …)."""
-        found: dict[str, set[str]] = {}
+        references: dict[str, set[str]] = {}
         for element in self.elements:
             for kind, name_field in _reference_fields(type(element)):
                 name = getattr(element, name_field, None)
                 if isinstance(name, str):
-                    found.setdefault(kind, set()).add(name)
-        return found
+                    references.setdefault(kind, set()).add(name)
+        return references
 
     @cached_property
     def command_words(self) -> frozenset[str]:
@@ -246,16 +246,16 @@ def _places(action: model.PrivateAction) -> bool:
 
 def _reference_fields(cls: type[model.Element]) -> tuple[tuple[str, str], ...]:
     """Return the kinds to which attributes of a class refer in any version, and the names of their fields."""
-    known = _REFERENCE_FIELDS.get(cls)
-    if known is None:
+    reference_fields = _REFERENCE_FIELDS.get(cls)
+    if reference_fields is None:
         pairs = [
             (rule.points_to, rule.field)
             for version in VERSIONS
             for rule in rules(cls, version).attributes.values()
             if rule.points_to
         ]
-        known = _REFERENCE_FIELDS[cls] = tuple(dict.fromkeys(pairs))
-    return known
+        reference_fields = _REFERENCE_FIELDS[cls] = tuple(dict.fromkeys(pairs))
+    return reference_fields
 
 
 _REFERENCE_FIELDS: dict[type[model.Element], tuple[tuple[str, str], ...]] = {}

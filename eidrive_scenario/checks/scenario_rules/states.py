@@ -138,7 +138,7 @@ class States:
 
     def _stopped_by_trigger(self, node: Node) -> float:
         """Return the earliest stop by the trigger of the element or of an element above [s]."""
-        return min(self._stopped[one] for one in (node, *node.above()))
+        return min(self._stopped[element] for element in (node, *node.above()))
 
     def _complete(self, node: Node) -> float:
         """Return the earliest completion [s].
@@ -153,7 +153,7 @@ class States:
             return f"{node.title} never starts"
         if state is model.StoryboardElementState.STOP_TRANSITION:
             return f"{node.title} is never stopped"
-        missing = next((one for one in node.walk() if self.start[one] == math.inf), None)
+        missing = next((element for element in node.walk() if self.start[element] == math.inf), None)
         return f"{node.title} never ends, as {missing.title} never starts" if missing else f"{node.title} never ends"
 
 
@@ -174,7 +174,7 @@ def _truth_of_running(node: Node, state: model.StoryboardElementState, owner: No
 def _can_be_stopped(node: Node) -> bool:
     if isinstance(node.element, model.Action):
         return True
-    acts = [one for one in (node, *node.above()) if one.level is model.StoryboardElementType.ACT]
+    acts = [enclosing for enclosing in (node, *node.above()) if enclosing.level is model.StoryboardElementType.ACT]
     stopped = any(getattr(act.element, "stop_trigger", None) is not None for act in acts)
     return stopped or any(True for _ in _overriding_events(node))
 
@@ -183,9 +183,9 @@ def _overriding_events(node: Node) -> Iterator[Node]:
     """Yield the other events of the maneuver that stop an event by their start."""
     if not isinstance(node.element, model.Event) or node.parent is None:
         return
-    for one in node.parent.children:
-        if one is not node and isinstance(one.element, model.Event) and one.element.priority in _OVERRIDING:
-            yield one
+    for event in node.parent.children:
+        if event is not node and isinstance(event.element, model.Event) and event.element.priority in _OVERRIDING:
+            yield event
 
 
 _CONTINUOUS = (

@@ -31,10 +31,10 @@ def never_true(rule: str) -> Callable[[LintContext], Iterator[Diagnostic]]:
     def check(context: LintContext) -> Iterator[Diagnostic]:
         for trigger in context.triggers:
             for group in trigger.groups:
-                for one in group.conditions:
-                    if one.rule == rule:
-                        message = f"{_describe_condition(one.condition)} is never true: {one.reason}"
-                        yield at(one.condition, f"{message}; {_consequence(trigger)}", _HINTS[rule])
+                for condition in group.conditions:
+                    if condition.rule == rule:
+                        message = f"{_describe_condition(condition.condition)} is never true: {condition.reason}"
+                        yield at(condition.condition, f"{message}; {_consequence(trigger)}", _HINTS[rule])
 
     return check
 
@@ -43,7 +43,7 @@ def contradictory_groups(context: LintContext) -> Iterator[Diagnostic]:
     """Yield groups whose conditions can be true, but never all at the same time."""
     for trigger in context.triggers:
         for group in trigger.groups:
-            if not group.intervals and all(one.intervals for one in group.conditions):
+            if not group.intervals and all(condition.intervals for condition in group.conditions):
                 yield at(
                     group.group,
                     f"the conditions of this group are never true together: {_describe_intervals(group.conditions)}; "
@@ -56,8 +56,8 @@ def simultaneous_edges(context: LintContext) -> Iterator[Diagnostic]:
     """Yield groups with several edges, which must all be observed at the same evaluation."""
     for trigger in context.triggers:
         for group in trigger.groups:
-            conditions = [one.condition for one in group.conditions]
-            edges = [one for one in conditions if one.condition_edge is not ConditionEdge.NONE]
+            conditions = [condition.condition for condition in group.conditions]
+            edges = [condition for condition in conditions if condition.condition_edge is not ConditionEdge.NONE]
             if group.intervals and len(edges) > 1:
                 names = " and ".join(_describe_condition(condition) for condition in edges)
                 yield at(
@@ -71,9 +71,9 @@ def exact_time_comparisons(context: LintContext) -> Iterator[Diagnostic]:
     """Yield comparisons of the simulation time by `equalTo`."""
     for trigger in context.triggers:
         for group in trigger.groups:
-            for one in group.conditions:
-                time = _time(one.condition)
-                if time is not None and time.rule is Rule.EQUAL_TO and time.value > 0.0 and one.intervals:
+            for condition in group.conditions:
+                time = _time(condition.condition)
+                if time is not None and time.rule is Rule.EQUAL_TO and time.value > 0.0 and condition.intervals:
                     yield at(
                         time,
                         f"simulation time = {time.value:g} s holds only if a time step ends there to the microsecond",
@@ -120,9 +120,9 @@ def _describe_condition(condition: Condition) -> str:
 
 def _describe_intervals(conditions: tuple[ConditionAnalysis, ...]) -> str:
     texts = [
-        f"{_describe_condition(one.condition)} {format_intervals(one.intervals)}"
-        for one in conditions
-        if format_intervals(one.intervals) != "at any time"
+        f"{_describe_condition(condition.condition)} {format_intervals(condition.intervals)}"
+        for condition in conditions
+        if format_intervals(condition.intervals) != "at any time"
     ]
     return ", ".join(texts)
 

@@ -39,9 +39,9 @@ def clip_before(intervals: Intervals, first: float) -> Intervals:
     return tuple((max(low, first), high) for low, high in intervals if high >= first)
 
 
-def intersection(one: Intervals, other: Intervals) -> Intervals:
+def intersection(first: Intervals, second: Intervals) -> Intervals:
     """Return the instants that are in both."""
-    overlaps = ((max(a, c), min(b, d)) for a, b in one for c, d in other)
+    overlaps = ((max(a, c), min(b, d)) for a, b in first for c, d in second)
     return tuple(sorted((low, high) for low, high in overlaps if low <= high))
 
 
@@ -139,13 +139,13 @@ def _time(leaf: model.SimulationTimeCondition, _: Outline) -> TruthIntervals:
 def _parameter(leaf: model.ParameterCondition, outline: Outline) -> TruthIntervals:
     """Return steady intervals unless an action sets the parameter; the user may choose its constant value."""
     name = leaf.parameter_ref
-    if any(isinstance(one, model.ParameterAction) and one.parameter_ref == name for one in outline.elements):
+    if any(isinstance(action, model.ParameterAction) and action.parameter_ref == name for action in outline.elements):
         return OPEN
     return TruthIntervals(steady=f"no action sets the parameter {name!r}")
 
 
 def _time_of_day(_: model.TimeOfDayCondition, outline: Outline) -> TruthIntervals:
-    if any(isinstance(one, model.TimeOfDay) for one in outline.elements):
+    if any(isinstance(element, model.TimeOfDay) for element in outline.elements):
         return OPEN
     return never("no EnvironmentAction sets the time of day")
 
