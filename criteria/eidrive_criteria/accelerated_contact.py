@@ -91,8 +91,8 @@ def _state(way: Course, time: float) -> tuple[Vector, Vector, Vector]:
     return displacement, _combined(way.velocity, way.acceleration, time), way.acceleration
 
 
-def _combined(one: Vector, other: Vector, factor: float) -> Vector:
-    return one[0] + factor * other[0], one[1] + factor * other[1], one[2] + factor * other[2]
+def _combined(first: Vector, second: Vector, factor: float) -> Vector:
+    return first[0] + factor * second[0], first[1] + factor * second[1], first[2] + factor * second[2]
 
 
 def _on_axis(phase: _Phase, axis: Vector) -> tuple[float, float, float]:

@@ -56,27 +56,27 @@ class AgeOfInformation(LinkCriterion):
 
     def _ages(self) -> dict[Measure, tuple[float, Link]]:
         """Return the largest age of each measure with its link; without the undefined ones."""
-        known = self._log.statistics_by_link(self.time)
+        statistics = self._log.statistics_by_link(self.time)
         ages: dict[Measure, tuple[float, Link]] = {}
         for link in sorted(self._used):
-            row = known.get(link)
+            of_link = statistics.get(link)
             values: dict[Measure, float | None] = dict.fromkeys(PHRASES, math.inf)
-            if row is not None:
-                values = {"mean": row.mean_age, "p95": row.p95_age, "peak": row.peak_age}
+            if of_link is not None:
+                values = {"mean": of_link.mean_age, "p95": of_link.p95_age, "peak": of_link.peak_age}
             for measure, value in values.items():
                 if value is not None and (measure not in ages or value > ages[measure][0]):
                     ages[measure] = value, link
         return ages
 
     def verdict(self) -> Verdict:
-        settings, found = self._settings, self._ages().get(self._settings.measure)
-        value = None if found is None else found[0]
-        if found is None:
+        settings, oldest = self._settings, self._ages().get(self._settings.measure)
+        value = None if oldest is None else oldest[0]
+        if oldest is None:
             reason = self.nothing("received message")
-        elif math.isinf(found[0]):
-            reason = f"no message from {found[1][0]} to {found[1][1]} was received"
+        elif math.isinf(oldest[0]):
+            reason = f"no message from {oldest[1][0]} to {oldest[1][1]} was received"
         else:
-            newest = f"the newest message from {found[1][0]} to {found[1][1]} was {value:.3f} s old"
+            newest = f"the newest message from {oldest[1][0]} to {oldest[1][1]} was {value:.3f} s old"
             reason = f"{newest} {PHRASES[settings.measure]}"
         exceeds = value is not None and settings.at_most is not None and value > settings.at_most
         return self.conclude(not self.missing and not exceeds, reason, value=value, limit=settings.at_most)

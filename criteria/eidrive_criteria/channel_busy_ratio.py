@@ -53,14 +53,14 @@ class ChannelBusyRatio(Criterion):
         return max(self._ratios.items(), key=lambda item: item[1]) if self._ratios else None
 
     def verdict(self) -> Verdict:
-        limit, found = self._settings.at_most, self._largest()
-        value = None if found is None else found[1]
+        limit, largest = self._settings.at_most, self._largest()
+        value = None if largest is None else largest[1]
         if not self._was_present:
             reason = actor_never_present([str(self._settings.of)])
-        elif found is None:
+        elif largest is None:
             reason = "no channel with a busy ratio was used"
         else:
-            reason = f"{found[0]} measured a busy channel for {100 * found[1]:.1f} % of the time"
+            reason = f"{largest[0]} measured a busy channel for {100 * largest[1]:.1f} % of the time"
         exceeds = value is not None and limit is not None and value > limit
         return self.conclude(self._was_present and not exceeds, reason, value=value, limit=limit)
 

@@ -58,8 +58,8 @@ class DetectionCount(PerceivedCriterion):
         view, settings = frame.view, self._settings
         if view.time < settings.after - TIME_TOLERANCE:
             return
-        known = self.known(frame, settings.source)
-        counted = [name for name in known if view.categories[view.rows[name]] in self._classes]
+        distances = self.known_actors(frame, settings.source)
+        counted = [name for name in distances if view.categories[view.rows[name]] in self._classes]
         self._frames += 1
         self._sum += len(counted)
         self._least = len(counted) if self._least is None else min(self._least, len(counted))

@@ -34,14 +34,14 @@ class EndOfRoad(SummedCriterion):
         self._within = settings.within
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        place, roads = self.lanes.center(view, row), self.lanes.roads
-        if place is None:
+        location, roads = self.lanes.center(view, row), self.lanes.roads
+        if location is None:
             return None
-        road, key = roads.road(place.road), self.lanes.key(place)
+        road, key = roads.road(location.road), self.lanes.key(location)
         _, _, _, length, _, _, yaw = view.plain_boxes[row]
-        direction = 1 if math.cos(yaw - roads.road_pose_at(place.road, place.s).h) >= 0.0 else -1
+        direction = 1 if math.cos(yaw - roads.road_pose_at(location.road, location.s).h) >= 0.0 else -1
         section = road.sections[key.section]
-        left = section.end - place.s if direction > 0 else place.s - section.s
+        left = section.end - location.s if direction > 0 else location.s - section.s
         if left - length / 2.0 > self._within:
             return None
         return None if any(True for _ in roads.links.beyond(key, direction)) else duration

@@ -48,7 +48,7 @@ class FirstDetection(PerceivedCriterion):
 
     def evaluate(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
-        if self._first is not None or settings.to not in self.known(frame, settings.source):
+        if self._first is not None or settings.to not in self.known_actors(frame, settings.source):
             return
         self._first = view.time
         own, other = view.plain_boxes[view.rows[self.of]], view.plain_boxes[view.rows[settings.to]]

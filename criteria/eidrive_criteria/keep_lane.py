@@ -24,29 +24,29 @@ class KeepLane(SummedCriterion):
     def __init__(self, settings: KeepLaneSettings) -> None:
         super().__init__(settings)
         self._before: LaneLocation | None = None
-        self._known = False
+        self._has_previous = False
 
     def interrupt(self) -> None:
         super().interrupt()
-        self._known = False
+        self._has_previous = False
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        place = self.lanes.center(view, row)
-        before, known = self._before, self._known
-        self._before, self._known = place, True
-        if not known or self._same_lane(before, place):
+        location = self.lanes.center(view, row)
+        before, has_previous = self._before, self._has_previous
+        self._before, self._has_previous = location, True
+        if not has_previous or self._same_lane(before, location):
             return None
         return 1.0
 
     def _same_lane(self, before: LaneLocation | None, now: LaneLocation | None) -> bool:
         if before is None or now is None:
             return before is now
-        one, other = self.lanes.key(before), self.lanes.key(now)
-        if one == other:
+        first, second = self.lanes.key(before), self.lanes.key(now)
+        if first == second:
             return True
         roads = self.lanes.roads
-        if any(other == following for way in (1, -1) for following, _ in roads.links.beyond(one, way)):
+        if any(second == following for way in (1, -1) for following, _ in roads.links.beyond(first, way)):
             return True
-        if one.road == other.road:
-            return abs(one.section - other.section) > 1
-        return any(roads.road(key.road).junction_id is not None for key in (one, other))
+        if first.road == second.road:
+            return abs(first.section - second.section) > 1
+        return any(roads.road(key.road).junction_id is not None for key in (first, second))

@@ -21,9 +21,9 @@ class OffRoad(SummedCriterion):
     state = "left the road"
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        place = self.lanes.center(view, row)
-        if place is not None:
-            lane = self.lanes.lane(place)
+        location = self.lanes.center(view, row)
+        if location is not None:
+            lane = self.lanes.lane(location)
             if lane.drivable or lane.type in ALLOWED:
                 return None
         x, y, *_ = view.plain_boxes[row]

@@ -23,12 +23,12 @@ class OnSidewalk(SummedCriterion):
     state = "was on a sidewalk"
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        place = self.lanes.center(view, row)
-        if place is not None and self.lanes.lane(place).drivable:
+        location = self.lanes.center(view, row)
+        if location is not None and self.lanes.lane(location).drivable:
             return None
         x, y, *_ = view.plain_boxes[row]
         center, *outline = self.lanes.types_at([(x, y, view.states[row].z), *corners(view, row)])
         if center & SIDEWALKS and "driving" not in center:
             return duration
-        beside = any(found & SIDEWALKS for found in outline) and not any("driving" in found for found in outline)
+        beside = any(types & SIDEWALKS for types in outline) and not any("driving" in types for types in outline)
         return duration if beside else None

@@ -70,7 +70,7 @@ class PerceivedCriterion(Criterion):
         self.perceives = True
         self.evaluate(frame)
 
-    def known(self, frame: Frame, source: Source) -> Mapping[str, float]:
+    def known_actors(self, frame: Frame, source: Source) -> Mapping[str, float]:
         """Return the actors that the station knows from a source, with the distance of their object [m]."""
         given = self._match
         return known_actors(frame, self.of, source, within=given.within, min_confidence=given.min_confidence)
@@ -136,11 +136,11 @@ class RecalledCriterion(PerceivedCriterion):
         super().observe(frame)
 
     def evaluate(self, frame: Frame) -> None:
-        known = {source: self.known(frame, source).keys() for source in SOURCES}
+        names_by_source = {source: self.known_actors(frame, source).keys() for source in SOURCES}
         for group, names in self._groups(frame).items():
             self.total[group] += len(names)
             for source in SOURCES:
-                self._known[source][group] += len(names & known[source])
+                self._known[source][group] += len(names & names_by_source[source])
 
     def recall(self, source: Source, group: Group) -> float | None:
         """Return the share of the objects of a group that the station knows; None without such objects."""
@@ -196,7 +196,7 @@ class RecalledCriterion(PerceivedCriterion):
             "helper_only": helped,
             "hidden": hidden - helped,
         }
-        return {group: {view.names[row] for row in found} for group, found in rows.items()}
+        return {group: {view.names[row] for row in members} for group, members in rows.items()}
 
     def _is_in_field(self, view: WorldView, own: int, row: int) -> bool:
         """Return whether the center of an actor is in the field of view of the station."""

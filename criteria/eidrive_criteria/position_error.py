@@ -43,8 +43,8 @@ class PositionError(PerceivedCriterion):
 
     def evaluate(self, frame: Frame) -> None:
         settings = self._settings
-        known = self.known(frame, settings.source)
-        errors = [error for name, error in known.items() if settings.to is None or name == settings.to]
+        distances = self.known_actors(frame, settings.source)
+        errors = [error for name, error in distances.items() if settings.to is None or name == settings.to]
         self._errors.add(errors, frame.view.time)
 
     def verdict(self) -> Verdict:

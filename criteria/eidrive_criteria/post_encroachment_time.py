@@ -128,12 +128,12 @@ def time_between(leaving: Trail, arriving: Trail, now: float) -> float:
     return arrival - departure
 
 
-def _change(inside: Trace, outside: Trace, place: Body) -> tuple[float, Body]:
+def _change(inside: Trace, outside: Trace, area: Body) -> tuple[float, Body]:
     """Return the last time and body between two frames, from the first one on, at which the body overlaps a place."""
     low, high = 0.0, 1.0
     for _ in range(STEPS):
         middle = (low + high) / 2.0
-        low, high = (middle, high) if overlap(_between(inside.body, outside.body, middle), place) else (low, middle)
+        low, high = (middle, high) if overlap(_between(inside.body, outside.body, middle), area) else (low, middle)
     return inside.time + low * (outside.time - inside.time), _between(inside.body, outside.body, low)
 
 

@@ -58,12 +58,12 @@ class ReachPosition(Criterion):
 
     def verdict(self) -> Verdict:
         settings = self._settings
-        place = f"({settings.x:.1f}, {settings.y:.1f})"
+        target = f"({settings.x:.1f}, {settings.y:.1f})"
         if self._reached is not None:
-            reason = f"{settings.of} reached {place} at {self._reached:.2f} s"
+            reason = f"{settings.of} reached {target} at {self._reached:.2f} s"
         elif math.isfinite(self._nearest):
             until = "" if settings.by is None else f" until {settings.by:.2f} s"
-            reason = f"{settings.of} came no nearer to {place} than {self._nearest:.2f} m{until}"
+            reason = f"{settings.of} came no nearer to {target} than {self._nearest:.2f} m{until}"
         else:
             reason = actor_never_present([settings.of])
         return self.conclude(

@@ -93,16 +93,17 @@ class RssViolation(Criterion):
             return
         self._ticks += 1
         violated = False
-        for found in self._surroundings.relations(view, settings.of, None if settings.to is None else (settings.to,)):
+        to = None if settings.to is None else (settings.to,)
+        for relation in self._surroundings.relations(view, settings.of, to):
             # A body that overlaps from behind is a coupled trailer, or has hit this one.
-            behind = found.ahead < 0.0 and (found.gap > 0.0 or found.side_gap == 0.0)
-            if behind or found.crosses or math.hypot(found.speed, found.side_speed) < STANDING:
+            behind = relation.ahead < 0.0 and (relation.gap > 0.0 or relation.side_gap == 0.0)
+            if behind or relation.crosses or math.hypot(relation.speed, relation.side_speed) < STANDING:
                 continue
-            ratio = safety_ratio(self._model, found)
+            ratio = safety_ratio(self._model, relation)
             if ratio < self._ratio:
-                self._ratio, self._when, self._other = ratio, view.time, found.other
+                self._ratio, self._when, self._other = ratio, view.time, relation.other
             if ratio < 1.0:
-                violated, self.violated_with = True, self.violated_with or found.other
+                violated, self.violated_with = True, self.violated_with or relation.other
         if violated:
             self._violations += 1
             self._first = view.time if self._first is None else self._first
@@ -130,25 +131,25 @@ class RssViolation(Criterion):
 
     def metrics(self) -> Mapping[str, float]:
         """Return the share of the time with a violation, and the smallest ratio of distance to required distance."""
-        found = {f"{self.name}.share": self._violations / self._ticks} if self._ticks else {}
-        return found | ({f"{self.name}.ratio": self._ratio} if math.isfinite(self._ratio) else {})
+        share = {f"{self.name}.share": self._violations / self._ticks} if self._ticks else {}
+        return share | ({f"{self.name}.ratio": self._ratio} if math.isfinite(self._ratio) else {})
 
 
-def safety_ratio(model: SafeDistanceModel, found: Relation) -> float:
+def safety_ratio(model: SafeDistanceModel, relation: Relation) -> float:
     """Return the larger ratio of distance to minimum distance, longitudinal and lateral; below 1 is dangerous.
 
     It is infinite if a minimum distance is 0 at a distance above it.
     """
-    if found.other_speed >= 0.0:
-        required = model.same_direction(max(found.speed, 0.0), found.other_speed) if found.gap > 0.0 else math.inf
+    own, other = max(relation.speed, 0.0), abs(relation.other_speed)
+    if relation.other_speed >= 0.0:
+        required = model.same_direction(own, other) if relation.gap > 0.0 else math.inf
     else:
-        own, other = max(found.speed, 0.0), -found.other_speed
-        required = model.opposite(other, own) if found.wrong_way else model.opposite(own, other)
-    if found.left >= 0.0:
-        beside = model.lateral(-found.other_side_speed, -found.side_speed)
+        required = model.opposite(other, own) if relation.wrong_way else model.opposite(own, other)
+    if relation.left >= 0.0:
+        beside = model.lateral(-relation.other_side_speed, -relation.side_speed)
     else:
-        beside = model.lateral(-found.side_speed, -found.other_side_speed)
-    return max(_ratio(found.gap, required), _ratio(found.side_gap, beside))
+        beside = model.lateral(-relation.side_speed, -relation.other_side_speed)
+    return max(_ratio(relation.gap, required), _ratio(relation.side_gap, beside))
 
 
 def _ratio(distance: float, required: float) -> float:

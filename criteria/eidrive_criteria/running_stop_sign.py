@@ -52,8 +52,8 @@ class RunningStopSign(StopLineCriterion):
 
     def approach(self, frame: Frame, row: int, point: tuple[float, float]) -> None:
         view = frame.view
-        known = {line.signal for line in self.crossings.near(point, FORGOTTEN)}
-        self._stopped = {signal: end for signal, end in self._stopped.items() if signal in known}
+        near = {line.signal for line in self.crossings.near(point, FORGOTTEN)}
+        self._stopped = {signal: end for signal, end in self._stopped.items() if signal in near}
         stands = abs(float(view.speed[row])) < self._own.below
         if not stands:
             self._since.clear()

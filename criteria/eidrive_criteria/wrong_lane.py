@@ -37,10 +37,10 @@ class WrongLane(SummedCriterion):
 
 def drives_against_lane(lanes: LaneTracker, view: WorldView, row: int) -> bool:
     """Return whether an actor is in a lane of the opposite direction, outside junctions and lanes for both."""
-    place = lanes.center(view, row)
-    if place is None or lanes.roads.road(place.road).junction_id is not None:
+    location = lanes.center(view, row)
+    if location is None or lanes.roads.road(location.road).junction_id is not None:
         return False
-    lane = lanes.lane(place)
+    lane = lanes.lane(location)
     if not lane.drivable or lane.type == "bidirectional" or lane.direction == "both":
         return False
-    return math.cos(view.states[row].yaw - lanes.roads.pose(place).h) < AGAINST
+    return math.cos(view.states[row].yaw - lanes.roads.pose(location).h) < AGAINST

@@ -75,9 +75,13 @@ class YieldToEmergencyVehicle(Criterion):
         self._removed = not (settings.of in view.rows and settings.to in view.rows)
         if self._removed:
             return
-        found = next(self._surroundings.relations(view, settings.of, (settings.to,)), None)
+        relation = next(self._surroundings.relations(view, settings.of, (settings.to,)), None)
         if self._since is None:
-            approaches = found is not None and found.ahead <= 0.0 < found.other_speed and found.gap <= settings.within
+            approaches = (
+                relation is not None
+                and relation.ahead <= 0.0 < relation.other_speed
+                and relation.gap <= settings.within
+            )
             self._since = view.time if approaches else None
         if self._since is None:
             return
@@ -85,13 +89,13 @@ class YieldToEmergencyVehicle(Criterion):
         self._longest = waited if self._longest is None else max(self._longest, waited)
         if self._violated is None and settings.at_most is not None and waited > settings.at_most + TIME_TOLERANCE:
             self._violated = view.time
-        if found is None:
+        if relation is None:
             # Without a relation a vehicle that had fallen back is out of range; a near one is on another way.
             if self._gap <= settings.within:
                 self._since, self._outcome = None, "took another way than"
             return
-        self._gap = found.gap
-        if found.ahead > 0.0:
+        self._gap = relation.gap
+        if relation.ahead > 0.0:
             self._since, self._outcome = None, "was past"
 
     def verdict(self) -> Verdict:
