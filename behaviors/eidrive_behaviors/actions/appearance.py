@@ -133,6 +133,7 @@ class AnimationAction(ActionBehaviour):
         kind, target = self._kind_and_target()
         context, name = self.context, self.actor.name
         pedestrian = self.action.animation_type.pedestrian_animation
+        gestures = pedestrian.pedestrian_gesture if pedestrian else ()
         animation = AnimationState(
             kind,
             target,
@@ -140,7 +141,7 @@ class AnimationAction(ActionBehaviour):
             since=max(context.time, 0.0),
             duration=self.action.animation_duration,
             loop=bool(self.action.loop),
-            gestures=tuple(one.gesture.value for one in pedestrian.pedestrian_gesture) if pedestrian else (),
+            gestures=tuple(gesture.gesture.value for gesture in gestures),
         )
         before = context.appearance(name)
         context.set_appearance(name, replace(before, animations={**before.animations, self.resource: animation}))

@@ -52,8 +52,8 @@ class ActivateControllerAction(ActionBehaviour):
             return False
         entities = self.context.scenario.document.entities
         objects = entities.scenario_object if entities is not None else ()
-        held = next((one.object_controller for one in objects if one.name == self.actor.name), ())
-        named = {one.name: controller for one, controller in zip(held, self.actor.controllers, strict=False)}
+        held = next((declared.object_controller for declared in objects if declared.name == self.actor.name), ())
+        named = {declared.name: controller for declared, controller in zip(held, self.actor.controllers, strict=False)}
         named |= {controller.name: controller for controller in self.actor.controllers}
         return name in named and not is_agent_controller(named[name])
 

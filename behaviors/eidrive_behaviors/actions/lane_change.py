@@ -72,15 +72,15 @@ def lane_path(
     """
     transition = copy.copy(transition)
     step = SPACING if math.cos(roads.pose(start).h - heading) >= 0.0 else -SPACING
-    place: LaneLocation | None = start
+    location: LaneLocation | None = start
     points: list[tuple[float, float, float]] = []
     end: int | None = None
-    while place is not None and SPACING * len(points) <= length:
+    while location is not None and SPACING * len(points) <= length:
         end = len(points) if end is None and transition.done else end
-        side = roads.driving_direction(place.road, place.lane)
-        points.append(roads.pose(place._replace(offset=transition.value * side))[:3])
+        side = roads.driving_direction(location.road, location.lane)
+        points.append(roads.pose(location._replace(offset=transition.value * side))[:3])
         transition.advance(SPACING * per_meter)
-        place = roads.advance(place, step, route=route)
+        location = roads.advance(location, step, route=route)
     if len(points) < 2:
         return None
     return LanePath(np.array(points), len(points) - 1 if end is None else end)

@@ -96,12 +96,12 @@ class LaneOffsetAction(ActionBehaviour):
         other = self.context.location(name)
         if other is None or roads is None:
             raise self.error(f"the reference entity {name!r} is off the road")
-        found = roads.distance(here, other)
-        if found is None:
+        offset = roads.distance(here, other)
+        if offset is None:
             raise self.error(f"the reference entity {name!r} is not reachable along the roads")
         along = facing(self.context, self.actor.name, here) * same_way(self.context, self.actor.name, name, "lane")
         left = target.relative_target_lane_offset.value * along
-        return here.offset + (found[1] + left) * self._way(here)
+        return here.offset + (offset[1] + left) * self._way(here)
 
     def describe(self) -> str:
         """Describe target and shape."""

@@ -49,10 +49,10 @@ class AssignRouteAction(ActionBehaviour):
         here = self.context.location(self.actor.name) if self.actor.present else None
         roads, seed = self.context.roads, self.context.seed
 
-        def place(position: model.Position) -> ResolvedPosition:
+        def resolve(position: model.Position) -> ResolvedPosition:
             return resolve_position(position, self.context, self.actor.name)
 
-        build = partial(build_route, route, roads, place, seed=seed, again=True)
+        build = partial(build_route, route, roads, resolve, seed=seed, again=True)
         try:
             path = build(here)
         except EidriveError:
@@ -62,7 +62,7 @@ class AssignRouteAction(ActionBehaviour):
                 self.context.warn(*self.error(message, "start the action on the way to its first waypoint").diagnostics)
             else:
                 wrong_way = self._attempt(partial(build, here, against_traffic=True))
-                if wrong_way is None or not self._may_drive_against_traffic(place(route.waypoint[0].position)):
+                if wrong_way is None or not self._may_drive_against_traffic(resolve(route.waypoint[0].position)):
                     raise
                 path = wrong_way
                 warn_of_wrong_way(self, f"route {route.name!r}")
@@ -97,20 +97,20 @@ class AcquirePositionAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Assign the route. Raise ScenarioError if none exists."""
-        place = resolve_position(self.action.position, self.context, self.actor.name)
+        target = resolve_position(self.action.position, self.context, self.actor.name)
         here = self.context.location(self.actor.name)
-        if self.context.roads is not None and here is not None and place.location is not None:
+        if self.context.roads is not None and here is not None and target.location is not None:
             try:
-                route = self._route(self.context.roads, here, place.location)
+                route = self._route(self.context.roads, here, target.location)
             except RouteError as error:
                 raise self.error(error.diagnostics[0].message, error.diagnostics[0].hint) from None
             assign_route(self, route)
         elif self.actor.driven:
             start = self.actor.motion.pose
-            check_way(self, math.hypot(place.pose.x - start.x, place.pose.y - start.y))
+            check_way(self, math.hypot(target.pose.x - start.x, target.pose.y - start.y))
             goal = self.actor.goal
-            self.actor.set_goal(replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]])))
-        elif self.context.roads is not None and place.location is None:
+            self.actor.set_goal(replace(goal or Goal(), path=None, lap=None, waypoints=np.array([target.pose[:3]])))
+        elif self.context.roads is not None and target.location is None:
             raise self.error("the position is not on a road", "move it onto a lane")
         else:
             message = f"{self.actor.name!r} is not on a road: it does not turn to the position"

@@ -186,22 +186,22 @@ class SynchronizeAction(ActionBehaviour):
         actor = self.context.actors[name]
         if actor.progress is not None:
             return self._along(actor.progress, name, position, sense)
-        place: ResolvedPosition = resolve_position(position, self.context, name)
+        target: ResolvedPosition = resolve_position(position, self.context, name)
         here = self.context.pose(name)
-        straight = math.hypot(place.pose.x - here.x, place.pose.y - here.y)
+        straight = math.hypot(target.pose.x - here.x, target.pose.y - here.y)
         roads = self.context.roads
         start = self.context.location(name)
-        if roads is None or start is None or place.location is None:
+        if roads is None or start is None or target.location is None:
             return straight
         sense *= facing(self.context, name, start)
         route = actor.motion.route
-        on_route = None if route is None else roads.distance(start, place.location, route=route)
+        on_route = None if route is None else roads.distance(start, target.location, route=route)
         if on_route is not None:
             return on_route[0] * sense
-        found = roads.distance(start, place.location)
-        if found is None or found[0] * sense >= 0.0:
-            return straight if found is None else abs(found[0])
-        behind, ahead = abs(found[0]), roads.distance(start, place.location, sense=1 if sense > 0.0 else -1)
+        shortest = roads.distance(start, target.location)
+        if shortest is None or shortest[0] * sense >= 0.0:
+            return straight if shortest is None else abs(shortest[0])
+        behind, ahead = abs(shortest[0]), roads.distance(start, target.location, sense=1 if sense > 0.0 else -1)
         return behind if behind < JUST_PASSED or ahead is None else abs(ahead[0])
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
@@ -217,8 +217,8 @@ class SynchronizeAction(ActionBehaviour):
         if cached[1] and isinstance(frame, model.TrajectoryPosition):
             target = frame.s
         else:
-            place = resolve_position(position, self.context, name).pose
-            target = layout.project(place.x, place.y, here)[0]
+            pose = resolve_position(position, self.context, name).pose
+            target = layout.project(pose.x, pose.y, here)[0]
         way = (target - here) * progress.way * sense
         return way % layout.length if layout.closed and layout.length > 0.0 else way
 

@@ -14,8 +14,8 @@ class TeleportAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Teleport the actor."""
-        place = resolve_position(self.action.position, self.context, self.actor.name)
-        self.context.add_actor(self.actor.name, place)
+        target = resolve_position(self.action.position, self.context, self.actor.name)
+        self.context.add_actor(self.actor.name, target)
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -163,11 +163,11 @@ class TrafficSourceAction(TrafficInstanceAction):
 
     def build_generator(self) -> traffic.Source:
         """Return the source. Raise ScenarioError if no lane is near."""
-        position: ResolvedPosition = resolve_position(self.action.position, self.context, None)
+        center: ResolvedPosition = resolve_position(self.action.position, self.context, None)
         lanes, ground = self.background.fleet.lanes, self.background.population.ground
-        x, y, radius = position.pose.x, position.pose.y, self.action.radius
+        x, y, radius = center.pose.x, center.pose.y, self.action.radius
         driving, walking = (
-            traffic.sites_within_radius(lanes, sites, x, y, radius, position.location)
+            traffic.sites_within_radius(lanes, sites, x, y, radius, center.location)
             for sites in (ground.driving, ground.walking)
         )
         if not len(driving) and not len(walking):
@@ -202,11 +202,11 @@ class TrafficSinkAction(TrafficInstanceAction):
 
     def build_generator(self) -> traffic.Sink:
         """Return the sink."""
-        position = resolve_position(self.action.position, self.context, None)
+        center = resolve_position(self.action.position, self.context, None)
         return traffic.Sink(
             self.traffic_name,
             self.background.key(self.traffic_name),
-            position=(position.pose.x, position.pose.y),
+            position=(center.pose.x, center.pose.y),
             radius=self.action.radius,
             rate=float("inf") if self.action.rate is None else self.action.rate,
             categories=None if self._traffic_mix is None else self._traffic_mix.categories,
@@ -235,8 +235,8 @@ class TrafficAreaAction(TrafficInstanceAction):
         if outline is None:
             covers = traffic.stretches_cover(self.background.fleet.lanes, self._road_ranges())
         else:
-            places = [resolve_position(position, self.context, None).pose for position in outline.position]
-            covers = traffic.polygon([(place.x, place.y) for place in places])
+            corners = [resolve_position(position, self.context, None).pose for position in outline.position]
+            covers = traffic.polygon([(corner.x, corner.y) for corner in corners])
         return traffic.Area(
             self.traffic_name,
             self.background.key(self.traffic_name),

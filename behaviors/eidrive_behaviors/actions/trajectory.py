@@ -46,18 +46,18 @@ class DrivenTrajectory:
     place  arc length of the vehicle [m], within the trajectory
     """
 
-    def __init__(self, layout: TrajectoryCurve, place: float) -> None:
-        self.place = place
+    def __init__(self, layout: TrajectoryCurve, s: float) -> None:
+        self.s = s
         self._away = 0.0
         self._layout = layout
-        self._path = _points(layout, place)
+        self._path = _points(layout, s)
         self._lap = _points(layout, 0.0) if layout.closed else None
 
     def move(self, pose: Pose) -> float:
         """Update the place, and return the arc length [m] on the trajectory extended along its tangents."""
         layout = self._layout
-        at = layout.track(pose.x, pose.y, self.place)
-        self.place = at if layout.closed else min(max(at, 0.0), layout.length)
+        at = layout.track(pose.x, pose.y, self.s)
+        self.s = at if layout.closed else min(max(at, 0.0), layout.length)
         end = layout.at(layout.length)
         self._away = math.hypot(pose.x - end.x, pose.y - end.y)
         return at
@@ -74,7 +74,7 @@ class DrivenTrajectory:
 
     @property
     def _has_passed(self) -> bool:
-        return not self._layout.closed and self._layout.length - self.place <= ARRIVED
+        return not self._layout.closed and self._layout.length - self.s <= ARRIVED
 
     def goal(self, before: Goal | None, speed: float | None) -> Goal:
         """Return the goal with this path; a target speed [m/s] replaces that of the goal before."""
@@ -242,7 +242,7 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def _heading_by_lane(self) -> float | None:
         """Return the driving direction of the lane of the first vertex [rad]; None outside of lanes."""
-        first = next(one for one in self._trajectory.walk() if isinstance(one, model.Position))
+        first = next(element for element in self._trajectory.walk() if isinstance(element, model.Position))
         here, roads = resolve_position(first, self.context, self.actor.name).location, self.context.roads
         return roads.pose(here).h if roads is not None and here is not None and roads.on_road(here) else None
 
@@ -376,13 +376,13 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def _set_driver_goal(self) -> Status:
         driven, motion = self._driven, self.actor.motion
-        if driven is None or driven.place != self._s:
+        if driven is None or driven.s != self._s:
             check_way(self, self._layout.length)
             driven = self._driven = DrivenTrajectory(self._layout, self._s)
         starts = motion.teleported or not self.actor.present
         if self.actor.present:
-            place = driven.move(motion.pose)
-            self._progress.move(self.context.view.tick, place, place)
+            s = driven.move(motion.pose)
+            self._progress.move(self.context.view.tick, s, s)
         else:
             self._enter(self._pose(self._s))
         speed = None
@@ -390,7 +390,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             speed = self._layout.speed_at(self._clock(0.0)) / self._timing.scale
             if starts:
                 motion.set_speed(speed)
-        self._s = driven.place
+        self._s = driven.s
         self.actor.set_goal(driven.goal(self.actor.goal, speed))
         if driven.has_missed:
             warn_of_missed_end(self)

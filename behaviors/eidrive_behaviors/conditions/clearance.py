@@ -29,8 +29,8 @@ class RelativeClearanceCondition(EntityCondition):
     def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the entities in the area."""
         here = context.location(entity)
-        found = self._entities_within(context, entity, here) if here is not None else []
-        return f"{entity}: {', '.join(found)} within its clearance" if found else f"{entity}: clear around"
+        entities = self._entities_within(context, entity, here) if here is not None else []
+        return f"{entity}: {', '.join(entities)} within its clearance" if entities else f"{entity}: clear around"
 
     def describe_for(self) -> str:
         """Describe the range."""
@@ -50,9 +50,9 @@ class RelativeClearanceCondition(EntityCondition):
         if not locations or not any(self._in_range(context, entity, here, other) for other in covered_lanes(locations)):
             return False
         assert context.roads is not None
-        found = [context.roads.distance(here, other) for other in locations]
+        offsets = [context.roads.distance(here, other) for other in locations]
         turn = facing(context, entity, here)
-        along = [offset[0] * turn for offset in found if offset is not None]
+        along = [offset[0] * turn for offset in offsets if offset is not None]
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return bool(along) and min(along) <= ahead and max(along) >= -behind
 
@@ -92,10 +92,10 @@ class RelativeClearanceCondition(EntityCondition):
 
 def covered_lanes(locations: list[LaneLocation]) -> list[LaneLocation]:
     """Return one location in each lane that a box covers between its corners, without lane 0."""
-    found = {(location.road, location.lane): location for location in locations}
+    by_lane = {(location.road, location.lane): location for location in locations}
     for road in {location.road for location in locations}:
-        lanes = [lane for name, lane in found if name == road]
+        lanes = [lane for name, lane in by_lane if name == road]
         for lane in range(min(lanes) + 1, max(lanes)):
             if lane != 0:
-                found.setdefault((road, lane), found[road, lanes[0]]._replace(lane=lane))
-    return list(found.values())
+                by_lane.setdefault((road, lane), by_lane[road, lanes[0]]._replace(lane=lane))
+    return list(by_lane.values())

@@ -78,8 +78,8 @@ class DistanceCondition(GapCondition):
 
     def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the absolute distance [m]."""
-        place = current_place(context, self.element.position, entity)
-        return math.nan if place is None else abs(self.gap(context, entity, place))
+        target = current_place(context, self.element.position, entity)
+        return math.nan if target is None else abs(self.gap(context, entity, target))
 
 
 class RelativeDistanceCondition(GapCondition):
@@ -120,11 +120,11 @@ class ReachPositionCondition(QuantityCondition):
 
     def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the distance between reference point and position [m]; infinite while the position is undefined."""
-        place = current_place(context, self.element.position, entity)
-        if place is None:
+        target = current_place(context, self.element.position, entity)
+        if target is None:
             return math.inf
         here = context.pose(entity)
-        return math.hypot(place.pose.x - here.x, place.pose.y - here.y)
+        return math.hypot(target.pose.x - here.x, target.pose.y - here.y)
 
     def threshold(self) -> tuple[model.Rule, float]:
         """Return the rule: at most the tolerance."""

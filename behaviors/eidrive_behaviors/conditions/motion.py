@@ -123,8 +123,8 @@ class DurationCondition(MotionCondition):
     def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the current duration."""
         start = self.since(context, entity)
-        found = self.otherwise if start is None else f"{self.state} for {context.time - start:.2f} s"
-        return f"{entity}: {found}"
+        text = self.otherwise if start is None else f"{self.state} for {context.time - start:.2f} s"
+        return f"{entity}: {text}"
 
     def describe_for(self) -> str:
         """Describe the required duration."""

@@ -56,16 +56,16 @@ def flag(controller: model.Controller, name: str, default: bool) -> bool:
     return value
 
 
-def choice(controller: model.Controller, name: str, known: Collection[str], default: str) -> str:
-    """Return a property that is one of the known texts; `default` if the controller does not have it.
+def choice(controller: model.Controller, name: str, choices: Collection[str], default: str) -> str:
+    """Return a property that is one of `choices`; `default` if the controller does not have it.
 
     Raise ScenarioError for another text.
     """
     entry = _entry(controller, name)
     if entry is None:
         return default
-    if entry.value not in known:
-        raise _invalid(controller, entry, suggestion(entry.value, known))
+    if entry.value not in choices:
+        raise _invalid(controller, entry, suggestion(entry.value, choices))
     return entry.value
 
 
@@ -146,12 +146,12 @@ class AdaptiveCruise(ControllerModel):
 
     def _find_lead(self) -> tuple[float, float] | None:
         """Return gap [m] and speed [m/s] of the nearest vehicle in the path; None if there is none."""
-        found = [
+        leads = [
             (gap, self.context.speed(name))
             for name, other in self.context.actors.items()
             if other is not self.actor and other.present and (gap := self._gap(name)) is not None
         ]
-        return min(found, default=None)
+        return min(leads, default=None)
 
     def _gap(self, name: str) -> float | None:
         context, me = self.context, self.actor.name

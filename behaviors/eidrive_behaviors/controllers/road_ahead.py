@@ -76,8 +76,9 @@ class RoadAhead:
         if here is None or roads is None:
             return []
         others = (other for other in self._context.actors.values() if other is not self._actor and other.present)
-        found = (self._observe(here, other) for other in others if other.name in self._context.view)
-        return sorted((candidate for candidate in found if candidate is not None), key=lambda candidate: candidate.gap)
+        observed = (self._observe(here, other) for other in others if other.name in self._context.view)
+        objects = [candidate for candidate in observed if candidate is not None]
+        return sorted(objects, key=lambda candidate: candidate.gap)
 
     def _observe(self, here: LaneLocation, other: Actor) -> LeadObject | None:
         roads, there = self._context.roads, self._context.location(other.name)
@@ -114,25 +115,27 @@ class RoadAhead:
             walks=walks,
         )
 
-    def _relative_heading(self, actor: Actor, place: LaneLocation) -> float:
+    def _relative_heading(self, actor: Actor, location: LaneLocation) -> float:
         """Return the angle of an actor to the own driving direction at a lane location [rad]."""
         roads = self._context.roads
         assert roads is not None
-        lane = roads.lane_pose_at(*place[:4]).h
+        lane = roads.lane_pose_at(*location[:4]).h
         here = self._context.location(self._actor.name)
         assert here is not None
-        flip = 0.0 if self._way_at(here, place) > 0 else math.pi
+        flip = 0.0 if self._way_at(here, location) > 0 else math.pi
         return self._context.pose(actor.name).h - lane - flip
 
-    def _way_at(self, here: LaneLocation, place: LaneLocation) -> int:
+    def _way_at(self, here: LaneLocation, location: LaneLocation) -> int:
         """Return +1 if the own driving direction is that of s on the road of a lane location, else -1."""
         roads = self._context.roads
         assert roads is not None
-        return roads.driving_direction(here.road, here.lane) * (roads.orientation(here, place) or 1)
+        return roads.driving_direction(here.road, here.lane) * (roads.orientation(here, location) or 1)
 
-    def _extents(self, actor: Actor, place: LaneLocation, along: float = 0.0, across: float = 0.0) -> tuple[Span, Span]:
+    def _extents(
+        self, actor: Actor, location: LaneLocation, along: float = 0.0, across: float = 0.0
+    ) -> tuple[Span, Span]:
         """Return the extents of an actor along and across the road, relative to the own reference point [m]."""
-        turn, bounds = self._relative_heading(actor, place), actor.entity.bounding_box
+        turn, bounds = self._relative_heading(actor, location), actor.entity.bounding_box
         cos, sin = math.cos(turn), math.sin(turn)
         x = along + bounds.center.x * cos - bounds.center.y * sin
         y = across + bounds.center.x * sin + bounds.center.y * cos
@@ -140,20 +143,20 @@ class RoadAhead:
         half_y = 0.5 * (bounds.dimensions.length * abs(sin) + bounds.dimensions.width * abs(cos))
         return (x - half_x, x + half_x), (y - half_y, y + half_y)
 
-    def _front_wheel_offset(self, actor: Actor, place: LaneLocation, across: float, side: float) -> float:
+    def _front_wheel_offset(self, actor: Actor, location: LaneLocation, across: float, side: float) -> float:
         """Return t of the corner beside the front axle that is nearest to the own actor [m]."""
-        turn, bounds = self._relative_heading(actor, place), actor.entity.bounding_box
+        turn, bounds = self._relative_heading(actor, location), actor.entity.bounding_box
         axles = actor.entity.axles if isinstance(actor.entity, model.Vehicle) else None
         front = axles.front_axle if axles is not None else None
         x = front.position_x if front is not None else bounds.center.x + 0.5 * bounds.dimensions.length
         y = math.copysign(0.5 * bounds.dimensions.width, -side * math.cos(turn))
         return across + x * math.sin(turn) + y * math.cos(turn)
 
-    def _velocity(self, actor: Actor, place: LaneLocation) -> tuple[float, float]:
+    def _velocity(self, actor: Actor, location: LaneLocation) -> tuple[float, float]:
         """Return the velocity along and across the road [m/s]."""
         view = self._context.view
         vx, vy, _ = view.velocity[view.rows[actor.name]].tolist()
-        axis = self._context.pose(actor.name).h - self._relative_heading(actor, place)
+        axis = self._context.pose(actor.name).h - self._relative_heading(actor, location)
         cos, sin = math.cos(axis), math.sin(axis)
         return vx * cos + vy * sin, vy * cos - vx * sin
 
