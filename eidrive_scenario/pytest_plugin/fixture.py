@@ -141,7 +141,7 @@ def _added(marker: pytest.Mark, folder: Path) -> MarkerSettings:
     if isinstance(drive, Mapping):
         drive = {name: path_beside(stack, folder) for name, stack in drive.items()}
     if isinstance(criteria, list | tuple):
-        criteria = [path_beside(one, folder) for one in criteria]
+        criteria = [path_beside(criterion, folder) for criterion in criteria]
     return MarkerSettings(drive, path_beside(criteria, folder))
 
 
@@ -155,9 +155,9 @@ def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
     if not Path(glob).is_absolute():
         for folder in (metafunc.definition.path.parent, metafunc.config.rootpath, library_path()):
             files = sorted(folder.glob(glob))
-            found = [path for path in files if definition(path) in ("scenario", "unreadable")]
-            if found:
-                return found
+            scenarios = [path for path in files if definition(path) in ("scenario", "unreadable")]
+            if scenarios:
+                return scenarios
             others += files
     elif is_regular_file(glob):
         if definition(Path(glob)) in ("scenario", "unreadable"):
@@ -211,9 +211,9 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             raise pytest.fail.Exception(printable(str(error)), pytrace=False) from None
         except SimulationError as error:
             add_error(request.node, error, request.node.path)
-            place = error.place if isinstance(error, ExtensionError | WallLimitError) else None
-            if error.__cause__ is not None and place is not None:
-                error.__cause__.__traceback__ = _from_file(error.__cause__.__traceback__, place.file)
+            location = error.place if isinstance(error, ExtensionError | WallLimitError) else None
+            if error.__cause__ is not None and location is not None:
+                error.__cause__.__traceback__ = _from_file(error.__cause__.__traceback__, location.file)
             raise error.with_traceback(None) from error.__cause__
         result = replace(result, warnings=(*result.warnings, *variant.replaced))
         add_properties(request.node, properties(result))

@@ -72,8 +72,8 @@ def run_markers(
     family = family_of(path)
     if family:
         yield _marker(config, family, f"scenarios in folders named {path.parent.name}")
-    place = path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
-    is_slow = "rate" in selectors or any(fnmatchcase(place.as_posix(), one) for one in config.getini(_INI_SLOW))
+    file = path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
+    is_slow = "rate" in selectors or any(fnmatchcase(file.as_posix(), pattern) for pattern in config.getini(_INI_SLOW))
     if is_slow and family != "slow":
         yield pytest.mark.slow
 

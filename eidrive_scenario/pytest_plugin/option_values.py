@@ -108,63 +108,64 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def check_values(name: str, place: str, value: Any, folder: Path) -> None:
+def check_values(name: str, option: str, value: Any, folder: Path) -> None:
     """Raise UsageError if the value of an option names an unknown extension or profile, or is not valid YAML.
 
-    place   option or ini option, for the message
+    option  command-line or ini option, for the message
     folder  folder of relative paths
     """
     check = _CHECKS.get(name)
     if check is None or value is None:
         return
     try:
-        check(place, value, folder)
+        check(option, value, folder)
     except InputError as error:
-        raise pytest.UsageError("\n".join(_with_place(place, str(one)) for one in error.diagnostics)) from None
+        messages = [_with_option(option, str(diagnostic)) for diagnostic in error.diagnostics]
+        raise pytest.UsageError("\n".join(messages)) from None
 
 
-def _with_place(place: str, message: str) -> str:
-    return message if message.startswith(f"{place}: ") else f"{place}: {message}"
+def _with_option(option: str, message: str) -> str:
+    return message if message.startswith(f"{option}: ") else f"{option}: {message}"
 
 
-def _check_channels(place: str, value: list[str], folder: Path) -> None:
+def _check_channels(option: str, value: list[str], folder: Path) -> None:
     """Check that profiles exist and that inline profiles are YAML; their settings are checked when a run loads them."""
     from eidrive_scenario.extensions.library import library_path, resolve
     from eidrive_scenario.files.yaml_text import load_yaml
 
     for channel in split_channels(",".join(value)):
         if "{" in channel:
-            load_yaml(channel, source=place)
+            load_yaml(channel, source=option)
         elif channel != NO_COOPERATION and not (library_path() / "channels" / channel).is_file():
             resolve("channels", path_beside(channel, folder))
 
 
 def _check_extension(group: str) -> Callable[[str, str, Path], None]:
-    def check(place: str, value: str, folder: Path) -> None:
+    def check(option: str, value: str, folder: Path) -> None:
         from eidrive_scenario.errors import SettingError
         from eidrive_scenario.extensions.registry import registry
 
         if value not in registry(group):
-            raise SettingError(registry(group).unknown(value, source=place))
+            raise SettingError(registry(group).unknown(value, source=option))
 
     return check
 
 
-def _check_drive(place: str, value: list[str], folder: Path) -> None:
+def _check_drive(option: str, value: list[str], folder: Path) -> None:
     from eidrive_scenario.files.yaml_text import read_yaml_source
 
-    for stack in option_of("drive").form.parse(place, value).values():
+    for stack in option_of("drive").form.parse(option, value).values():
         if stack is not None:
-            read_yaml_source(path_beside(stack, folder), option=place)
+            read_yaml_source(path_beside(stack, folder), option=option)
 
 
-def _check_criteria(place: str, value: list[str], folder: Path) -> None:
+def _check_criteria(option: str, value: list[str], folder: Path) -> None:
     from eidrive_scenario.errors import quoted
     from eidrive_scenario.evaluation.criteria_parser import declare_criteria
     from eidrive_scenario.files.yaml_text import read_yaml_source
 
     for text in value:
-        content = read_yaml_source(path_beside(text, folder), option=place)
+        content = read_yaml_source(path_beside(text, folder), option=option)
         shown = quoted(content.data)
         if "$" not in shown:  # the parameters of the scenario are not known yet
             declare_criteria(content.data, content.lines, source=content.source, shown=shown)

@@ -88,8 +88,8 @@ def pytest_command(item: pytest.Item) -> str:
     words = ["pytest", "::".join([str(item.path), *item.nodeid.split("::")[1:]])]
     for option in OPTIONS:
         value = None if option.name in _NOT_REPEATED else command_line_value(item.config, option.name)
-        for one in value if option.repeatable and value else [] if value is None else [value]:
-            words += [option.flag, _option_text(option.name, one)]
+        for given in value if option.repeatable and value else [] if value is None else [value]:
+            words += [option.flag, _option_text(option.name, given)]
     return shlex.join(words)
 
 
@@ -121,10 +121,10 @@ def _run_and_report(
 
     config, overrides = item.config, dict(overrides)
     limit = overrides.pop("wall_limit", wall_limit(config))
-    known = [field.name for field in fields(RunSettings)]
+    names = [field.name for field in fields(RunSettings)]
     for keyword in overrides:
-        if keyword not in known:
-            raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, known)))
+        if keyword not in names:
+            raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, names)))
     settings: dict[str, Any] = {}
     for option in OPTIONS:
         if (value := option_value(config, option.name)) is not None and option.setting:
@@ -167,7 +167,7 @@ def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, A
     listed = stacks.parse("eidrive_drive", listed_value(config, "drive"))
     in_file = {name: stack and path_beside(stack, root) for name, stack in listed.items()}
     by_option = stacks.parse("--eidrive-drive", command_line_value(config, "drive") or ())
-    criteria = [path_beside(one, root) for one in listed_value(config, "criterion")]
+    criteria = [path_beside(criterion, root) for criterion in listed_value(config, "criterion")]
     return {
         "drive": {**in_file, **stacks.check("drive", marker.drive), **by_option},
         "criteria": [

@@ -72,13 +72,13 @@ def show_report(terminalreporter: Any, config: pytest.Config) -> None:
 
 def _folders(terminalreporter: Any) -> list[Path]:
     """Return the folders of all runs, including those in the reports of workers of pytest-xdist, each once."""
-    found: dict[Path, None] = {}
+    folders: dict[Path, None] = {}
     for reports in terminalreporter.stats.values():
         for report in reports:
             facts = getattr(report, "eidrive", {})
-            found.update(dict.fromkeys(Path(folder) for folder in facts.get("folders", ())))
-            found.update(dict.fromkeys(Path(path).parent for path in facts.get("attachments", ())))
-    return list(found)
+            folders.update(dict.fromkeys(Path(folder) for folder in facts.get("folders", ())))
+            folders.update(dict.fromkeys(Path(path).parent for path in facts.get("attachments", ())))
+    return list(folders)
 
 
 _SYSTEM_OUT = "system-out"
@@ -180,8 +180,8 @@ def annotation(report: Any, root: Path) -> str:
     """Return the workflow command of one failed test: its place in the scenario file and its reasons."""
     facts = _facts(report)
     file = facts.get("file") or str(root / report.nodeid.split("::")[0])
-    place = f"file={_property(_below_workspace(file))},line={facts.get('line') or 1}"
-    return f"::error {place},title={_property(report.nodeid)}::{_data(_text(facts, report))}"
+    position = f"file={_property(_below_workspace(file))},line={facts.get('line') or 1}"
+    return f"::error {position},title={_property(report.nodeid)}::{_data(_text(facts, report))}"
 
 
 def summary(counts: Mapping[str, int], reports: Iterable[Any]) -> str:
@@ -198,23 +198,23 @@ def summary(counts: Mapping[str, int], reports: Iterable[Any]) -> str:
     if rows:
         lines += ["| test | outcome | reason | command |", "|---|---|---|---|"]
     size = len("\n".join(lines).encode())
-    for number, row in enumerate(rows):
-        size += len(row.encode()) + 1
+    for number, line in enumerate(rows):
+        size += len(line.encode()) + 1
         if size > _MAX_BYTES:
             lines += ["", f"and {len(rows) - number} more"]
             break
-        lines.append(row)
+        lines.append(line)
     return "\n".join([*lines, ""])
 
 
 def _failed(terminalreporter: Any) -> list[Any]:
     """Return the reports of failed tests that run scenarios, each test once."""
-    found: dict[str, Any] = {}
+    failed: dict[str, Any] = {}
     for outcome in ("failed", "error"):
         for report in terminalreporter.stats.get(outcome, ()):
             if hasattr(report, "eidrive") or ".xosc" in Path(report.nodeid.split("::")[0]).suffixes:
-                found.setdefault(report.nodeid, report)
-    return list(found.values())
+                failed.setdefault(report.nodeid, report)
+    return list(failed.values())
 
 
 def _count(reports: Iterable[Any]) -> int:
@@ -258,7 +258,7 @@ def _cell(text: str) -> str:
 
 def _code(command: str) -> str:
     """Return a command as code in a cell: HTML, as a vertical bar ends a cell even in backquotes."""
-    command = re.sub(r"[&<>|`*_\[\]\\$~]", lambda found: f"&#{ord(found[0])};", command)
+    command = re.sub(r"[&<>|`*_\[\]\\$~]", lambda match: f"&#{ord(match[0])};", command)
     return f"<code>{' '.join(command.splitlines())}</code>"
 
 
