@@ -156,7 +156,8 @@ def write_atomically(path: Path) -> Iterator[BinaryIO]:
             if isinstance(error, OSError) and error.filename == str(unfinished):
                 error.filename = str(path)
             if isinstance(error, OutputError):
-                raise OutputError([replace(one, source=str(path)) for one in error.diagnostics]) from error
+                diagnostics = [replace(diagnostic, source=str(path)) for diagnostic in error.diagnostics]
+                raise OutputError(diagnostics) from error
             raise
 
 

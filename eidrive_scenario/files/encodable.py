@@ -22,4 +22,4 @@ def printable(text: str) -> str:
     Names in scenarios, recordings and stores may contain sequences that a terminal executes. In JSON the escapes have
     the same meaning as the characters.
     """
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -155,14 +155,14 @@ def first_elements(content: bytes, max_elements: int, visit: Callable[[int, str,
     """
     parser = expat.ParserCreate()
     depth = count = 0
-    found = False
+    is_done = False
 
     def start(name: str, attributes: Mapping[str, str]) -> None:
-        nonlocal depth, count, found
+        nonlocal depth, count, is_done
         depth += 1
         count += 1
-        found = visit(depth, name.rsplit(":", 1)[-1], attributes)
-        if found or count >= max_elements:
+        is_done = visit(depth, name.rsplit(":", 1)[-1], attributes)
+        if is_done or count >= max_elements:
             raise _Done
 
     def end(_: str) -> None:
@@ -177,7 +177,7 @@ def first_elements(content: bytes, max_elements: int, visit: Callable[[int, str,
         pass
     except (expat.ExpatError, LookupError) as error:
         raise ValueError("not XML") from error
-    return found
+    return is_done
 
 
 def _scan(content: bytes, limits: XmlLimits, refuse: Callable[[str, str, int | None], NoReturn]) -> None:
