@@ -17,6 +17,7 @@ from eidrive_scenario.perception.learned.pillars.grid import ScanHistory
 from eidrive_scenario.perception.learned.pillars.network import PillarNetwork
 from eidrive_scenario.perception.learned.weights import DESCRIPTION
 from eidrive_scenario.sensing.readings import LidarReading
+from eidrive_scenario.v2x.messages.message import compress
 from training.pillars.scenes import CLASSES, overlaps
 
 torch = pytest.importorskip("torch")
@@ -36,8 +37,7 @@ def test_folded_weights_give_the_outputs_of_the_trained_network(tmp_path: Path) 
     network.eval()
     description = {"network": "pillars", "classes": CLASSES, "input_size": [256, 256]}
     path = tmp_path / "pillars.npz"
-    codebook = np.zeros((256, 8), dtype=np.float32)
-    arrays: dict[str, Any] = {**network.folded(), "codebook": codebook, DESCRIPTION: np.array(json.dumps(description))}
+    arrays: dict[str, Any] = {**network.folded(), DESCRIPTION: np.array(json.dumps(description))}
     np.savez(path, **arrays)
     grid = np.random.default_rng(3).random((12, 256, 256), dtype=np.float32)
     engine = PillarNetwork(path, "opencv")
@@ -56,14 +56,19 @@ def test_folded_weights_give_the_outputs_of_the_trained_network(tmp_path: Path) 
     np.testing.assert_allclose(engine.codec.expand(sent[:, :50].numpy()), received, atol=1e-4)
 
 
-def test_grids_of_training_are_those_of_the_engine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two scans of a station at rest, with points 1 m above a level ground and below the clearance."""
+@pytest.fixture
+def samples(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Module `samples`, without Triton."""
     language = SimpleNamespace()
     monkeypatch.setitem(sys.modules, "triton", SimpleNamespace(jit=lambda function: function, language=language))
     monkeypatch.setitem(sys.modules, "triton.language", language)
     from training.pillars import samples
-    from training.pillars.scans import Scans
 
+    return samples
+
+
+def test_grids_of_training_are_those_of_the_engine(samples: Any) -> None:
+    """Two scans of a station at rest, with points 1 m above a level ground and below the clearance."""
     rng = np.random.default_rng(4)
     plan = rng.uniform(-55.0, 55.0, (4000, 2))
     ground = np.column_stack([plan, np.full(len(plan), -2.0)])
@@ -77,11 +82,31 @@ def test_grids_of_training_are_those_of_the_engine(monkeypatch: pytest.MonkeyPat
         grid = history.add(time, [LidarReading(cloud, intensity, pose)], frame, 0.0)
     points, before = (torch.from_numpy(cloud + np.array([0.0, 0.0, 2.0]))[None].float() for cloud in reversed(clouds))
     returned, strength = torch.ones(1, len(intensity), dtype=torch.bool), torch.from_numpy(intensity)[None].float()
-    scans = Scans(points, returned, strength, torch.zeros(1, len(intensity), dtype=torch.int32))
+    scans = samples.Scans(points, returned, strength, torch.zeros(1, len(intensity), dtype=torch.int32))
     trained = samples._grids(points, scans, before, scans)[0].numpy()
     different = ~np.isclose(trained, grid.channels, atol=2e-3)
     assert different.mean() < 1e-4, "except points on the border of a cell"
     assert (grid.channels[0] > 0.0).sum() > 400
+
+
+def test_merged_points_of_training_are_those_of_early_fusion(samples: Any) -> None:
+    """Three stations, whose grids are centered 4 and 8 m apart; the first two points are on the body of the first."""
+    rng = np.random.default_rng(6)
+    world = np.round(rng.uniform(-6.0, 6.0, (3, 400, 3)), 1) + 0.03
+    center = torch.tensor([[0.0, 0.0], [4.0, 0.0], [0.0, 8.0]])
+    points = torch.from_numpy(world).float() - torch.cat([center, torch.zeros(3, 1)], dim=1)[:, None]
+    returned, slots = torch.ones(3, 400, dtype=torch.bool), torch.full((3, 400), 5, dtype=torch.int32)
+    returned[:, -20:] = False
+    slots[:, :2] = 7
+    scans = samples.Scans(points, returned, torch.full((3, 400), 0.25), slots)
+    merged, shown = samples._merged(points, scans, center, torch.tensor([7, 1, -1]), torch.zeros(3, 3))
+    sent = [compress(world[station, 2:-20].astype(np.float32).astype(float), 0.0, 0.1).points() for station in (1, 2)]
+    own = shown.intensity == 0.25
+    np.testing.assert_allclose(merged[own & shown.returned].numpy(), world[0, :-20], atol=1e-5)
+    received = merged[~own & shown.returned].numpy()
+    assert (shown.intensity[~own] == 1.0).all()
+    assert len(received) == sum(map(len, sent))
+    np.testing.assert_allclose(np.sort(received.sum(axis=1)), np.sort(np.concatenate(sent).sum(axis=1)), atol=1e-4)
 
 
 def test_overlap_of_bodies_is_that_of_the_engine() -> None:

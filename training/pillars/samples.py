@@ -34,7 +34,7 @@ class Batch:
     own     (N,) slot of the carrier; -1: a mast
     points  (N, B) number of points of each station on each body
     known   (N,) whether the grid has the earlier scan
-    merged  (S, 12, 256, 256) grids of the first stations with the points of all, as in early fusion; None without them
+    merged  (P, 12, 256, 256) grids of the first stations of P scenes with the points of all, as in early fusion
     """
 
     grids: Tensor
@@ -45,7 +45,7 @@ class Batch:
     own: Tensor
     points: Tensor
     known: Tensor
-    merged: Tensor | None
+    merged: Tensor
 
 
 class Sampler:
@@ -55,11 +55,10 @@ class Sampler:
         self._meshes, self._device = meshes, device
         self.device_type = torch.device(device).type
 
-    def batch(self, arrays: dict[str, Any], noise: Tensor | None = None) -> Batch:
+    def batch(self, arrays: dict[str, Any], noise: Tensor) -> Batch:
         """Return the batch of scenes of `SceneMaker.batch`, each turned by a random angle.
 
-        noise  errors (N, 3) of the poses of the stations in x, y [m] and heading [rad], of the merged points; None:
-               points are not merged
+        noise  errors (P · STATIONS, 3) of the poses of the stations in x, y [m] and heading [rad], of the merged points
         """
         scene = {
             name: torch.as_tensor(value).to(self._device, non_blocking=True)
@@ -91,15 +90,10 @@ class Sampler:
         center = place[:, :2] + phase
         placed = _placed(now, place, scene["yaw"], center), _placed(earlier, before, scene["yaw"], center)
         grids = _grids(placed[0], now, placed[1], earlier)
-        merged = None
-        if noise is not None:
-            merged = _grids(
-                *_merged(placed[0], now, center, own, noise), *_merged(placed[1], earlier, center, own, noise)
-            )
+        merged = _grids(*_merged(placed[0], now, center, own, noise), *_merged(placed[1], earlier, center, own, noise))
         known = torch.rand(len(place), device=self._device) < 0.9  # the earlier scan is sometimes missing
         grids[:, 8:] *= known[:, None, None, None]
-        if merged is not None:
-            merged[:, 8:] *= known[::STATIONS, None, None, None]
+        merged[:, 8:] *= known[: len(noise) : STATIONS, None, None, None]
         slots = scene["bodies"].shape[1]
         hits = torch.zeros(len(place), slots + 1, device=self._device)
         rows = torch.where(now.returned & (now.rows >= 0), now.rows, slots).long()
@@ -137,13 +131,15 @@ def _placed(scans: Scans, place: Tensor, yaw: Tensor, center: Tensor) -> Tensor:
 
 
 def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Tensor) -> tuple[Tensor, Scans]:
-    """Return the points (S, STATIONS · M, 3) of all stations of each scene in the grid of the first one, and their
-    returns.
+    """Return the points (P, STATIONS · M, 3) of all stations of the first P scenes in the grids of the first stations,
+    and their returns, with pose errors (P · STATIONS, 3).
 
     Points of the others are those of the message: centers of occupied cells, each once, with the intensity 1, without
     those on the body of the receiver.
     """
-    number, rays = points.shape[:2]
+    number, rays = len(noise), points.shape[1]
+    points, center = points[:number], center[:number]
+    scans = Scans(*(part[:number] for part in (scans.points, scans.returned, scans.intensity, scans.rows)))
     stations = torch.arange(number, device=points.device)
     receiver = stations // STATIONS * STATIONS
     cos, sin = torch.cos(noise[:, 2:3]), torch.sin(noise[:, 2:3])
@@ -171,47 +167,50 @@ def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Te
 
 
 def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor:
-    """Return the input of the network (N, 12, 256, 256)."""
-    number, height, x, y, standing, cell, size = _cells(points, now.returned)
-    count = _sum(standing, cell, torch.ones_like(height), size)
-    some = count > 0.0
-    per = count.clamp(min=1.0)
-    high = torch.zeros(size, device=height.device).scatter_reduce_(0, cell[standing], height[standing], "amax")
-    low = torch.full((size,), 1e9, device=height.device).scatter_reduce_(0, cell[standing], height[standing], "amin")
-    low = torch.where(some, low, 0.0)
-    ground = _sum(now.returned & (height <= CLEARANCE) & (cell >= 0), cell, torch.ones_like(height), size)
-    channels = [
-        torch.log1p(count) / 3.0, high / 4.0, low / 4.0, _sum(standing, cell, height, size) / per / 4.0,
-        _sum(standing, cell, now.intensity, size) / per, _sum(standing, cell, x, size) / per,
-        _sum(standing, cell, y, size) / per, torch.log1p(ground) / 3.0,
-    ]  # fmt: skip
-    _, height, x, y, standing, cell, _ = _cells(before, earlier.returned)
-    count = _sum(standing, cell, torch.ones_like(height), size)
-    per = count.clamp(min=1.0)
-    high = torch.zeros(size, device=height.device).scatter_reduce_(0, cell[standing], height[standing], "amax")
-    channels += [torch.log1p(count) / 3.0, high / 4.0, _sum(standing, cell, x, size) / per,
-                 _sum(standing, cell, y, size) / per]  # fmt: skip
-    grids = torch.stack([channel.reshape(number, CELLS, CELLS) for channel in channels], dim=1)
-    assert grids.shape[1] == CHANNELS
-    return grids
-
-
-def _cells(points: Tensor, returned: Tensor) -> tuple[int, Tensor, Tensor, Tensor, Tensor, Tensor, int]:
-    """Return number of scans; heights, offsets in the cell, whether they stand, cells of the points; cells in all."""
+    """Return the input of the network (N, 12, 256, 256), with the channels of a cell side by side in memory."""
     number = len(points)
-    i = torch.floor((points[..., 0] + REACH) / SIDE)
-    j = torch.floor((points[..., 1] + REACH) / SIDE)
-    inside = returned & (i >= 0) & (i < CELLS) & (j >= 0) & (j < CELLS)
-    x, y = (points[..., 0] + REACH) / SIDE - i - 0.5, (points[..., 1] + REACH) / SIDE - j - 0.5
-    first = torch.arange(number, device=points.device)[:, None] * (CELLS * CELLS)
-    cell = torch.where(inside, first + (i * CELLS + j).long().clamp(0, CELLS * CELLS - 1), -1)
-    height = points[..., 2]
-    standing = inside & (height > CLEARANCE) & (height < TALLEST)
-    return number, height, x, y, standing, cell, number * CELLS * CELLS
+    size = number * CELLS * CELLS
+    cell, values = _in_cells(points, now.returned, now.intensity)
+    ground = values[:, 0] <= CLEARANCE
+    below = torch.zeros(size, device=points.device).index_add_(0, cell[ground], torch.ones_like(values[ground, 0]))
+    count, high, sums = _statistics(cell[~ground], values[~ground], size)
+    low = torch.full((size,), 1e9, device=points.device)
+    low.scatter_reduce_(0, cell[~ground], values[~ground, 0], "amin")
+    height, x, y, intensity = (sums / count.clamp(min=1.0)[:, None]).unbind(1)
+    channels = [torch.log1p(count) / 3.0, high / 4.0, torch.where(count > 0.0, low, 0.0) / 4.0, height / 4.0,
+                intensity, x, y, torch.log1p(below) / 3.0]  # fmt: skip
+    cell, values = _in_cells(before, earlier.returned, earlier.intensity)
+    standing = values[:, 0] > CLEARANCE
+    count, high, sums = _statistics(cell[standing], values[standing], size)
+    _, x, y, _ = (sums / count.clamp(min=1.0)[:, None]).unbind(1)
+    channels += [torch.log1p(count) / 3.0, high / 4.0, x, y]
+    grids = torch.stack(channels, dim=1).reshape(number, CELLS, CELLS, CHANNELS)
+    return grids.permute(0, 3, 1, 2)
 
 
-def _sum(chosen: Tensor, cell: Tensor, value: Tensor, size: int) -> Tensor:
-    return torch.zeros(size, device=value.device).index_add_(0, cell[chosen], value[chosen])
+def _in_cells(points: Tensor, returned: Tensor, intensity: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the cells (P,) of the points within the grids (N, 256, 256), and their height, offset from the center of
+    the cell along x and y, and intensity (P, 4).
+    """
+    place = (points[..., :2] + REACH) / SIDE
+    index = torch.floor(place)
+    inside = returned & ((index >= 0) & (index < CELLS)).all(dim=2) & (points[..., 2] < TALLEST)
+    # Indices are looked up once: each use of a mask waits for the device.
+    kept = inside.flatten().nonzero()[:, 0]
+    index = index.reshape(-1, 2)[kept]
+    scan = kept // points.shape[1]
+    cell = (scan * CELLS + index[:, 0].long()) * CELLS + index[:, 1].long()
+    offset = place.reshape(-1, 2)[kept] - index - 0.5
+    height = points[..., 2].flatten()[kept]
+    return cell, torch.stack([height, offset[:, 0], offset[:, 1], intensity.flatten()[kept]], dim=1)
+
+
+def _statistics(cell: Tensor, values: Tensor, size: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Return number of points and maximum height of each cell (size,), and sums of the values (size, 4)."""
+    sums = torch.zeros(size, 5, device=cell.device)
+    sums.index_add_(0, cell, torch.cat([torch.ones_like(values[:, :1]), values], dim=1))
+    high = torch.zeros(size, device=cell.device).scatter_reduce_(0, cell, values[:, 0], "amax")
+    return sums[:, 0], high, sums[:, 1:]
 
 
 @dataclass(frozen=True)
@@ -235,9 +234,10 @@ class Targets:
 def targets(batch: Batch, points: Tensor, step: int = 1) -> Targets:
     """Return the targets of every station, or of every `step`th, for bodies with these numbers of points (N, B)."""
     device = points.device
-    points, center, own, known = (part[::step] for part in (points, batch.center, batch.own, batch.known))
+    stations = torch.arange(0, len(points), step, device=device)
+    points, center, own, known = (part[stations] for part in (points, batch.center, batch.own, batch.known))
     number, slots = points.shape
-    scene = torch.arange(len(batch.own), device=device)[::step] // STATIONS
+    scene = stations // STATIONS
     boxes, velocity, classes = batch.boxes[scene], batch.velocity[scene], batch.classes[scene]
     offset = boxes[..., :2] - center[:, None]
     i, j = (torch.floor((offset[..., axis] + REACH) / STRIDE_SIDE) for axis in (0, 1))

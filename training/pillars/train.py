@@ -187,7 +187,13 @@ def train(
     network.train()
     average = copy.deepcopy(network).eval()
     parameters = [entry for entry in network.parameters() if entry.requires_grad]
-    optimizer = torch.optim.AdamW(parameters, lr=RATE, weight_decay=DECAY)
+    optimizer = torch.optim.AdamW(parameters, lr=RATE, weight_decay=DECAY, fused=sampler.device_type == "cuda")
+    entries = [
+        pair
+        for pair in zip(average.state_dict().values(), network.state_dict().values(), strict=True)
+        if pair[0].dtype.is_floating_point
+    ]
+    averages, currents = (list(part) for part in zip(*entries, strict=True))
     features = torch.compile(network.features, dynamic=False) if arguments.compile else network.features
     random = np.random.default_rng(arguments.seed + (1 if joint else 0))
     book, device = CodeBook(network), network.codebook.device
@@ -201,10 +207,10 @@ def train(
         with torch.no_grad():
             arrays = next(scenes)
             number = len(arrays["bodies"]) * STATIONS
-            batch = sampler.batch(arrays, pose_errors(number, noise, device) if joint else None)
+            batch = sampler.batch(arrays, pose_errors(number if joint else 0, noise, device))
             own = targets(batch, batch.points)
             # In one batch, so that normalization has the same statistics in training as later.
-            grids = batch.grids if batch.merged is None else torch.cat([batch.grids, batch.merged])
+            grids = torch.cat([batch.grids, batch.merged])
         with torch.autocast(sampler.device_type, torch.bfloat16):
             all_features = features(grids.contiguous(memory_format=torch.channels_last))
             own_features = all_features[:number]
@@ -234,9 +240,7 @@ def train(
         optimizer.step()
         with torch.no_grad():
             decay = min(AVERAGE, (step + 1) / (step + 20))
-            for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True):
-                if kept.dtype.is_floating_point:
-                    kept.lerp_(new, 1.0 - decay)
+            torch._foreach_lerp_(averages, currents, 1.0 - decay)
         held.append(loss.detach())
         step += 1
         if step % 100 == 0:
@@ -292,8 +296,7 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
             if noise == 0.0:
                 maps, present = received_maps(network, batch, network.coded(latent, mask)[0], mask, 0.0)
                 results[f"codes {share:g}"] = network.head(fuse(features, maps, present, "attention")), union(batch)
-        if batch.merged is not None:
-            results["early"] = network.head(network.features(batch.merged)), union(batch)
+        results["early"] = network.head(network.features(batch.merged)), union(batch)
         scene = torch.arange(len(batch.own), device=batch.own.device) // STATIONS
         centers = batch.boxes[scene][..., :2] - batch.center[:, None]
         inside = (centers.abs() < REACH).all(dim=2) & (batch.classes[scene] >= 0)
