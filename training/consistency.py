@@ -42,7 +42,7 @@ vehicle is completely visible."""
 def errors(scenes: Iterable[StationScene]) -> dict[tuple[str, str], Array]:
     """Return errors [m] and NEES of centers (N, 2), by sensors and visibility: whole, hidden, cut off."""
     rng = generator(1, "consistency of lifting")
-    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    errors_by_view: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for scene in scenes:
         labels = [label for label in scene.labels if _is_evaluated(label)]
         if not labels:
@@ -64,18 +64,18 @@ def errors(scenes: Iterable[StationScene]) -> dict[tuple[str, str], Array]:
                 surroundings=MapContext(scene.context.roads),
                 pattern=pattern_from_settings(SENSORS["lidar"]),  # type: ignore[arg-type]
             )
-            for row, label in enumerate(labels):
-                off = lifted.boxes[row, :2] - label.place[:2]
-                nees = float(off @ np.linalg.solve(lifted.covariance[row], off))
+            for index, label in enumerate(labels):
+                off = lifted.boxes[index, :2] - label.world_box[:2]
+                nees = float(off @ np.linalg.solve(lifted.covariance[index], off))
                 view = (
                     "cut off"
-                    if cut[row]
+                    if cut[index]
                     else "whole"
                     if label.visible_pixels >= COMPLETE * label.silhouette_pixels
                     else "hidden"
                 )
-                found.setdefault((sensors, view), []).append((math.hypot(*off.tolist()), nees))
-    return {key: np.array(values) for key, values in found.items()}
+                errors_by_view.setdefault((sensors, view), []).append((math.hypot(*off.tolist()), nees))
+    return {key: np.array(values) for key, values in errors_by_view.items()}
 
 
 def _category(label: Label) -> str:

@@ -67,9 +67,9 @@ def evaluate(options: argparse.Namespace) -> None:
     print(f"{len(dataset)} held-out images, {len(scenes)} scenes of the library", flush=True)
     tables: list[Table] = []
 
-    def add(found: Sequence[Table]) -> None:
-        tables.extend(found)
-        print(as_markdown(found), flush=True)
+    def add(new_tables: Sequence[Table]) -> None:
+        tables.extend(new_tables)
+        print(as_markdown(new_tables), flush=True)
 
     add([_size_and_time(networks, scenes[0])])
     evaluated = {name: evaluate_dataset(sensitive_networks[name], dataset, networks[name].confidence) for name in names}
@@ -103,11 +103,11 @@ def _size_and_time(networks: Mapping[str, ImageNetwork], scene: StationScene) ->
 
 def _lifting(of: str, scenes: Sequence[StationScene], names: Sequence[str]) -> list[Table]:
     """Return errors of lifted centers, with and without the lidar."""
-    found = []
+    tables = []
     for sensors, use_lidar in (("camera and lidar", True), ("camera alone", False)):
         errors = {name: center_errors(DETECTORS[name], scenes, use_lidar) for name in names}
-        found.append(error_table(errors, f"{of}, {sensors}"))
-    return found
+        tables.append(error_table(errors, f"{of}, {sensors}"))
+    return tables
 
 
 def write_report(out: Path, tables: Sequence[Table], curves: Mapping[str, Any]) -> None:

@@ -29,8 +29,8 @@ def rendered(split: str, folder: Path, seed: int, images: int, processes: int) -
     if not (folder / "labels.npz").is_file():
         shots: list[Shot] = []
         worlds = -(-images // PER_WORLD)
-        for number, found in enumerate(render(seed, split, worlds, 0, processes)):
-            shots += found
+        for number, world_shots in enumerate(render(seed, split, worlds, 0, processes)):
+            shots += world_shots
             print(f"\rrendering images of {split}: {(number + 1) * PER_WORLD}/{worlds * PER_WORLD}", end="", flush=True)
         print()
         write(folder, [entry.data for entry in shots], table(shots))
@@ -87,7 +87,7 @@ def objects_of(labels: Sequence[Label]) -> Objects:
 def center_errors(kind: type[LearnedDetector], scenes: Iterable[StationScene], use_lidar: bool) -> Array:
     """Return distance [m] and plan-view error of the lifted center [m] of each detected vehicle (K, 2)."""
     detector = kind(LearnedSettings())
-    found = []
+    errors = []
     for scene in scenes:
         readings = scene.readings
         if not use_lidar:
@@ -100,16 +100,16 @@ def center_errors(kind: type[LearnedDetector], scenes: Iterable[StationScene], u
             for label, enough in zip(scene.labels, objects.to_find, strict=True)
             if enough and IMAGE_CLASSES[label.number] in VEHICLES
         ]
-        centers = np.array([label.place[:2] for label in vehicles], dtype=float).reshape(-1, 2)
+        centers = np.array([label.world_box[:2] for label in vehicles], dtype=float).reshape(-1, 2)
         free = np.ones(len(vehicles), dtype=bool)
-        for row in np.argsort(-detections.scores, kind="stable"):
-            distances = np.linalg.norm(centers - detections.boxes[row, :2], axis=1)
+        for detection in np.argsort(-detections.scores, kind="stable"):
+            distances = np.linalg.norm(centers - detections.boxes[detection, :2], axis=1)
             distances[~free] = np.inf
             if len(distances) and distances.min() <= MATCHED_WITHIN:
                 nearest = int(np.argmin(distances))
                 free[nearest] = False
-                found.append((vehicles[nearest].distance, float(distances[nearest])))
-    return np.array(found).reshape(-1, 2)
+                errors.append((vehicles[nearest].distance, float(distances[nearest])))
+    return np.array(errors).reshape(-1, 2)
 
 
 def milliseconds(network: ImageNetwork, image: NDArray[np.uint8], repeats: int = 40) -> float:

@@ -39,7 +39,7 @@ class Label(NamedTuple):
 
     number   of its class in IMAGE_CLASSES;  box  x1 y1 x2 y2 of its visible part [px]
     visible_pixels     in the image;  silhouette_pixels  those of its silhouette within the image without occlusion
-    distance from the camera to its center [m];  place  x y z l w h yaw in the world [m, rad]
+    distance from the camera to its center [m];  world_box  x y z l w h yaw in the world [m, rad]
     readable whether its class is visible: False for traffic lights from behind, in dense fog and in the dark
     """
 
@@ -48,7 +48,7 @@ class Label(NamedTuple):
     visible_pixels: int
     silhouette_pixels: int
     distance: float
-    place: tuple[float, ...]
+    world_box: tuple[float, ...]
     readable: bool = True
 
 
@@ -59,40 +59,40 @@ def actor_labels(
     skipped = set(skip)
     segmentation = reading.segmentation
     counts = np.bincount(segmentation[segmentation >= 0], minlength=len(view.names))
-    found = []
-    for row in np.flatnonzero(counts).tolist():
-        name = image_class(view.categories[row])
-        if view.names[row] in skipped or name not in IMAGE_CLASSES:
+    labels = []
+    for index in np.flatnonzero(counts).tolist():
+        name = image_class(view.categories[index])
+        if view.names[index] in skipped or name not in IMAGE_CLASSES:
             continue
-        lines, columns = np.nonzero(segmentation == row)
+        lines, columns = np.nonzero(segmentation == index)
         box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
-        visible_pixels = int(counts[row])
-        silhouette_pixels = silhouette(reading, view, row, specs[view.names[row]])
-        place = view.boxes[row]
-        distance = float(np.linalg.norm(place[:3] - reading.pose[:3, 3]))
-        found.append(
+        visible_pixels = int(counts[index])
+        silhouette_pixels = silhouette(reading, view, index, specs[view.names[index]])
+        world_box = view.boxes[index]
+        distance = float(np.linalg.norm(world_box[:3] - reading.pose[:3, 3]))
+        labels.append(
             Label(
                 IMAGE_CLASSES.index(name),
                 box,
                 visible_pixels,
                 max(silhouette_pixels or visible_pixels, visible_pixels),
                 distance,
-                tuple(place.tolist()),
+                tuple(world_box.tolist()),
             )
         )
-    return found
+    return labels
 
 
 def mark_readable(labels: Iterable[Label], reading: CameraReading, weather: Weather) -> list[Label]:
     """Return the labels; objects that fog hides or that are black on black are marked as not readable."""
     gray = cv2.blur(cv2.cvtColor(reading.rgb, cv2.COLOR_RGB2GRAY), (3, 3))
-    found = []
+    marked = []
     for label in labels:
         left, top, right, bottom = (int(side) for side in label.box)
         dark = int(gray[max(top - 3, 0) : bottom + 3, max(left - 3, 0) : right + 3].max()) < DARK
         in_fog = math.exp(-weather.extinction * label.distance) < LEAST_CONTRAST
-        found.append(label._replace(readable=label.readable and not dark and not in_fog))
-    return found
+        marked.append(label._replace(readable=label.readable and not dark and not in_fog))
+    return marked
 
 
 def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpec) -> int | None:
@@ -121,7 +121,7 @@ def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpe
 
 def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: Mapping[str, str]) -> list[Label]:
     """Return the visible traffic lights and stop signs; those that do not face the camera are not readable."""
-    found = []
+    labels = []
     segmentation = reading.segmentation
     for number in np.unique(segmentation[segmentation <= FIRST_SIGNAL_LABEL]).tolist():
         head = heads[FIRST_SIGNAL_LABEL - number]
@@ -136,7 +136,7 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
         facing = (math.cos(pose.h) * to_camera_center[0] + math.sin(pose.h) * to_camera_center[1]) / float(
             np.hypot(to_camera_center[0], to_camera_center[1])
         )
-        found.append(
+        labels.append(
             Label(
                 IMAGE_CLASSES.index(name),
                 box,
@@ -147,7 +147,7 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
                 readable=facing > LEAST_FACING,
             )
         )
-    return found
+    return labels
 
 
 def signal_class(head: SignalHead, state: str) -> str | None:

@@ -81,8 +81,8 @@ def light_scenes(seed: int, split: str, worlds: int, processes: int = 1, first: 
             yield from _scenes(task)
         return
     with get_context("spawn").Pool(processes) as pool:
-        for found in pool.imap(_scenes, tasks):
-            yield from found
+        for scenes in pool.imap(_scenes, tasks):
+            yield from scenes
 
 
 def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
@@ -141,17 +141,19 @@ def _lights(
     reading: CameraReading, heads: list[SignalHead], labels: list[Label], states: Mapping[str, str]
 ) -> Iterator[Light]:
     """Yield all traffic lights of the map within the image, including hidden ones and those from behind."""
-    by_place = {label.place[:3]: label for label in labels if IMAGE_CLASSES[label.number].startswith("traffic light")}
+    by_center = {
+        label.world_box[:3]: label for label in labels if IMAGE_CLASSES[label.number].startswith("traffic light")
+    }
     height, width = reading.segmentation.shape
     for head in heads:
         if not head.signal.dynamic:
             continue
         center = head_box(head)[1]
         distance = float(np.linalg.norm(center - reading.pose[:3, 3]))
-        place, _ = pixels(center[None], reading)
-        if np.isnan(place).any() or distance > IN_RANGE or not ((place[0] >= 0) & (place[0] < (width, height))).all():
+        pixel, _ = pixels(center[None], reading)
+        if np.isnan(pixel).any() or distance > IN_RANGE or not ((pixel[0] >= 0) & (pixel[0] < (width, height))).all():
             continue
-        label = by_place.get(tuple(center.tolist()))
+        label = by_center.get(tuple(center.tolist()))
         box = None if label is None else label.box
         to_read = label is not None and label.readable and _shows_enough(label)
         yield Light(head.signal.id, states[head.signal.id], distance, box, to_read)

@@ -27,41 +27,45 @@ class Reading(NamedTuple):
 
 def readings(networks: Mapping[str, ImageNetwork], scenes: Iterable[LightScene]) -> list[Reading]:
     """Return every light in the images: read by class, by class and lamps, and by lamps alone."""
-    found = []
+    light_readings = []
     for scene in scenes:
         cameras = {"camera": scene.reading}
         lights = LightsOnMap(scene.roads)
-        read = {"lamps alone": {one.id: one.state for one in lights.read({}, cameras)}}
+        read = {"lamps alone": {light.id: light.state for light in lights.read({}, cameras)}}
         for name, network in networks.items():
             images: dict[str, ImageDetections] = {"camera": network.find(scene.reading.rgb)}
-            read[f"{name} alone"] = {one.id: one.state for one in lights.by_class(images, cameras)}
-            read[f"{name} and lamps"] = {one.id: one.state for one in lights.read(images, cameras)}
+            read[f"{name} alone"] = {light.id: light.state for light in lights.by_class(images, cameras)}
+            read[f"{name} and lamps"] = {light.id: light.state for light in lights.read(images, cameras)}
         for light in scene.lights:
             states = {method: _merge_red(of.get(light.id, "")) for method, of in sorted(read.items())}
             hidden = light.box is None
-            found.append(Reading(_merge_red(light.state), light.distance, scene.weather, light.to_read, hidden, states))
-    return found
+            light_readings.append(
+                Reading(_merge_red(light.state), light.distance, scene.weather, light.to_read, hidden, states)
+            )
+    return light_readings
 
 
 def _merge_red(state: str) -> str:
     return "red" if state == "redYellow" else state
 
 
-def light_table(found: Sequence[Reading]) -> Table:
+def light_table(light_readings: Sequence[Reading]) -> Table:
     """Return shares of lights that are read correctly and incorrectly; the others are not read."""
-    required = [one for one in found if one.to_read]
+    required = [reading for reading in light_readings if reading.to_read]
     parts: list[tuple[str, list[Reading]]] = [("all", required)]
-    parts += [(state, [one for one in required if one.state == state]) for state in LIGHT_STATES]
-    parts += [(weather, [one for one in required if one.weather == weather]) for weather in WEATHERS]
-    parts += [(f"{a:.0f} to {b:.0f} m", [one for one in required if a <= one.distance < b]) for a, b in DISTANCES]
-    parts.append(("occluded", [one for one in found if one.hidden]))
-    methods = list(found[0].read) if found else []
+    parts += [(state, [reading for reading in required if reading.state == state]) for state in LIGHT_STATES]
+    parts += [(weather, [reading for reading in required if reading.weather == weather]) for weather in WEATHERS]
+    parts += [
+        (f"{a:.0f} to {b:.0f} m", [reading for reading in required if a <= reading.distance < b]) for a, b in DISTANCES
+    ]
+    parts.append(("occluded", [reading for reading in light_readings if reading.hidden]))
+    methods = list(light_readings[0].read) if light_readings else []
     rows = []
     for name, part in parts:
         rows.append([name])
         for method in methods:
-            correct = sum(one.read[method] == one.state for one in part) / max(len(part), 1)
-            incorrect = sum(one.read[method] not in ("", one.state) for one in part) / max(len(part), 1)
+            correct = sum(reading.read[method] == reading.state for reading in part) / max(len(part), 1)
+            incorrect = sum(reading.read[method] not in ("", reading.state) for reading in part) / max(len(part), 1)
             rows[-1] += [f"{correct:.2f}", f"{incorrect:.2f}"]
         rows[-1].append(str(len(part)))
     head = ["lights", *(f"{method}: {result}" for method in methods for result in ("correct", "incorrect")), "n"]

@@ -42,19 +42,19 @@ CAUSES = (
 def misses(evaluated: Mapping[str, list[EvaluatedImage]], dataset: Dataset) -> Table:
     """Return required vehicles by the first cause that applies: number of misses, and recall."""
     cause, required = causes(dataset), _required(dataset)
-    found = {name: _found(entries, dataset) for name, entries in evaluated.items()}
+    detected_vehicles = {name: _detected_vehicles(entries, dataset) for name, entries in evaluated.items()}
     rows = []
     names = (*CAUSES, "none of these")
     for index, name in enumerate(names):
         part = required & (cause == index)
         rows.append([name, str(int(part.sum()))])
-        for detected in found.values():
+        for detected in detected_vehicles.values():
             missed = int((part & ~detected).sum())
             share = missed / max(int((required & ~detected).sum()), 1)
             recall = float(detected[part].mean()) if part.any() else float("nan")
             rows[-1] += [str(missed), f"{share:.0%}", number(recall)]
     head = ["cause", "vehicles"]
-    for name in found:
+    for name in detected_vehicles:
         head += [f"{name} missed", "of all misses", "recall"]
     return "Held-out images, all weathers: causes of missed vehicles", head, rows
 
@@ -91,9 +91,9 @@ def _crowding(dataset: Dataset) -> NDArray[np.float64]:
     return shares
 
 
-def _found(entries: list[EvaluatedImage], dataset: Dataset) -> Bools:
+def _detected_vehicles(entries: list[EvaluatedImage], dataset: Dataset) -> Bools:
     """Return the vehicles (N,) that a detector detects at its confidence, as any class of vehicle."""
-    found = np.zeros(len(dataset.number), dtype=bool)
+    detected = np.zeros(len(dataset.number), dtype=bool)
     required = _required(dataset)
     for index, entry in enumerate(entries):
         rows = dataset.objects(index)
@@ -101,11 +101,11 @@ def _found(entries: list[EvaluatedImage], dataset: Dataset) -> Bools:
         confident = np.array(
             [
                 name in VEHICLES and score >= entry.confidence
-                for name, score in zip(entry.found.classes, entry.found.scores.tolist(), strict=True)
+                for name, score in zip(entry.detections.classes, entry.detections.scores.tolist(), strict=True)
             ],
             dtype=bool,
         )
-        boxes, scores = entry.found.boxes[confident], entry.found.scores[confident]
+        boxes, scores = entry.detections.boxes[confident], entry.detections.scores[confident]
         ignored = np.zeros(len(vehicle_rows), dtype=bool)
-        found[vehicle_rows] = match(boxes, scores, dataset.box[vehicle_rows].astype(float), ignored).found
-    return found
+        detected[vehicle_rows] = match(boxes, scores, dataset.box[vehicle_rows].astype(float), ignored).found
+    return detected

@@ -244,7 +244,7 @@ def winding_road(rng: np.random.Generator) -> Element:
 
 def winding_course(rng: np.random.Generator) -> list[curves.Curve]:
     """Return lines and bends, each bend a clothoid, an arc and a clothoid."""
-    found: list[curves.Curve] = []
+    course: list[curves.Curve] = []
     x, y, heading, s = 0.0, 0.0, float(rng.uniform(-math.pi, math.pi)), 0.0
     for _ in range(int(rng.integers(1, 4))):
         bend = float(rng.choice([-1, 1])) / rng.uniform(35.0, 250.0)
@@ -261,10 +261,10 @@ def winding_course(rng: np.random.Generator) -> list[curves.Curve]:
                 if start == end
                 else curves.spiral(s, x, y, heading, length, start, end)
             )
-            found.append(curve)
+            course.append(curve)
             x, y, heading, *_ = curve.at(length)
             s += length
-    return found
+    return course
 
 
 def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
@@ -289,9 +289,9 @@ def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
 
 def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
     """Return rows of houses along the roads outside junctions; none for some places."""
-    found: list[House] = []
+    houses: list[House] = []
     if rng.random() < 0.2:
-        return found
+        return houses
     setback, gap = rng.uniform(1.0, 10.0), rng.uniform(1.0, 25.0)
     for road in roads.roads.values():
         if road.junction_id is not None:
@@ -308,9 +308,9 @@ def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
                     tone = rng.uniform(0.25, 0.9)
                     color = tuple(float(c) for c in (tone * rng.uniform(0.75, 1.1, 3)).clip(0.05, 0.95))
                     center = (pose.x, pose.y, pose.z + height / 2)
-                    found.append(House(center, (length, depth, height), pose.h, (color[0], color[1], color[2])))
+                    houses.append(House(center, (length, depth, height), pose.h, (color[0], color[1], color[2])))
                 s += length + gap + rng.uniform(0.0, 10.0)
-    return found
+    return houses
 
 
 def _clear_of_roads(roads: RoadNetwork, x: float, y: float, heading: float, length: float, depth: float) -> bool:

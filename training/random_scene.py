@@ -121,8 +121,8 @@ def random_view(rng: np.random.Generator, positions: LanePositions, heads: Seque
     else:
         mount = (spec.size[0] / 2 + 0.06, float(rng.uniform(-0.3, 0.3)), float(rng.uniform(0.7, 1.5)))
     cos, sin = math.cos(heading), math.sin(heading)
-    place = (x + cos * mount[0] - sin * mount[1], y + sin * mount[0] + cos * mount[1], z + mount[2])
-    pose = _camera_pose(place, heading + lateral, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
+    position = (x + cos * mount[0] - sin * mount[1], y + sin * mount[0] + cos * mount[1], z + mount[2])
+    pose = _camera_pose(position, heading + lateral, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
     ahead, _, _ = spec.offset
     return View(settings, pose, (spec, Placement(x - cos * ahead, y - sin * ahead, z, heading)))
 
@@ -155,10 +155,10 @@ def _roadside(rng: np.random.Generator, positions: LanePositions) -> Array:
     return _camera_pose((x, y, z + height), yaw, pitch, 0.0)
 
 
-def _camera_pose(place: tuple[float, float, float], yaw: float, pitch: float, roll: float) -> Array:
+def _camera_pose(position: tuple[float, float, float], yaw: float, pitch: float, roll: float) -> Array:
     pose = np.eye(4)
     pose[:3, :3] = rotation_matrix(yaw, pitch, roll) @ OPTICAL
-    pose[:3, 3] = place
+    pose[:3, 3] = position
     return pose
 
 
@@ -202,14 +202,14 @@ def random_traffic(
     boxes = list(occupied)
     if view.carrier is not None:
         boxes.append(_box(*view.carrier))
-    found = []
+    actors = []
     for number in range(int(rng.integers(3, 31))):
-        row = int(rng.choice(len(weight), p=weight / weight.sum()))
-        kinds = _ON_LANES[str(positions.kinds[row])]
+        index = int(rng.choice(len(weight), p=weight / weight.sum()))
+        kinds = _ON_LANES[str(positions.kinds[index])]
         shape = str(rng.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
         spec = random_actor(rng, f"{shape} {number} {int(rng.integers(1000))}", shape)
-        x, y, z, heading = positions.poses[row].tolist()
-        lateral = float(rng.normal(0.0, 0.12)) * float(positions.widths[row])
+        x, y, z, heading = positions.poses[index].tolist()
+        lateral = float(rng.normal(0.0, 0.12)) * float(positions.widths[index])
         x, y = x - math.sin(heading) * lateral, y + math.cos(heading) * lateral
         turned = rng.random() < (0.95 if shape == "pedestrian" else 0.12)
         heading += float(rng.uniform(-math.pi, math.pi)) if turned else float(rng.normal(0.0, 0.07))
@@ -219,8 +219,8 @@ def random_traffic(
         if too_near or any(overlap(box, other) for other in boxes):
             continue
         boxes.append(box)
-        found.append((spec, placement))
-    return found
+        actors.append((spec, placement))
+    return actors
 
 
 def random_signals(rng: np.random.Generator, roads: RoadNetwork) -> dict[str, str]:

@@ -129,7 +129,7 @@ def _unmarked(images: Sequence[EvaluatedImage]) -> int:
     for kind in KINDS:
         result = score(images, Part(kind.names, detected_as=kind.detected_as))
         matched += result.recall * result.objects if result.objects else 0.0
-    return sum(len(image.found) for image in images) - round(matched)
+    return sum(len(image.detections) for image in images) - round(matched)
 
 
 def _cells(images: Sequence[EvaluatedImage], part: Part) -> list[str]:
@@ -158,6 +158,6 @@ def _in_photographs(network: ImageNetwork, folder: Path) -> list[EvaluatedImage]
             distance=np.zeros(len(objects)),
             to_find=np.ones(len(objects), dtype=bool),
         )
-        found = network.find(np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB), dtype=np.uint8))
-        images.append(_at_input_size(EvaluatedImage(marked, found, "clear", network.confidence), len(pixels)))
+        detections = network.find(np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB), dtype=np.uint8))
+        images.append(_at_input_size(EvaluatedImage(marked, detections, "clear", network.confidence), len(pixels)))
     return images

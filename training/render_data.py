@@ -120,7 +120,7 @@ def table(images: list[Shot]) -> dict[str, Any]:
         "whole": np.array([label.silhouette_pixels for _, label in labels], dtype=np.int64),
         "distance": np.array([label.distance for _, label in labels], dtype=np.float32),
         "readable": np.array([label.readable for _, label in labels], dtype=bool),
-        "place": np.array([label.place for _, label in labels], dtype=np.float32).reshape(-1, 7),
+        "place": np.array([label.world_box for _, label in labels], dtype=np.float32).reshape(-1, 7),
     }
 
 
@@ -152,8 +152,8 @@ def main() -> None:
     images: list[Shot] = []
     with Progress() as progress:
         bar = progress.add_task(options.split, total=options.worlds)
-        for found in render(options.seed, options.split, options.worlds, options.first, options.processes):
-            images += found
+        for world_shots in render(options.seed, options.split, options.worlds, options.first, options.processes):
+            images += world_shots
             progress.advance(bar)
     write(options.out / options.split, [entry.data for entry in images], table(images))
     size = sum(len(entry.data) for entry in images) / 2**20

@@ -59,7 +59,7 @@ def _evaluate_twice(
 
 
 def _bits(image: EvaluatedImage) -> tuple[bytes, bytes, tuple[str, ...]]:
-    return image.found.boxes.tobytes(), image.found.scores.tobytes(), image.found.classes
+    return image.detections.boxes.tobytes(), image.detections.scores.tobytes(), image.detections.classes
 
 
 def _class_scores(evaluated: Sequence[EvaluatedImage]) -> dict[str, float]:

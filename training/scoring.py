@@ -33,7 +33,7 @@ class EvaluatedImage:
     """Image with its objects, detections, and the name of its weather."""
 
     objects: Objects
-    found: ImageDetections
+    detections: ImageDetections
     weather: str
     confidence: float
     """Default confidence of the detector, at which recall is evaluated."""
@@ -85,11 +85,11 @@ def score(images: Sequence[EvaluatedImage], part: Part) -> Score:
         objects = image.objects
         required = part.required(objects)
         of_classes = np.array([name in names for name in objects.names], dtype=bool) | ~objects.to_find
-        detected = np.array([name in (part.detected_as or part.names) for name in image.found.classes], dtype=bool)
+        detected = np.array([name in (part.detected_as or part.names) for name in image.detections.classes], dtype=bool)
         matches.append(
             match(
-                image.found.boxes[detected],
-                image.found.scores[detected],
+                image.detections.boxes[detected],
+                image.detections.scores[detected],
                 objects.boxes[of_classes],
                 ~required[of_classes],
             )
@@ -102,8 +102,8 @@ def score(images: Sequence[EvaluatedImage], part: Part) -> Score:
 def mean_precision(images: Sequence[EvaluatedImage], names: Sequence[str], weather: str) -> float:
     """Return the mean average precision of the classes that occur; NaN if there are none."""
     values = [score(images, Part((name,), weather=weather)).precision for name in names]
-    known = [value for value in values if not np.isnan(value)]
-    return float(np.mean(known)) if known else float("nan")
+    defined = [value for value in values if not np.isnan(value)]
+    return float(np.mean(defined)) if defined else float("nan")
 
 
 def as_one_light(images: Sequence[EvaluatedImage]) -> list[EvaluatedImage]:
@@ -121,7 +121,7 @@ def as_one_light(images: Sequence[EvaluatedImage]) -> list[EvaluatedImage]:
                 entry.objects.distance,
                 entry.objects.to_find,
             ),
-            ImageDetections(entry.found.boxes, entry.found.scores, merge_lights(entry.found.classes)),
+            ImageDetections(entry.detections.boxes, entry.detections.scores, merge_lights(entry.detections.classes)),
             entry.weather,
             entry.confidence,
         )

@@ -39,7 +39,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
         for value in ELEVATIONS:
             setting: Any = lamps
             weathers[title, value] = Weather(sun_elevation=value, headlights=setting)
-    found = {key: dict.fromkeys(networks, 0) for key in weathers}
+    detected = {key: dict.fromkeys(networks, 0) for key in weathers}
     required = 0
     for number in range(worlds):
         rng = generator(seed, "training data", "sweeps", number)
@@ -63,18 +63,18 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
                     break
                 for name, network in networks.items():
                     detections = network.find(reading.rgb)
-                    rows = [row for row, category in enumerate(detections.classes) if category in VEHICLES]
+                    vehicles = [index for index, category in enumerate(detections.classes) if category in VEHICLES]
                     matches = match(
-                        detections.boxes[rows], detections.scores[rows], boxes, np.zeros(len(boxes), dtype=bool)
+                        detections.boxes[vehicles], detections.scores[vehicles], boxes, np.zeros(len(boxes), dtype=bool)
                     )
-                    found[key][name] += int(matches.found.sum())
+                    detected[key][name] += int(matches.found.sum())
     return {
         "vehicles": required,
         "curves": {
             title: {
                 "at": [value for kind, value in weathers if kind == title],
                 **{
-                    name: [found[key][name] / max(required, 1) for key in weathers if key[0] == title]
+                    name: [detected[key][name] / max(required, 1) for key in weathers if key[0] == title]
                     for name in networks
                 },
             }

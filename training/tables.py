@@ -43,7 +43,7 @@ def tables_of(evaluated: Mapping[str, list[EvaluatedImage]], of: str) -> list[Ta
         row(f"clear, {name} only", Part((name,), farthest=40.0, height=15.0, weather="clear"), everything)
         for name in VEHICLES
     ]
-    found: list[Table] = [(f"{of}: vehicles within 40 m and at least 15 px high", ["weather", *head], by_weather)]
+    tables: list[Table] = [(f"{of}: vehicles within 40 m and at least 15 px high", ["weather", *head], by_weather)]
     for weather in [name for name in ("clear", "fog") if name in weathers]:
         rows = [row(name, Part((name,), weather=weather), everything) for name in IMAGE_CLASSES]
         lights = {name: as_one_light(entries) for name, entries in evaluated.items()}
@@ -52,15 +52,15 @@ def tables_of(evaluated: Mapping[str, list[EvaluatedImage]], of: str) -> list[Ta
         for entries in evaluated.values():
             mean += [number(mean_precision(entries, IMAGE_CLASSES, weather)), ""]
         rows.append([*mean, ""])
-        found.append((f"{of}, {weather}: by class", ["class", *head], [r for r in rows if r[-1] != "0"]))
+        tables.append((f"{of}, {weather}: by class", ["class", *head], [r for r in rows if r[-1] != "0"]))
         by_distance = [
             row(f"{title} {near:.0f} to {far:.0f} m", Part(names, near, far, weather=weather), everything)
             for title, names in (("vehicles", VEHICLES), ("others", ROAD_USERS[3:]))
             for near, far in DISTANCES
         ]
         title = f"{of}, {weather}: road users by distance"
-        found.append((title, ["class and distance", *head], [r for r in by_distance if r[-1] != "0"]))
-    return found
+        tables.append((title, ["class and distance", *head], [r for r in by_distance if r[-1] != "0"]))
+    return tables
 
 
 def error_table(errors: Mapping[str, Array], of: str) -> Table:
@@ -72,8 +72,8 @@ def error_table(errors: Mapping[str, Array], of: str) -> Table:
     rows = []
     for name, low, high in bins:
         cells = [name]
-        for found in errors.values():
-            inside = found[(found[:, 0] >= low) & (found[:, 0] < high), 1]
+        for values in errors.values():
+            inside = values[(values[:, 0] >= low) & (values[:, 0] < high), 1]
             if len(inside):
                 cells += [f"{np.median(inside):.2f}", f"{np.percentile(inside, 90):.2f}", str(len(inside))]
             else:

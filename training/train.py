@@ -126,7 +126,7 @@ def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dic
     F1."""
     device = samples.images.device
     groups = suppression_groups(IMAGE_CLASSES)
-    found: dict[int, list[Matches]] = {number: [] for number in range(len(IMAGE_CLASSES))}
+    matches: dict[int, list[Matches]] = {number: [] for number in range(len(IMAGE_CLASSES))}
     present = np.zeros(len(IMAGE_CLASSES), dtype=np.int64)
     for start in range(0, len(samples), 64):
         pixels = samples.images[start : start + 64].float().div(255.0)
@@ -151,15 +151,15 @@ def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dic
                 of_class = (classes == class_number) | (classes == IGNORED)
                 ignored: NDArray[np.bool_] = classes[of_class] == IGNORED
                 present[class_number] += int((~ignored).sum())
-                found[class_number].append(
+                matches[class_number].append(
                     match(b[n == class_number], s[n == class_number], objects[of_class], ignored)
                 )
     result = {
-        name: average_precision(found[number], int(present[number]))
+        name: average_precision(matches[number], int(present[number]))
         for number, name in enumerate(IMAGE_CLASSES)
         if present[number]
     }
-    everything = [entry for entries in found.values() for entry in entries]
+    everything = [entry for entries in matches.values() for entry in entries]
     any_correct = any(entry.correct.any() for entry in everything)
     confidence_of_best_f1 = best_confidence(everything, int(present.sum())) if any_correct else Description.confidence
     return {"mean": float(np.mean(list(result.values()))), **result}, confidence_of_best_f1

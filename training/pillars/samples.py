@@ -33,7 +33,7 @@ class Batch:
     boxes   (S, B, 7), velocity (S, B, 2), classes (S, B) as in the scene
     own     (N,) slot of the carrier; -1: a mast
     points  (N, B) number of points of each station on each body
-    known   (N,) whether the grid has the earlier scan
+    has_earlier_scan  (N,) whether the grid has the earlier scan
     merged  (P, 12, 256, 256) grids of the first stations of P scenes with the points of all, as in early fusion
     """
 
@@ -44,7 +44,7 @@ class Batch:
     classes: Tensor
     own: Tensor
     points: Tensor
-    known: Tensor
+    has_earlier_scan: Tensor
     merged: Tensor
 
 
@@ -73,34 +73,34 @@ class Sampler:
         numbers = torch.arange(count, device=self._device).repeat_interleave(STATIONS)
         own = scene["own"].flatten()
 
-        def heads(place: Tensor) -> Heads:
+        def heads(position: Tensor) -> Heads:
             return Heads(
-                numbers, own, place, scene["yaw"].flatten(), upper + (lower - upper) * share,
+                numbers, own, position, scene["yaw"].flatten(), upper + (lower - upper) * share,
                 scene["half_field"].flatten(), scene["reach"].flatten(), scene["fade"].flatten(), columns,
             )  # fmt: skip
 
-        place = scene["place"].reshape(-1, 3)
-        before = place.clone()
+        position = scene["position"].reshape(-1, 3)
+        before = position.clone()
         before[:, :2] -= LAG * scene["speed"].reshape(-1, 2)
         moved = scene["bodies"].clone()
         moved[:, :, 1:3] -= LAG * scene["velocity"]
-        now = cast(self._meshes, scene["bodies"], scene["count"], heads(place))
+        now = cast(self._meshes, scene["bodies"], scene["count"], heads(position))
         earlier = cast(self._meshes, moved, scene["count"], heads(before))
-        phase = (torch.rand(len(place), 2, device=self._device) - 0.5) * STRIDE_SIDE
-        center = place[:, :2] + phase
-        placed = _placed(now, place, scene["yaw"], center), _placed(earlier, before, scene["yaw"], center)
+        phase = (torch.rand(len(position), 2, device=self._device) - 0.5) * STRIDE_SIDE
+        center = position[:, :2] + phase
+        placed = _placed(now, position, scene["yaw"], center), _placed(earlier, before, scene["yaw"], center)
         grids = _grids(placed[0], now, placed[1], earlier)
         merged = _grids(*_merged(placed[0], now, center, own, noise), *_merged(placed[1], earlier, center, own, noise))
-        known = torch.rand(len(place), device=self._device) < 0.9  # the earlier scan is sometimes missing
-        grids[:, 8:] *= known[:, None, None, None]
-        merged[:, 8:] *= known[: len(noise) : STATIONS, None, None, None]
+        has_earlier_scan = torch.rand(len(position), device=self._device) < 0.9  # the earlier scan is sometimes missing
+        grids[:, 8:] *= has_earlier_scan[:, None, None, None]
+        merged[:, 8:] *= has_earlier_scan[: len(noise) : STATIONS, None, None, None]
         slots = scene["bodies"].shape[1]
-        hits = torch.zeros(len(place), slots + 1, device=self._device)
-        rows = torch.where(now.returned & (now.rows >= 0), now.rows, slots).long()
-        hits.scatter_add_(1, rows, torch.ones_like(rows, dtype=torch.float32))
+        hits = torch.zeros(len(position), slots + 1, device=self._device)
+        hit_slots = torch.where(now.returned & (now.hit_slots >= 0), now.hit_slots, slots).long()
+        hits.scatter_add_(1, hit_slots, torch.ones_like(hit_slots, dtype=torch.float32))
         return Batch(
             grids, center, scene["boxes"], scene["velocity"], scene["classes"].long(), own.long(),
-            hits[:, :slots], known, merged,
+            hits[:, :slots], has_earlier_scan, merged,
         )  # fmt: skip
 
 
@@ -112,7 +112,7 @@ def _turn(scene: dict[str, Tensor]) -> None:
     def turned(x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         return cos * x - sin * y, sin * x + cos * y
 
-    for name, column in (("bodies", 1), ("bodies", 4), ("velocity", 0), ("boxes", 0), ("place", 0), ("speed", 0)):
+    for name, column in (("bodies", 1), ("bodies", 4), ("velocity", 0), ("boxes", 0), ("position", 0), ("speed", 0)):
         part = scene[name]
         x, y = turned(part[..., column], part[..., column + 1])
         part[..., column], part[..., column + 1] = x, y
@@ -120,13 +120,13 @@ def _turn(scene: dict[str, Tensor]) -> None:
     scene["yaw"] += angle[:, None]
 
 
-def _placed(scans: Scans, place: Tensor, yaw: Tensor, center: Tensor) -> Tensor:
+def _placed(scans: Scans, position: Tensor, yaw: Tensor, center: Tensor) -> Tensor:
     """Return the points (N, M, 3) relative to the center of the grid and the ground."""
     yaw = yaw.flatten()[:, None]
     cos, sin = torch.cos(yaw), torch.sin(yaw)
     x, y, z = scans.points.unbind(2)
-    shift = (place[:, :2] - center)[:, None]
-    height = z + place[:, 2:3] + GROUND_NOISE * torch.randn(len(place), 1, device=z.device)
+    shift = (position[:, :2] - center)[:, None]
+    height = z + position[:, 2:3] + GROUND_NOISE * torch.randn(len(position), 1, device=z.device)
     return torch.stack([cos * x - sin * y + shift[..., 0], sin * x + cos * y + shift[..., 1], height], dim=2)
 
 
@@ -139,7 +139,7 @@ def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Te
     """
     number, rays = len(noise), points.shape[1]
     points, center = points[:number], center[:number]
-    scans = Scans(*(part[:number] for part in (scans.points, scans.returned, scans.intensity, scans.rows)))
+    scans = Scans(*(part[:number] for part in (scans.points, scans.returned, scans.intensity, scans.hit_slots)))
     stations = torch.arange(number, device=points.device)
     receiver = stations // STATIONS * STATIONS
     cos, sin = torch.cos(noise[:, 2:3]), torch.sin(noise[:, 2:3])
@@ -157,12 +157,12 @@ def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Te
     again[1:] = order.values[1:] == order.values[:-1]
     repeated = torch.zeros_like(again).scatter_(0, order.indices, again).reshape(number, rays)
     body = own[receiver, None]
-    on_receiver = (scans.rows == body) & (body >= 0)
+    on_receiver = (scans.hit_slots == body) & (body >= 0)
     returned = scans.returned & (mine | ~(repeated | on_receiver))
     intensity = torch.where(mine, scans.intensity, 1.0)
     size = number // STATIONS, STATIONS * rays
     return apart.reshape(*size, 3), Scans(
-        apart.reshape(*size, 3), returned.reshape(size), intensity.reshape(size), scans.rows.reshape(size)
+        apart.reshape(*size, 3), returned.reshape(size), intensity.reshape(size), scans.hit_slots.reshape(size)
     )
 
 
@@ -192,15 +192,15 @@ def _in_cells(points: Tensor, returned: Tensor, intensity: Tensor) -> tuple[Tens
     """Return the cells (P,) of the points within the grids (N, 256, 256), and their height, offset from the center of
     the cell along x and y, and intensity (P, 4).
     """
-    place = (points[..., :2] + REACH) / SIDE
-    index = torch.floor(place)
+    coordinates = (points[..., :2] + REACH) / SIDE
+    index = torch.floor(coordinates)
     inside = returned & ((index >= 0) & (index < CELLS)).all(dim=2) & (points[..., 2] < TALLEST)
     # Indices are looked up once: each use of a mask waits for the device.
     kept = inside.flatten().nonzero()[:, 0]
     index = index.reshape(-1, 2)[kept]
     scan = kept // points.shape[1]
     cell = (scan * CELLS + index[:, 0].long()) * CELLS + index[:, 1].long()
-    offset = place.reshape(-1, 2)[kept] - index - 0.5
+    offset = coordinates.reshape(-1, 2)[kept] - index - 0.5
     height = points[..., 2].flatten()[kept]
     return cell, torch.stack([height, offset[:, 0], offset[:, 1], intensity.flatten()[kept]], dim=1)
 
@@ -235,7 +235,7 @@ def targets(batch: Batch, points: Tensor, step: int = 1) -> Targets:
     """Return the targets of every station, or of every `step`th, for bodies with these numbers of points (N, B)."""
     device = points.device
     stations = torch.arange(0, len(points), step, device=device)
-    points, center, own, known = (part[stations] for part in (points, batch.center, batch.own, batch.known))
+    points, center, own = (part[stations] for part in (points, batch.center, batch.own))
     number, slots = points.shape
     scene = stations // STATIONS
     boxes, velocity, classes = batch.boxes[scene], batch.velocity[scene], batch.classes[scene]
@@ -260,22 +260,21 @@ def targets(batch: Batch, points: Tensor, step: int = 1) -> Targets:
     heat.view(-1).scatter_reduce_(0, flat[on], value[on], "amax")
     heat = heat.reshape(number, OUT, OUT, len(CLASSES)).permute(0, 3, 1, 2)
     near = on & (di.abs() <= 1) & (dj.abs() <= 1) & required[:, None]
-    rows, columns = torch.nonzero(near, as_tuple=True)
-    held, point = box[rows], middle[rows]
-    cx = (pi[rows, columns] + 0.5) * STRIDE_SIDE - REACH
-    cy = (pj[rows, columns] + 0.5) * STRIDE_SIDE - REACH
-    shift = velocity[n, b][rows] * LAG
+    entries, patch_cells = torch.nonzero(near, as_tuple=True)
+    box, middle = box[entries], middle[entries]
+    cx = (pi[entries, patch_cells] + 0.5) * STRIDE_SIDE - REACH
+    cy = (pj[entries, patch_cells] + 0.5) * STRIDE_SIDE - REACH
+    shift = velocity[n, b][entries] * LAG
     values = torch.stack(
         [
-            (point[:, 0] - cx) / STRIDE_SIDE, (point[:, 1] - cy) / STRIDE_SIDE, held[:, 2],
-            *torch.log(held[:, 3:6].clamp(min=0.1)).unbind(1), torch.cos(held[:, 6]), torch.sin(held[:, 6]),
-            torch.cos(2.0 * held[:, 6]), torch.sin(2.0 * held[:, 6]), shift[:, 0], shift[:, 1],
-            torch.zeros_like(held[:, 0]),
+            (middle[:, 0] - cx) / STRIDE_SIDE, (middle[:, 1] - cy) / STRIDE_SIDE, box[:, 2],
+            *torch.log(box[:, 3:6].clamp(min=0.1)).unbind(1), torch.cos(box[:, 6]), torch.sin(box[:, 6]),
+            torch.cos(2.0 * box[:, 6]), torch.sin(2.0 * box[:, 6]), shift[:, 0], shift[:, 1],
+            torch.zeros_like(box[:, 0]),
         ],
         dim=1,
     )  # fmt: skip
     assert values.shape[1] == BOX
-    weights = value[rows, columns]
-    return Targets(
-        heat, cell[rows, columns], values, weights, known[n][rows].float(), required.sum().clamp(min=1).float()
-    )
+    weights = value[entries, patch_cells]
+    moving = batch.has_earlier_scan[stations][n][entries].float()
+    return Targets(heat, cell[entries, patch_cells], values, weights, moving, required.sum().clamp(min=1).float())

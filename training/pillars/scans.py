@@ -15,7 +15,7 @@ import triton.language as tl  # type: ignore[import-not-found]
 CHUNK = 16
 """Triangles that share a bounding box."""
 GROUND, NOTHING = -1, -2
-"""Rows of the hits of rays that meet the ground, and nothing."""
+"""Hit slots of rays that meet the ground, and nothing."""
 ASPHALT = 0.17
 ATTENUATION = 0.004
 RANGE_NOISE = 0.02
@@ -100,7 +100,7 @@ def _enters(ox, oy, oz, ix, iy, iz, box):  # type: ignore[no-untyped-def]
 
 @triton.jit  # type: ignore[untyped-decorator]
 def _cast(  # type: ignore[no-untyped-def]
-    triangles, boxes, chunks, bounds, bodies, counts, scenes, heads, elevations, distance, rows, brightness,
+    triangles, boxes, chunks, bounds, bodies, counts, scenes, heads, elevations, distance, hit_slots, brightness,
     rings, columns, slots, block: tl.constexpr, chunk: tl.constexpr,
 ):  # fmt: skip
     """Cast the rays of one block of one scan against all bodies of its scene."""
@@ -116,7 +116,7 @@ def _cast(  # type: ignore[no-untyped-def]
     dx, dy, dz = flat * tl.cos(azimuth), flat * tl.sin(azimuth), tl.sin(elevation)
     dz = tl.where(tl.abs(dz) < 1e-7, 1e-7, dz)
     best = tl.where(dz < 0.0, -sz / dz, 1e9)
-    row = tl.where(dz < 0.0, -1, -2)
+    hit_slot = tl.where(dz < 0.0, -1, -2)
     bright = tl.abs(dz)
     scene = tl.load(scenes + scan)
     for slot in range(0, tl.load(counts + scene)):
@@ -153,11 +153,11 @@ def _cast(  # type: ignore[no-untyped-def]
                         hit = hit & (reach > 1e-3) & (reach < best)
                         facing = tl.load(t + 9) * ux + tl.load(t + 10) * uy + tl.load(t + 11) * dz
                         best = tl.where(hit, reach, best)
-                        row = tl.where(hit, slot, row)
+                        hit_slot = tl.where(hit, slot, hit_slot)
                         bright = tl.where(hit, tl.abs(facing) * tl.load(t + 12), bright)
     out = scan * rings * columns + ray
     tl.store(distance + out, best, mask=inside)
-    tl.store(rows + out, row, mask=inside)
+    tl.store(hit_slots + out, hit_slot, mask=inside)
     tl.store(brightness + out, bright, mask=inside)
 
 
@@ -167,7 +167,7 @@ class Heads:
 
     scene      (N,) scene of each
     own        (N,) slot of the body that carries it; its hits are no returns; -1: a mast, which is too thin to hide
-    place      (N, 3) of the sensor [m], yaw (N,) [rad], elevations (N, R) of the rings [rad]
+    position   (N, 3) of the sensor [m], yaw (N,) [rad], elevations (N, R) of the rings [rad]
     half_field (N,) half the field of view [rad], reach (N,) range [m]
     fade       (N,) extinction of the air [1/m]
     columns    of a revolution
@@ -175,7 +175,7 @@ class Heads:
 
     scene: torch.Tensor
     own: torch.Tensor
-    place: torch.Tensor
+    position: torch.Tensor
     yaw: torch.Tensor
     elevations: torch.Tensor
     half_field: torch.Tensor
@@ -190,13 +190,13 @@ class Scans:
 
     points     (N, M, 3) relative to the sensor, in axes of its heading [m]
     returned   (N, M) whether there is a return;  intensity (N, M)
-    rows       (N, M) slot of the body that it shows, GROUND, or NOTHING for the air
+    hit_slots  (N, M) slot of the body that it shows, GROUND, or NOTHING for the air
     """
 
     points: torch.Tensor
     returned: torch.Tensor
     intensity: torch.Tensor
-    rows: torch.Tensor
+    hit_slots: torch.Tensor
 
 
 def cast(meshes: Meshes, bodies: torch.Tensor, counts: torch.Tensor, heads: Heads, *, block: int = 128) -> Scans:
@@ -207,19 +207,19 @@ def cast(meshes: Meshes, bodies: torch.Tensor, counts: torch.Tensor, heads: Head
     device, rings = bodies.device, heads.elevations.shape[1]
     shape = len(heads.scene), heads.columns * rings
     distance, brightness = torch.empty(shape, device=device), torch.empty(shape, device=device)
-    rows = torch.empty(shape, dtype=torch.int32, device=device)
+    hit_slots = torch.empty(shape, dtype=torch.int32, device=device)
     start = torch.zeros(shape[0], device=device)
-    table = torch.cat([heads.place, heads.yaw[:, None], start[:, None]], dim=1).contiguous()
+    table = torch.cat([heads.position, heads.yaw[:, None], start[:, None]], dim=1).contiguous()
     _cast[(shape[0], triton.cdiv(shape[1], block))](
         meshes.triangles, meshes.boxes, meshes.chunks, meshes.bounds, bodies.contiguous(),
         counts.to(torch.int32), heads.scene.to(torch.int32), table, heads.elevations.contiguous(),
-        distance, rows, brightness, rings, heads.columns, bodies.shape[1], block=block, chunk=CHUNK,
+        distance, hit_slots, brightness, rings, heads.columns, bodies.shape[1], block=block, chunk=CHUNK,
     )  # fmt: skip
     turn = torch.arange(heads.columns, device=device) * (2.0 * math.pi / heads.columns)
     azimuth = torch.remainder(turn + math.pi, 2.0 * math.pi) - math.pi
     azimuth, elevation = azimuth.repeat_interleave(rings), heads.elevations.repeat(1, heads.columns)
-    own = rows == heads.own[:, None]
-    brightness = torch.where(rows == GROUND, ASPHALT * brightness, brightness)
+    own = hit_slots == heads.own[:, None]
+    brightness = torch.where(hit_slots == GROUND, ASPHALT * brightness, brightness)
     fade = heads.fade[:, None]
     through = torch.exp(-2.0 * fade * distance.clamp(max=1e4))
     returned = brightness * through / distance.square().clamp(min=1e-6) >= 0.1 / TEN_PERCENT_RANGE**2
@@ -227,10 +227,10 @@ def cast(meshes: Meshes, bodies: torch.Tensor, counts: torch.Tensor, heads: Head
     intensity = (brightness * through * torch.exp(-ATTENUATION * distance.clamp(max=1e4))).clamp(0.0, 1.0)
     length = distance + RANGE_NOISE * torch.randn(shape, device=device)
     air = torch.rand(shape, device=device) < 0.6 * fade  # a few percent of the rays in dense fog
-    place = AIR[0] + (AIR[1] - AIR[0]) * torch.rand(shape, device=device)
-    air &= place < distance
-    length, intensity = torch.where(air, place, length), torch.where(air, 0.05, intensity)
-    rows = torch.where(air, NOTHING, rows)
+    air_distance = AIR[0] + (AIR[1] - AIR[0]) * torch.rand(shape, device=device)
+    air &= air_distance < distance
+    length, intensity = torch.where(air, air_distance, length), torch.where(air, 0.05, intensity)
+    hit_slots = torch.where(air, NOTHING, hit_slots)
     flat = torch.cos(elevation)
     directions = torch.stack([flat * torch.cos(azimuth), flat * torch.sin(azimuth), torch.sin(elevation)], dim=2)
-    return Scans(directions * length[..., None], returned | (air & ~own), intensity, rows)
+    return Scans(directions * length[..., None], returned | (air & ~own), intensity, hit_slots)

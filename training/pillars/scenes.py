@@ -100,15 +100,15 @@ class SceneMaker:
 
         bodies    (SLOTS, 9) mesh, x, y, z of the center, cos and sin of the heading, scale;  count  of them
         velocity  (SLOTS, 2) [m/s];  boxes (SLOTS, 7);  classes (SLOTS,) row in CLASSES, -1: no road user
-        own       (STATIONS,) slot of the carrier, -1: a mast;  place (STATIONS, 3), yaw (STATIONS,) of the sensors
+        own       (STATIONS,) slot of the carrier, -1: a mast;  position (STATIONS, 3), yaw (STATIONS,) of the sensors
         speed     (STATIONS, 2) velocity of the sensors;  half_field, reach, fade (STATIONS,);  upper, lower (STATIONS,)
         """
         assets = self._assets
         place = int(rng.integers(len(assets.lanes)))
         lanes = assets.lanes[place]
         driving = np.flatnonzero(lanes[:, 4] == 0)
-        row = int(rng.choice(driving))
-        center = lanes[row, :2].copy()
+        lane = int(rng.choice(driving))
+        center = lanes[lane, :2].copy()
         away = np.hypot(*(lanes[:, :2] - center).T)
         near = np.flatnonzero(away < _SPREAD)
         entries: list[tuple[float, ...]] = []
@@ -127,8 +127,8 @@ class SceneMaker:
             entries.append((mesh, x, y, low + height / 2.0, heading, *scale, *velocity, length, width, height))
             return True
 
-        def body(row: int, shape: str, *, straight: bool = False) -> bool:
-            x, y, heading, width, kind = lanes[row].tolist()
+        def body(lane: int, shape: str, *, straight: bool = False) -> bool:
+            x, y, heading, width, kind = lanes[lane].tolist()
             mesh = int(rng.choice(self._shapes[shape]))
             aside = float(rng.normal(0.0, 0.12)) * width
             x, y = x - center[0] - math.sin(heading) * aside, y - center[1] + math.cos(heading) * aside
@@ -145,7 +145,7 @@ class SceneMaker:
             mast = number > 0 and rng.random() < 0.45
             for _ in range(20):
                 if number == 0:
-                    start = row
+                    start = lane
                 else:
                     kinds = lanes[near, 4] != 0 if mast else lanes[near, 4] <= 1
                     rows = near[kinds & (away[near] > 7.0) & (away[near] < 55.0)]
@@ -212,7 +212,7 @@ class SceneMaker:
                 float
             ),
             "own": stand[:, 0],
-            "place": stand[:, 1:4],
+            "position": stand[:, 1:4],
             "yaw": stand[:, 4],
             "speed": stand[:, 5:7],
             "half_field": stand[:, 7],

@@ -151,17 +151,17 @@ def pose_errors(number: int, noise: float, device: torch.device) -> Tensor:
 def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, noise: float) -> tuple[Tensor, Tensor]:
     """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells."""
     number = len(latent)
-    row = torch.arange(number, device=latent.device)
-    scene, station = row // STATIONS, row % STATIONS
+    grids = torch.arange(number, device=latent.device)
+    scene, station = grids // STATIONS, grids % STATIONS
     maps, present = [], []
     for step in range(1, STATIONS):
         sender = scene * STATIONS + (station + step) % STATIONS
         error = pose_errors(number, noise, latent.device)
         shift = batch.center - batch.center[sender] + error[:, :2]
-        values, held = warp(latent[sender], mask[sender], shift, error[:, 2])
-        held = held * ~_own_cells(batch)
+        values, sent_cells = warp(latent[sender], mask[sender], shift, error[:, 2])
+        sent_cells = sent_cells * ~_own_cells(batch)
         maps.append(network.received(values.to(latent.dtype)))
-        present.append(held)
+        present.append(sent_cells)
     return torch.stack(maps), torch.stack(present)
 
 
@@ -197,7 +197,7 @@ def train(
     features = torch.compile(network.features, dynamic=False) if arguments.compile else network.features
     random = np.random.default_rng(arguments.seed + (1 if joint else 0))
     book, device = CodeBook(network), network.codebook.device
-    start, step, held = time.monotonic(), 0, []
+    start, step, losses = time.monotonic(), 0, []
     peak = RATE * (0.4 if joint else 1.0)
     while (progress := (time.monotonic() - start) / (60.0 * arguments.minutes)) < 1.0:
         rate = peak * min(1.0, (step + 1) / 300.0) * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * progress)))
@@ -241,10 +241,10 @@ def train(
         with torch.no_grad():
             decay = min(AVERAGE, (step + 1) / (step + 20))
             torch._foreach_lerp_(averages, currents, 1.0 - decay)
-        held.append(loss.detach())
+        losses.append(loss.detach())
         step += 1
         if step % 100 == 0:
-            mean = torch.stack(held[-100:]).mean().item()
+            mean = torch.stack(losses[-100:]).mean().item()
             print(f"step {step}  {time.monotonic() - start:.0f} s  loss {mean:.3f}  rate {rate:.2e}", flush=True)
     return average, step
 
@@ -254,12 +254,12 @@ def peaks(maps: Tensor, count: int = 100) -> tuple[Tensor, Tensor, Tensor]:
     share = torch.sigmoid(maps[:, :K].float())
     best, kind = share.max(dim=1)
     best = torch.where(functional.max_pool2d(best[:, None], 3, 1, 1)[:, 0] == best, best, 0.0)
-    scores, rows = best.flatten(1).topk(count, dim=1)
-    i, j = rows // OUT, rows % OUT
-    offset = maps[:, K : K + 2].float().flatten(2).gather(2, rows[:, None].expand(-1, 2, -1))
+    scores, cells = best.flatten(1).topk(count, dim=1)
+    i, j = cells // OUT, cells % OUT
+    offset = maps[:, K : K + 2].float().flatten(2).gather(2, cells[:, None].expand(-1, 2, -1))
     x = (i + 0.5 + offset[:, 0]) * STRIDE_SIDE - REACH
     y = (j + 0.5 + offset[:, 1]) * STRIDE_SIDE - REACH
-    return scores, kind.flatten(1).gather(1, rows), torch.stack([x, y], dim=2)
+    return scores, kind.flatten(1).gather(1, cells), torch.stack([x, y], dim=2)
 
 
 def average_precision(entries: list[tuple[float, bool]], objects: int) -> float:
@@ -302,21 +302,21 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
         inside = (centers.abs() < REACH).all(dim=2) & (batch.classes[scene] >= 0)
         inside &= torch.arange(centers.shape[1], device=centers.device) != batch.own[:, None]
         for name, (maps, points) in results.items():
-            scores, _, places = (part.cpu().numpy() for part in peaks(maps))
+            scores, _, peak_centers = (part.cpu().numpy() for part in peaks(maps))
             step = len(inside) // len(maps)
             truth = (inside & (points > 0))[::step].cpu().numpy()
-            distance = torch.cdist(torch.as_tensor(places), centers[::step].cpu().float()).numpy()
-            for row in range(len(scores)):
-                open_rows = truth[row].copy()
-                objects[name] = objects.get(name, 0) + int(open_rows.sum())
+            distance = torch.cdist(torch.as_tensor(peak_centers), centers[::step].cpu().float()).numpy()
+            for grid in range(len(scores)):
+                unmatched = truth[grid].copy()
+                objects[name] = objects.get(name, 0) + int(unmatched.sum())
                 for rank in range(scores.shape[1]):
-                    if scores[row, rank] < 0.05:
+                    if scores[grid, rank] < 0.05:
                         break
-                    near = np.where(open_rows, distance[row, rank], np.inf)
+                    near = np.where(unmatched, distance[grid, rank], np.inf)
                     best = int(near.argmin())
                     hit = bool(near[best] < 1.0)
-                    open_rows[best] &= not hit
-                    detections.setdefault(name, []).append((float(scores[row, rank]), hit))
+                    unmatched[best] &= not hit
+                    detections.setdefault(name, []).append((float(scores[grid, rank]), hit))
     return {name: round(average_precision(detections.get(name, []), objects[name]), 4) for name in objects}
 
 
