@@ -171,10 +171,10 @@ def main() -> None:
         first = by_step[options.dt[0]]
         line = f"{name:52}{first.simulated:12.2f}"
         row: dict[str, object] = {"scenario": name, "simulated_s": first.simulated, "end": first.end}
-        for dt, one in by_step.items():
-            runs[dt].append(one)
-            line += f"{one.wall:15.3f}{one.rate:10.1f}"
-            row |= {f"wall_s_{dt:g}": one.wall, f"loading_s_{dt:g}": one.loading}
+        for dt, run in by_step.items():
+            runs[dt].append(run)
+            line += f"{run.wall:15.3f}{run.rate:10.1f}"
+            row |= {f"wall_s_{dt:g}": run.wall, f"loading_s_{dt:g}": run.loading}
         if esmini and ESMINI_STEP in by_step:
             esmini_total = esmini_seconds(esmini, path, timeout=20.0)
             row["esmini_s"] = esmini_total
@@ -186,8 +186,8 @@ def main() -> None:
         table.append(row)
     for dt, done in runs.items():
         if done:
-            simulated, running = sum(one.simulated for one in done), sum(one.running for one in done)
-            loading = sum(one.loading for one in done)
+            simulated, running = sum(run.simulated for run in done), sum(run.running for run in done)
+            loading = sum(run.loading for run in done)
             print(
                 f"\ndt {dt:g}: {len(done)} scenarios, {simulated:.0f} s simulated in {loading + running:.1f} s "
                 f"({loading:.1f} s of it loading): {simulated / (loading + running):.1f} simulated s per wall s, "

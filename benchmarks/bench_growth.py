@@ -67,9 +67,9 @@ def nurbs_cost(count: int) -> float:
     trajectory = model.Trajectory(name="curve", closed=False, shape=model.Shape(nurbs=shape))
 
     def resolve(position: model.Position) -> Pose:
-        place = position.world_position
-        assert place is not None
-        return Pose(place.x, place.y, 0.0, 0.0, 0.0, 0.0)
+        world_position = position.world_position
+        assert world_position is not None
+        return Pose(world_position.x, world_position.y, 0.0, 0.0, 0.0, 0.0)
 
     return processor_time(lambda: sample_trajectory(trajectory, resolve)) / count
 

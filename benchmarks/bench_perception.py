@@ -49,7 +49,7 @@ class LidarResults:
     detector: list[float] = field(default_factory=list)
 
 
-def evaluate_scenario(name: str, stations: tuple[str, ...], every: int, seed: int, found: LidarResults) -> None:
+def evaluate_scenario(name: str, stations: tuple[str, ...], every: int, seed: int, results: LidarResults) -> None:
     """Run a scenario with the oracle and evaluate additional lidars."""
     simulation = Simulation(load_for_seed(resolve_scenario(name), seed, {}), seed=seed, settings=RunSettings())
     lidars: dict[str, tuple[Rig, LidarDetector]] = {}
@@ -69,31 +69,31 @@ def evaluate_scenario(name: str, stations: tuple[str, ...], every: int, seed: in
                 readings = rig.read(world, view)
                 read = time.perf_counter()
                 detections = detector.detect(readings)
-                found.detector.append(time.perf_counter() - read)
-                found.sensor.append(read - start)
+                results.detector.append(time.perf_counter() - read)
+                results.sensor.append(read - start)
                 cloud = readings.lidars["lidar"]
                 points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
                 compare(
-                    found, detections, points[points[:, 2] > 0.25], view.boxes, view.names, view.categories, station
+                    results, detections, points[points[:, 2] > 0.25], view.boxes, view.names, view.categories, station
                 )
             tick += 1
 
 
 def compare(
-    found: LidarResults, detections: Detections, points: np.ndarray, boxes: np.ndarray, names: tuple[str, ...],
+    results: LidarResults, detections: Detections, points: np.ndarray, boxes: np.ndarray, names: tuple[str, ...],
     categories: tuple[str, ...], station: str,
 ) -> None:  # fmt: skip
     """Compare detections with the true objects."""
-    found.frames += 1
+    results.frames += 1
     for name, category, box in zip(names, categories, boxes, strict=True):
         enlarged = box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0])
         if name == station or category == "misc" or np.count_nonzero(points_in_box(points, enlarged)) < LEAST_POINTS:
             continue
         distances = np.hypot(*(detections.boxes[:, :2] - box[:2]).T)
         error = float(distances.min()) if len(distances) and distances.min() < FOUND else math.inf
-        found.errors["incoming car" if name == "Incoming" else category].append(error)
-    for place in detections.boxes[:, :2]:
-        found.false += bool(np.hypot(*(boxes[:, :2] - place).T).min() > FOUND)
+        results.errors["incoming car" if name == "Incoming" else category].append(error)
+    for center in detections.boxes[:, :2]:
+        results.false += bool(np.hypot(*(boxes[:, :2] - center).T).min() > FOUND)
 
 
 def evaluate_random_scenes(count: int, seed: int) -> None:
@@ -103,18 +103,18 @@ def evaluate_random_scenes(count: int, seed: int) -> None:
     false = 0
     detector = LidarDetector()
     for scene in random_scenes(count, seed):
-        found, cloud = detector.detect(scene.readings), scene.readings.lidars["lidar"]
+        detections, cloud = detector.detect(scene.readings), scene.readings.lidars["lidar"]
         points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
         points = points[points[:, 2] > 0.25]
         for kind, box in zip(scene.kinds, scene.boxes, strict=True):
             if np.count_nonzero(points_in_box(points, box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0]))) < LEAST_POINTS:
                 continue
-            distances = np.hypot(*(found.boxes[:, :2] - box[:2]).T)
+            distances = np.hypot(*(detections.boxes[:, :2] - box[:2]).T)
             hit = len(distances) > 0 and distances.min() < FOUND
             errors[kind].append(float(distances.min()) if hit else math.inf)
-            correct_class[kind] += bool(hit and found.classes[int(distances.argmin())] == kind)
-        for place in found.boxes[:, :2]:
-            false += bool(np.hypot(*(scene.boxes[:, :2] - place).T).min() > FOUND)
+            correct_class[kind] += bool(hit and detections.classes[int(distances.argmin())] == kind)
+        for center in detections.boxes[:, :2]:
+            false += bool(np.hypot(*(scene.boxes[:, :2] - center).T).min() > FOUND)
     for kind, all_of in sorted(errors.items()):
         hits = [error for error in all_of if math.isfinite(error)]
         share, correct = 100 * len(hits) / len(all_of), 100 * correct_class[kind] / max(len(hits), 1)
@@ -158,19 +158,19 @@ def main() -> None:
 def print_lidar_results(every: int, seed: int) -> None:
     """Print the results of the detector `lidar`, and its times."""
     print("scenarios 1 and 2, which were used to choose thresholds")
-    found = LidarResults()
+    results = LidarResults()
     for name, stations in SCENARIOS.items():
-        evaluate_scenario(name, stations, every, seed, found)
-    for kind, errors in sorted(found.errors.items()):
+        evaluate_scenario(name, stations, every, seed, results)
+    for kind, errors in sorted(results.errors.items()):
         hits = [error for error in errors if math.isfinite(error)]
         share, median_error = 100 * len(hits) / len(errors), median(hits)
         print(f"{kind:13} detected {share:5.1f} % of {len(errors):4}   median error of the center {median_error:.2f} m")
-    print(f"false detections per point cloud {found.false / found.frames:.2f}")
+    print(f"false detections per point cloud {results.false / results.frames:.2f}")
     print("random scenes, which were not used to choose anything")
     evaluate_random_scenes(150, RANDOM_SEED)
     print(
-        f"lidar {1e3 * median(found.sensor):.1f} ms, "
-        f"detector {1e3 * median(found.detector):.1f} ms per reading (medians)"
+        f"lidar {1e3 * median(results.sensor):.1f} ms, "
+        f"detector {1e3 * median(results.detector):.1f} ms per reading (medians)"
     )
     print(*(f"tracker {kind}, 10 objects: {tracker_milliseconds(kind):.2f} ms" for kind in ("cv", "ctrv")), sep="\n")
 

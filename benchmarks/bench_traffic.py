@@ -79,7 +79,7 @@ def scenario_text(town: Path, scripted: int, swarm: int, seconds: float) -> str:
     while len(occupied) < scripted:
         row = int(rng.choice(rows, p=shares))
         progress = float(rng.uniform(5.0, lanes.length[row] - 5.0))
-        if all(row != other or abs(progress - place) > 12.0 for other, place in occupied):
+        if all(row != other or abs(progress - other_progress) > 12.0 for other, other_progress in occupied):
             occupied.append((row, progress))
     placed, groups = [], []
     for n, (row, progress) in enumerate(occupied):

@@ -48,14 +48,14 @@ def gain(name: str, base: float, head: float) -> float:
 
 def pairs(name: str, base: Path, head: Path, repeats: int) -> list[tuple[float, float]]:
     """Return the figures of both checkouts, measured in turn; empty if one of them has none."""
-    found = []
+    figure_pairs = []
     for number in range(repeats):
         sides = (base, head) if number % 2 == 0 else (head, base)
         values = {side: value for side in sides if (value := measure(name, side)) is not None}
         if len(values) < len(sides):
             return []
-        found.append((values[base], values[head]))
-    return found
+        figure_pairs.append((values[base], values[head]))
+    return figure_pairs
 
 
 def comparison(name: str, measured: list[tuple[float, float]]) -> str:

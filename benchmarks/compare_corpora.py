@@ -133,13 +133,13 @@ def measured(paths: Sequence[Path], base: Path, head: Path, options: argparse.Na
             for _ in range(options.repeats):
                 for runner in times:
                     times[runner].append(runner.seconds(path, options.limit))
-            found = [[value for value in values if value is not None] for values in times.values()]
-            if not all(found):
+            completed = [[value for value in values if value is not None] for values in times.values()]
+            if not all(completed):
                 continue
             processes: tuple[float | None, float | None] = (None, None)
             if options.processes:
                 processes = process_seconds(path, options.limit, base), process_seconds(path, options.limit, head)
-            yield Times(path.stem, min(found[0]), min(found[1]), *processes)
+            yield Times(path.stem, min(completed[0]), min(completed[1]), *processes)
 
 
 def summary(title: str, pairs: Sequence[tuple[float, float]]) -> str:

@@ -263,16 +263,16 @@ def main() -> None:
     if options.here:
         print(*(FIGURES[name].measure() for name in names))
         return
-    found: dict[str, float | None] = {}
+    values: dict[str, float | None] = {}
     if not options.json:
         print(f"{'figure':20}{'here':>10}  {'unit':24}{'aim':16}0.1.0")
     for name in names:
-        found[name] = best(name, options.repeats)
+        values[name] = best(name, options.repeats)
         if not options.json:
-            print(line(name, found[name]), flush=True)
+            print(line(name, values[name]), flush=True)
     if options.json:
-        print(json.dumps(found))
-    if None in found.values():
+        print(json.dumps(values))
+    if None in values.values():
         sys.exit(1)
 
 

@@ -70,13 +70,13 @@ def main() -> None:
     if git("status", "--porcelain", "--untracked-files=no"):
         sys.exit("the checkout has changes; commit them, so that the line belongs to a commit")
     commit, date = git("log", "-1", "--format=%H %cI").split()
-    speeds, found = [core_speed()], dict.fromkeys(FIGURES, "")
+    speeds, values = [core_speed()], dict.fromkeys(FIGURES, "")
     for name in available():
         value = best(name, options.repeats)
-        found[name] = "" if value is None else f"{value:.4g}"
+        values[name] = "" if value is None else f"{value:.4g}"
         print(line(name, value), flush=True)
         speeds.append(core_speed())
-    row = [commit[:12], date, processor(), platform.python_version(), f"{median(speeds):.1f}", *found.values()]
+    row = [commit[:12], date, processor(), platform.python_version(), f"{median(speeds):.1f}", *values.values()]
     add_row(options.file, row)
     print(f"wrote {options.file}")
 

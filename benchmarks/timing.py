@@ -52,14 +52,14 @@ def shares_by_package(profile: cProfile.Profile) -> dict[str, float]:
             return {"python": 1.0}
         callers = {caller: entry[2] for caller, entry in stats[function][4].items() if caller not in above}
         total = sum(callers.values())
-        found: dict[str, float] = defaultdict(float)
+        shares: dict[str, float] = defaultdict(float)
         for caller, own in callers.items():
             weight = own / total if total else 1.0 / len(callers)
             for name, share in owners_of(caller, above | {function}).items():
-                found[name] += weight * share
+                shares[name] += weight * share
         if not above:
-            owners[function] = dict(found)
-        return dict(found) or {"python": 1.0}
+            owners[function] = dict(shares)
+        return dict(shares) or {"python": 1.0}
 
     seconds: dict[str, float] = defaultdict(float)
     for function, (_, _, own, _, _) in stats.items():
