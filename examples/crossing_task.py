@@ -70,17 +70,17 @@ def features(observation: dict[str, Any]) -> Floats:
     the own path, at most 5 s.
     """
     received, age = observation["senders"][0]
-    found = np.zeros(FEATURES)
-    found[:2] = observation["ego"][0] / 10.0, age if received else 1.0
+    values = np.zeros(FEATURES)
+    values[:2] = observation["ego"][0] / 10.0, age if received else 1.0
     tracks = observation["tracks"]
     speeds = np.hypot(tracks[:, 3], tracks[:, 4]) * (tracks[:, 0] > 0.0)
-    row = int(np.argmax(speeds))
-    if speeds[row] < MOVING:
-        return found
-    x, y, vx, vy = tracks[row, 1:5]
+    fastest = int(np.argmax(speeds))
+    if speeds[fastest] < MOVING:
+        return values
+    x, y, vx, vy = tracks[fastest, 1:5]
     until = min(-y / vy, 5.0) if y * vy < 0.0 else 5.0
-    found[2:] = 1.0, x / 30.0, y / 30.0, vx / 15.0, vy / 15.0, until / 5.0
-    return found
+    values[2:] = 1.0, x / 30.0, y / 30.0, vx / 15.0, vy / 15.0, until / 5.0
+    return values
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,8 @@ def outcomes(pool: ProcessPoolExecutor, candidates: Sequence[Floats], seeds: Seq
     """Return the outcomes of each candidate in all latencies and seeds."""
     episodes = [(latency, seed) for latency in LATENCIES for seed in seeds]
     jobs = [(weights, latency, seed) for weights in candidates for latency, seed in episodes]
-    found = list(pool.map(drive, *zip(*jobs, strict=True), chunksize=len(episodes)))
-    return [found[n : n + len(episodes)] for n in range(0, len(found), len(episodes))]
+    results = list(pool.map(drive, *zip(*jobs, strict=True), chunksize=len(episodes)))
+    return [results[n : n + len(episodes)] for n in range(0, len(results), len(episodes))]
 
 
 def train(
@@ -66,14 +66,15 @@ def train(
     with ProcessPoolExecutor(workers) as pool:
         for generation in range(generations + 1):
             (driven,) = outcomes(pool, [mean], fixed)
-            passed, reward = (fmean(getattr(one, name) for one in driven) for name in ("passed", "reward"))
+            passed, reward = (fmean(getattr(outcome, name) for outcome in driven) for name in ("passed", "reward"))
             print(f"generation {generation:3}: passes {passed:4.0%}, reward {reward:6.2f}", flush=True)
             curve.append((generation, reward, passed))
             means.append(mean)
             if generation < generations:
                 candidates = [mean + spread * rng.standard_normal(len(mean)) for _ in range(population)]
                 rewards = [
-                    fmean(one.reward for one in each) for each in outcomes(pool, candidates, [int(rng.integers(2**31))])
+                    fmean(outcome.reward for outcome in driven)
+                    for driven in outcomes(pool, candidates, [int(rng.integers(2**31))])
                 ]
                 best = np.array(candidates)[np.argsort(rewards, kind="stable")[-elites:]]
                 mean, spread = best.mean(axis=0), np.maximum(best.std(axis=0), LEAST_SPREAD)
