@@ -54,13 +54,13 @@ ALONE = "none"
 
 def jobs(scenarios: Iterable[str], seeds: Sequence[int]) -> list[Job]:
     """Return the runs of all arms of these scenarios."""
-    found = []
-    for name in scenarios:
-        for arm, parameters in {ALONE: {"Participants": "none"}, **ARMS[name]}.items():
-            contact = {"collision": {"of": EGO, "name": CONTACT}}
-            settings = RunSettings(parameters=dict(parameters), criteria=contact)
-            found += [Job(f"corner_cases/{name}", arm, seed, settings) for seed in seeds]
-    return found
+    criteria = {"collision": {"of": EGO, "name": CONTACT}}
+    return [
+        Job(f"corner_cases/{name}", arm, seed, RunSettings(parameters=dict(parameters), criteria=criteria))
+        for name in scenarios
+        for arm, parameters in {ALONE: {"Participants": "none"}, **ARMS[name]}.items()
+        for seed in seeds
+    ]
 
 
 def table(runs: Sequence[SceneRun]) -> str:

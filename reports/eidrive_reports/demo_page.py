@@ -70,7 +70,7 @@ def row(cell: Cell) -> tuple[str, ...]:
     )
 
 
-def render(table: Table, found: Sequence[PublishedClaim] = ()) -> RenderableType:
+def render(table: Table, claims: Sequence[PublishedClaim] = ()) -> RenderableType:
     """Return one grid per scenario, followed by the checks of the published order."""
     parts: list[RenderableType] = [Text(f"Table II, oracle; {table.variant.title}", style="bold"), Text("")]
     for scenario in table.scenarios:
@@ -87,14 +87,14 @@ def render(table: Table, found: Sequence[PublishedClaim] = ()) -> RenderableType
         for cell in (cell for cell in table.cells if cell.scenario == scenario):
             grid.add_row(*row(cell))
         parts.append(grid)
-        parts.extend(_lines(check) for check in found if check.scenario == scenario)
+        parts.extend(_lines(claim) for claim in claims if claim.scenario == scenario)
         parts.append(Text(""))
     return Group(*parts)
 
 
-def _lines(check: PublishedClaim) -> RenderableType:
-    verdict = ("holds: ", "green") if check.holds else ("does not hold: ", "red")
-    return Group(Text.assemble(verdict, check.statement), Padding(Text(check.evidence, style="dim"), (0, 0, 0, 4)))
+def _lines(claim: PublishedClaim) -> RenderableType:
+    verdict = ("holds: ", "green") if claim.holds else ("does not hold: ", "red")
+    return Group(Text.assemble(verdict, claim.statement), Padding(Text(claim.evidence, style="dim"), (0, 0, 0, 4)))
 
 
 COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
@@ -170,11 +170,10 @@ def _scenario(
     table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], site: DemoSite, window: Window, watched: int
 ) -> dict[str, Any]:
     mine = {arm.name: stories[scenario, arm.channel(table.variant)] for arm in ARMS}
-    found: Sequence[PublishedClaim] = [check for check in evaluate_claims(table) if check.scenario == scenario]
     return {
         "title": SCENARIOS.get(scenario, scenario),
         "cells": [cell for cell in table.cells if cell.scenario == scenario],
-        "checks": found,
+        "checks": [claim for claim in evaluate_claims(table) if claim.scenario == scenario],
         "chart": Markup(_chart(mine)),
         "views": [
             {"title": view.title, "caption": view.caption, "address": png_address(view.png)} for view in site.views

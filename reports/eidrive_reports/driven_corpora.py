@@ -147,7 +147,8 @@ def selected(names: Iterable[str]) -> list[Group]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("groups", nargs="*", help=f"groups, all by default: {', '.join(one.name for one in GROUPS)}")
+    names = ", ".join(group.name for group in GROUPS)
+    parser.add_argument("groups", nargs="*", help=f"groups, all by default: {names}")
     parser.add_argument("--planner", default=DEFAULT)
     parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument("--out", type=Path, default=Path("reports"))
@@ -163,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not options.resume:
         record.unlink(missing_ok=True)
     console = Console(stderr=True)
-    found = []
+    results = []
     for group in groups:
         reference = None if group.reference is None else dict([group.reference])
         jobs = [
@@ -175,10 +176,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             runs = run_recorded(jobs, record, workers=options.workers, console=console, title=group.name)
         except SettingError as error:
             parser.error(str(error))
-        found.append((group, runs))
+        results.append((group, runs))
         with write_atomically(options.out / "driven_corpora.md") as stream:
-            stream.write(report(found).encode())
-    sys.stdout.write(report(found))
+            stream.write(report(results).encode())
+    sys.stdout.write(report(results))
 
 
 if __name__ == "__main__":

@@ -102,11 +102,11 @@ def wrong_reference(files: Iterable[Path], name: str, model: str) -> Diagnostic 
         return registry("controllers").unknown(model, source=REFERENCE_OPTION)
     for path in files:
         try:
-            known = _controller_names(path)
+            names = _controller_names(path)
         except InputError:
             continue
-        if name not in known:
-            hint = suggestion(name, known) if known else "the file has no controller of another tool"
+        if name not in names:
+            hint = suggestion(name, names) if names else "the file has no controller of another tool"
             return Diagnostic(f"{path.name} has no controller {quoted(name)}", hint, REFERENCE_OPTION)
     return None
 
@@ -115,8 +115,8 @@ def _controller_names(path: Path) -> list[str]:
     """Return the names of the controllers of other tools in a scenario, or in that of a distribution."""
     scenario = load_scenario(load_distribution(path).scenario if definition(path) == "distribution" else path)
     trees = (scenario.document, *scenario.entries.values())
-    found = (one for tree in trees for one in tree.walk() if isinstance(one, Controller))
-    return list(dict.fromkeys(one.name for one in found if not is_agent_controller(one)))
+    controllers = (element for tree in trees for element in tree.walk() if isinstance(element, Controller))
+    return list(dict.fromkeys(element.name for element in controllers if not is_agent_controller(element)))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -102,13 +102,13 @@ class DrivenMotion:
 
     def _end_stop(self, time: float) -> None:
         if self._stopped_at is not None and self._place is not None:
-            reason = max(self._reasons, key=lambda one: self._reasons[one], default="")
+            reason = max(self._reasons, key=lambda reason: self._reasons[reason], default="")
             self.stops.append(Stop(self._stopped_at, time - self._stopped_at, *self._place, reason))
         self._stopped_at = None
         self._reasons.clear()
 
     def _add_contacts(self, time: float, criteria: Iterable[Criterion]) -> None:
-        metrics = next(one.metrics() for one in criteria if one.name == CONTACT)
+        metrics = next(criterion.metrics() for criterion in criteria if criterion.name == CONTACT)
         count, at_fault = (int(metrics.get(f"{CONTACT}.{key}", 0.0)) for key in ("count", "at_fault"))
         fresh = count - len(self.contacts)
         blamed = at_fault - sum(fault for _, fault in self.contacts)

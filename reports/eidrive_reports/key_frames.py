@@ -78,7 +78,7 @@ class KeyFrames:
         self._boxes: list[float] = []
         self._speeds: list[float] = []
         self._common_times: list[float] = []
-        self._found: dict[str, tuple[str, StationSnapshot]] = {}
+        self._events: dict[str, tuple[str, StationSnapshot]] = {}
         self._least = (math.inf, math.inf)
         self._touched = False
 
@@ -101,7 +101,7 @@ class KeyFrames:
     def story(self) -> Story:
         """Return the key frames and series of the frames so far."""
         moments = []
-        first = "received" if "received" in self._found else "hidden"
+        first = "received" if "received" in self._events else "hidden"
         for kind, absent in (
             (first, f"{self.hidden} is never detected by others only"),
             ("entered", f"{self.hidden} never enters the conflict area"),
@@ -110,7 +110,7 @@ class KeyFrames:
         ):
             if kind == "entered" and not self.areas:
                 continue
-            title, snapshot = self._found.get(kind, (absent, None))
+            title, snapshot = self._events.get(kind, (absent, None))
             moments.append(Moment(kind, title, snapshot and _portable(snapshot)))
         return Story(
             self.ego,
@@ -137,30 +137,35 @@ class KeyFrames:
             self._least = (box, center)
             collision = f"{self.hidden} and {self.ego} collide"
             title = collision if self._touched else f"minimum distance, {box:.2f} m"
-            self._found["closest"] = (title, snapshot)
+            self._events["closest"] = (title, snapshot)
 
     def _find_events(self, frame: Frame, snapshot: StationSnapshot) -> None:
         step = snapshot.step
         if not self._shows(snapshot.own):
-            if "hidden" not in self._found:
+            if "hidden" not in self._events:
                 others = [name for name, at in frame.steps.items() if name != self.ego and self._shows(at.detections)]
                 if others:
                     title = (
                         f"{' and '.join(others)} {'sees' if len(others) == 1 else 'see'} {self.hidden}, "
                         f"{self.ego} does not"
                     )
-                    self._found["hidden"] = (title, snapshot)
-            if "received" not in self._found:
+                    self._events["hidden"] = (title, snapshot)
+            if "received" not in self._events:
                 senders = [held.message.sender for held in snapshot.received if self._shows(held.message.detections)]
                 if senders:
                     title = f"{self.ego} receives {self.hidden} only from {' and '.join(dict.fromkeys(senders))}"
-                    self._found["received"] = (title, snapshot)
-        if "entered" not in self._found and self.areas:
+                    self._events["received"] = (title, snapshot)
+        if "entered" not in self._events and self.areas:
             at = snapshot.view.centers[snapshot.view.row(self.hidden), :2]
             if any(points_in_polygon(at, area) for area in self.areas):
-                self._found["entered"] = (f"{self.hidden} enters the conflict area", snapshot)
-        if "braked" not in self._found and step is not None and step.plan is not None and step.plan.braking is not None:
-            self._found["braked"] = (f"{self.ego} brakes", snapshot)
+                self._events["entered"] = (f"{self.hidden} enters the conflict area", snapshot)
+        if (
+            "braked" not in self._events
+            and step is not None
+            and step.plan is not None
+            and step.plan.braking is not None
+        ):
+            self._events["braked"] = (f"{self.ego} brakes", snapshot)
 
     def _shows(self, detections: Detections) -> bool:
         """True if a detection is near the position of the occluded car at the time of measurement."""

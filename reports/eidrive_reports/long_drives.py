@@ -160,8 +160,8 @@ def write_town_drive(
     """
     seconds = 60.0 * minutes
     way = draw_way(roads, seed, seconds)
-    places = waypoints(roads, way)
-    length = roads.route(places[0], places[-1], places[1:-1]).length
+    locations = waypoints(roads, way)
+    length = roads.route(locations[0], locations[-1], locations[1:-1]).length
     criteria = (
         f"[{{collision: {{of: {EGO}, only_at_fault: true}}}}, {{route_completion: {{of: {EGO}, at_least: 0.95}}}}, "
         f"{{running_red_light: {{of: {EGO}}}}}, {{actor_blocked: {{of: {EGO}, at_most: 60}}}}]"
@@ -179,11 +179,11 @@ def write_town_drive(
         criteria=criteria,
         mix="\n".join(_mix_entry(entry, weight) for entry, weight in MIX),
         corners="\n".join(f'{" " * 27}<Position><WorldPosition x="{x:g}" y="{y:g}"/></Position>' for x, y in corners),
-        start=_position(places[0]),
-        end=_position(places[-1]),
+        start=_position(locations[0]),
+        end=_position(locations[-1]),
         waypoints="\n".join(
-            f'{" " * 18}<Waypoint routeStrategy="shortest"><Position>{_position(place)}</Position></Waypoint>'
-            for place in places
+            f'{" " * 18}<Waypoint routeStrategy="shortest"><Position>{_position(location)}</Position></Waypoint>'
+            for location in locations
         ),
         covered=max(length - 5.0 * ARRIVAL, 0.5 * length),
         arrival=ARRIVAL,
@@ -232,11 +232,11 @@ def _is_open(roads: RoadNetwork, key: LaneKey) -> bool:
 
 
 def waypoints(roads: RoadNetwork, way: Sequence[LaneKey]) -> list[LaneLocation]:
-    """Return places on each lane of a way that is outside of junctions and not left by a lane change.
+    """Return locations on each lane of a way that is outside of junctions and not left by a lane change.
 
     A long lane has two, so that a route can lead around a ring of one lane.
     """
-    found = []
+    locations = []
     for number, key in enumerate(way):
         following = way[number + 1] if number + 1 < len(way) else key
         if _is_open(roads, key) and (following == key or following[:2] != key[:2]):
@@ -244,12 +244,12 @@ def waypoints(roads: RoadNetwork, way: Sequence[LaneKey]) -> list[LaneLocation]:
             shares = (1.0 / 3.0, 2.0 / 3.0) if section.length >= LONG_SECTION else (0.5,)
             forward = roads.driving_direction(key.road, key.lane) > 0
             along = [section.length * (share if forward else 1.0 - share) for share in shares]
-            found += [roads.location(key.road, key.lane, section.s + s) for s in along]
-    return found
+            locations += [roads.location(key.road, key.lane, section.s + s) for s in along]
+    return locations
 
 
-def _position(place: LaneLocation) -> str:
-    return f'<LanePosition roadId={quoteattr(place.road)} laneId="{place.lane}" s="{place.s:.3f}"/>'
+def _position(location: LaneLocation) -> str:
+    return f'<LanePosition roadId={quoteattr(location.road)} laneId="{location.lane}" s="{location.s:.3f}"/>'
 
 
 def _mix_entry(entry: str, weight: int) -> str:
@@ -260,7 +260,7 @@ def _mix_entry(entry: str, weight: int) -> str:
 
 def _signals(roads: RoadNetwork) -> str:
     """Return a signal controller per junction: the groups of its signals have green one after the other."""
-    found = []
+    controllers = []
     for junction in roads.junctions.values():
         groups = [
             [signal for signal in roads.controllers[number].signals if roads.signals[signal].dynamic]
@@ -269,8 +269,8 @@ def _signals(roads: RoadNetwork) -> str:
         ]
         groups = [list(dict.fromkeys(group)) for group in groups if group]
         if groups:
-            found.append(_controller(f"Junction{junction.id}", groups))
-    return f"\n      <TrafficSignals>\n{''.join(found)}      </TrafficSignals>" if found else ""
+            controllers.append(_controller(f"Junction{junction.id}", groups))
+    return f"\n      <TrafficSignals>\n{''.join(controllers)}      </TrafficSignals>" if controllers else ""
 
 
 def _controller(name: str, groups: Sequence[Sequence[str]]) -> str:

@@ -84,13 +84,13 @@ class Car(NamedTuple):
 
 @dataclass(frozen=True)
 class OvertakingScene:
-    """Ego with its wanted speed [m/s] and range of its sensors [m], an obstacle from a place on [m], oncoming cars, and
-    the duration [s]."""
+    """Ego with its wanted speed [m/s] and range of its sensors [m], an obstacle from `obstacle_x` on [m], oncoming
+    cars, and the duration [s]."""
 
     speed: float
     range: float
     obstacle: Obstacle
-    place: float
+    obstacle_x: float
     oncoming: tuple[Car, ...]
     duration: float
 
@@ -98,13 +98,13 @@ class OvertakingScene:
 def gap_scene(kind: str, gap: float, seed: int) -> OvertakingScene:
     """Return the scene of a gap [s] behind an obstacle; speeds and places vary with the seed."""
     draws = generator(seed, "overtaking gap", kind)
-    obstacle, place = OBSTACLES[kind], draws.uniform(140.0, 160.0)
+    obstacle, obstacle_x = OBSTACLES[kind], draws.uniform(140.0, 160.0)
     speed, other = draws.uniform(12.0, 14.0), draws.uniform(11.0, 13.0)
-    meeting = (place - START - BEHIND) / (speed - obstacle.speed)
-    first = place + (obstacle.speed + other) * meeting
+    meeting = (obstacle_x - START - BEHIND) / (speed - obstacle.speed)
+    first = obstacle_x + (obstacle.speed + other) * meeting
     times = [0.0, HEADWAY, *(HEADWAY + gap + HEADWAY * number for number in range(COLUMN))]
     cars = tuple(Car(first + other * time, other) for time in times)
-    return OvertakingScene(speed, SIGHT, obstacle, place, cars, meeting + times[-1])
+    return OvertakingScene(speed, SIGHT, obstacle, obstacle_x, cars, meeting + times[-1])
 
 
 def random_scene(seed: int) -> OvertakingScene:
@@ -190,11 +190,11 @@ def write(scene: OvertakingScene, path: Path) -> None:
     """Write the scenario of a scene; its folder has to contain the road."""
     actors = [(EGO, "", START, -LANE / 2.0, scene.speed)]
     obstacle = scene.obstacle
-    for row in range(obstacle.number):
-        x, y = scene.place + row * obstacle.spacing, -LANE / 2.0 - obstacle.right
-        actors.append((f"Obstacle{row + 1}", obstacle.entry, x, y, obstacle.speed))
-    for row, car in enumerate(scene.oncoming):
-        actors.append((f"Oncoming{row + 1}", "lincoln_mkz", car.x, LANE / 2.0, car.speed))
+    for index in range(obstacle.number):
+        x, y = scene.obstacle_x + index * obstacle.spacing, -LANE / 2.0 - obstacle.right
+        actors.append((f"Obstacle{index + 1}", obstacle.entry, x, y, obstacle.speed))
+    for index, car in enumerate(scene.oncoming):
+        actors.append((f"Oncoming{index + 1}", "lincoln_mkz", car.x, LANE / 2.0, car.speed))
     text = _SCENARIO.format(
         road=ROAD_FILE,
         ego=EGO,

@@ -250,13 +250,13 @@ class PublishedClaim:
 
 def evaluate_claims(table: Table) -> tuple[PublishedClaim, ...]:
     """Compare the order of the arms in each scenario with the published order."""
-    found = []
+    claims = []
     for scenario in table.scenarios:
         none, cooperation, latency, error = (table.cell(scenario, arm.name) for arm in ARMS)
-        found.append(_order(scenario, "cooperation > none", none, cooperation))
-        found.append(_order(scenario, "latency < cooperation", latency, cooperation))
-        found.append(_mixture(scenario, latency, error, cooperation))
-    return tuple(found)
+        claims.append(_order(scenario, "cooperation > none", none, cooperation))
+        claims.append(_order(scenario, "latency < cooperation", latency, cooperation))
+        claims.append(_mixture(scenario, latency, error, cooperation))
+    return tuple(claims)
 
 
 def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> PublishedClaim:
@@ -300,7 +300,7 @@ def difference(links: Table, own: Table) -> str:
     """
     shifts, smaller, worse = [], 0.0, {LINKS.name: 0, OWN.name: 0}
     for scenario in links.scenarios:
-        place = SCENARIOS.get(scenario, scenario).split(",")[0].lower()
+        title = SCENARIOS.get(scenario, scenario).split(",")[0].lower()
         for arm in ARMS[1:]:
             before, after = links.cell(scenario, arm.name), own.cell(scenario, arm.name)
             change = after.center.mean - before.center.mean
@@ -308,7 +308,7 @@ def difference(links: Table, own: Table) -> str:
                 smaller = max(smaller, abs(change))
                 continue
             shifts.append(
-                f"{place} {arm.title} {before.center.mean:.2f} → {after.center.mean:.2f} m, collision-free "
+                f"{title} {arm.title} {before.center.mean:.2f} → {after.center.mean:.2f} m, collision-free "
                 f"{before.collision_free.successes} → {after.collision_free.successes} of {len(after.seeds)}"
             )
         for table in (links, own):

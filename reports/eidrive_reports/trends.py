@@ -102,8 +102,8 @@ def precision_by_delay(
             state = StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0)
             channel.send(Message("RSU", tick, now, state, detections, 0), ["Ego"], now)
         truth = detections.boxes
-        found = match_by_share(iou_bev(fused.boxes, truth), fused.scores, np.zeros(cars, dtype=bool), iou)
-        measured.append(average_precision([found], cars))
+        matches = match_by_share(iou_bev(fused.boxes, truth), fused.scores, np.zeros(cars, dtype=bool), iou)
+        measured.append(average_precision([matches], cars))
     late = np.array([math.ceil(max(delay, dt) / dt - 1e-6) * dt for delay in delays])
     expected = np.ones(len(late)) if compensated else (speed * late <= largest_shift(iou) + 1e-9).astype(float)
     label = f"{speed:g} m/s, IoU {iou:g}" + (", predicted to the current time" if compensated else "")

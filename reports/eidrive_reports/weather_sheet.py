@@ -123,8 +123,8 @@ def write(
 ) -> None:
     """Draw the contact sheet."""
     order = ("sunny", "foggy_morning", "storm", "midnight")
-    known = {path.stem for path in (library_path() / "weather").glob("*.yaml")}
-    chosen = weather or [*(name for name in order if name in known), *sorted(known - {*order})]
+    presets = {path.stem for path in (library_path() / "weather").glob("*.yaml")}
+    chosen = weather or [*(name for name in order if name in presets), *sorted(presets - {*order})]
     try:
         weathers = [load_weather(name, origin="--weather") for name in chosen]
         with write_atomically(out) as stream:

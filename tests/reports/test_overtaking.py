@@ -33,8 +33,8 @@ def test_gap_is_the_time_between_cars_at_one_place(kind: str) -> None:
     assert (second.x - first.x) / first.speed == pytest.approx(HEADWAY)
     assert (third.x - second.x) / first.speed == pytest.approx(9.0)
     assert (column[0].x - third.x) / first.speed == pytest.approx(HEADWAY)
-    meeting = (first.x - scene.place) / (first.speed + scene.obstacle.speed)
-    assert scene.place + scene.obstacle.speed * meeting - (START + scene.speed * meeting) == pytest.approx(BEHIND)
+    meeting = (first.x - scene.obstacle_x) / (first.speed + scene.obstacle.speed)
+    assert scene.obstacle_x + scene.obstacle.speed * meeting - (START + scene.speed * meeting) == pytest.approx(BEHIND)
 
 
 def test_random_scenes_are_valid_and_their_gaps_within_bounds(tmp_path: Path) -> None:

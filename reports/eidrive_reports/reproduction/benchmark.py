@@ -112,7 +112,7 @@ def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
 
 def trace_digest(episodes: Sequence[Episode]) -> str:
     """Return the digest of the trace hashes of runs in the order of their seeds, one hash per line."""
-    hashes = [episode.trace_hash for episode in sorted(episodes, key=lambda one: one.seed)]
+    hashes = [episode.trace_hash for episode in sorted(episodes, key=lambda episode: episode.seed)]
     return sha256_of("\n".join(hashes).encode())[:16]
 
 
@@ -177,9 +177,9 @@ def rank_rows(episodes: Sequence[Episode], plan: Plan) -> list[Row]:
         measured: list[dict[str, Value]] = []
         for method, own in mine.items():
             alone = mine.get(Method(NO_COOPERATION, method.detector), []) if method.cooperates else []
-            place: dict[str, Value] = {"channel": channel.name, "channel_title": channel.title, "method": method.name}
-            place |= {"rate": channel.rate, "stations": channel.stations}
-            measured.append({**place, **outcome(own), **_gain(alone, own)})
+            key: dict[str, Value] = {"channel": channel.name, "channel_title": channel.title, "method": method.name}
+            key |= {"rate": channel.rate, "stations": channel.stations}
+            measured.append({**key, **outcome(own), **_gain(alone, own)})
         for row in measured:
             row["rank"] = 1 + sum(float(other["share"] or 0) > float(row["share"] or 0) for other in measured)
         rows += sorted(measured, key=lambda row: (int(row["rank"] or 0), float(row["bytes_per_s"] or 0)))

@@ -59,11 +59,11 @@ def with_load(path: Path, count: int) -> etree._Element:
 def places(count: int) -> list[tuple[float, float]]:
     """Return the places of the stations [m]."""
     random = generator(0, "channel load")
-    found: list[tuple[float, float]] = []
-    while len(found) < count:
+    positions: list[tuple[float, float]] = []
+    while len(positions) < count:
         radius = math.sqrt(random.uniform(INNER**2, OUTER**2))
         angle = random.uniform(0.0, 2.0 * math.pi)
         x, y = radius * math.cos(angle), radius * math.sin(angle)
         if min(abs(x), abs(y)) > CLEAR:
-            found.append((CENTER[0] + x, CENTER[1] + y))
-    return found
+            positions.append((CENTER[0] + x, CENTER[1] + y))
+    return positions

@@ -99,7 +99,7 @@ def _radio(rows: Sequence[Row]) -> str:
     listed = []
     for row in (row for row in rows if row["fault"] == "radio" and number(row, "reception") < 0.95):
         received = number(row, "reception")
-        nearest = min(single, key=lambda one: abs(number(one, "reception") - received))
+        nearest = min(single, key=lambda row: abs(number(row, "reception") - received))
         listed.append(
             f"{row['share']:.0%} with {received:.0%} received ({nearest['share']:.0%} with independent losses and "
             f"{nearest['reception']:.0%})"
@@ -173,7 +173,7 @@ def loaded(access: str) -> Mapping[str, Any]:
 
 def cases(detectors: Sequence[str]) -> list[Case]:
     """Return the runs of all arms."""
-    found = []
+    runs = []
     for detector, ((scenario, planner), blocks) in product(detectors, BLOCKS.items()):
         arms: dict[str, str | Mapping[str, Any]] = {"none": "none"}
         arms |= {f"latency {latency}": delay(latency) for latency in LATENCIES}
@@ -181,11 +181,11 @@ def cases(detectors: Sequence[str]) -> list[Case]:
         arms |= {f"radio {power}": radio(power) for power in POWERS}
         for (arm, channel), block in product(arms.items(), range(blocks)):
             name = f"{detector} {planner} {arm} {block}"
-            found.append(Case(scenario, name, _settings(scenario, detector, planner, channel), shift=1000 * block))
+            runs.append(Case(scenario, name, _settings(scenario, detector, planner, channel), shift=1000 * block))
     for detector, access, stations in product(detectors, ACCESS, STATIONS):
         settings = _settings(LOADED[0], detector, LOADED[1], loaded(access), sender="RSU")
-        found.append(Case(LOADED[0], f"{detector} {access} {stations}", settings, load=stations - 2))
-    return found
+        runs.append(Case(LOADED[0], f"{detector} {access} {stations}", settings, load=stations - 2))
+    return runs
 
 
 def _settings(
@@ -215,15 +215,15 @@ def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
     age                      median of the mean age of information of the runs [s]; None if infinite or without messages
     """
     free = sum(not collided(episode) for episode in episodes)
-    found = wilson(free, len(episodes))
+    collision_free = wilson(free, len(episodes))
     received = [episode.metrics["packet_reception_ratio"] for episode in episodes if _has_links(episode)]
     age = _median(episodes, "age_of_information.mean")
     return {
         "episodes": len(episodes),
         "free": free,
-        "share": found.share,
-        "low": found.low,
-        "high": found.high,
+        "share": collision_free.share,
+        "low": collision_free.low,
+        "high": collision_free.high,
         "reception": sum(received) / len(received) if received else None,
         "age": age,
     }
@@ -241,7 +241,7 @@ def _median(episodes: Sequence[Episode], name: str) -> float | None:
 
 def fault_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the arms of fixed latencies, fixed losses and radio by geometry."""
-    found = by_case(episodes)
+    runs = by_case(episodes)
     arms: list[tuple[str, float | None]] = [("none", None)]
     arms += [("latency", latency) for latency in LATENCIES]
     arms += [(kind, share) for kind in ("independent", "bursty") for share in LOSSES]
@@ -250,16 +250,16 @@ def fault_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterato
         for fault, value in arms:
             arm = fault if value is None else f"{fault} {value}"
             blocks = range(BLOCKS[scenario, planner])
-            mine = [one for block in blocks for one in found[scenario, f"{detector} {planner} {arm} {block}"]]
-            place: dict[str, Value] = {"detector": detector, "scenario": scenario, "planner": planner}
-            yield {**place, "fault": fault, "value": value, **outcome(mine)}
+            mine = [episode for block in blocks for episode in runs[scenario, f"{detector} {planner} {arm} {block}"]]
+            key: dict[str, Value] = {"detector": detector, "scenario": scenario, "planner": planner}
+            yield {**key, "fault": fault, "value": value, **outcome(mine)}
 
 
 def load_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the arms with added stations."""
-    found = by_case(episodes)
+    runs = by_case(episodes)
     for detector, access, stations in product(detectors, ACCESS, STATIONS):
-        mine = found[LOADED[0], f"{detector} {access} {stations}"]
+        mine = runs[LOADED[0], f"{detector} {access} {stations}"]
         yield {
             "detector": detector,
             "access": access,

@@ -101,14 +101,14 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str
 def ratio_row(episodes: Sequence[Episode], scenario: str, detector: str) -> dict[str, Value]:
     """Return the ratio of the counts with and without cooperation; None if an episode counts nothing."""
     none, cooperation = (_means(episodes, scenario, detector, arm) for arm in ARMS)
-    found = paired_ratio(none, cooperation) if min(*none, *cooperation) > 0.0 else None
+    ratio = paired_ratio(none, cooperation) if min(*none, *cooperation) > 0.0 else None
     return {
         "scenario": scenario,
         "detector": detector,
         "senders": SENDERS[scenario],
-        "ratio": None if found is None else found.mean,
-        "low": None if found is None else finite(found.low),
-        "high": None if found is None else finite(found.high),
+        "ratio": None if ratio is None else ratio.mean,
+        "low": None if ratio is None else finite(ratio.low),
+        "high": None if ratio is None else finite(ratio.high),
         "more": float(np.mean(cooperation)) > float(np.mean(none)),
         "paper_ratio": RATIOS[scenario, detector],
     }
@@ -121,8 +121,8 @@ def series(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Ro
         for step, (mean, sd) in enumerate(
             zip(averages.mean(axis=0).tolist(), averages.std(axis=0).tolist(), strict=True)
         ):
-            place = {"scenario": scenario, "detector": detector, "arm": arm}
-            yield {**place, "step": step, "time": round(step * STEP, 6), "mean": mean, "sd": sd}
+            key = {"scenario": scenario, "detector": detector, "arm": arm}
+            yield {**key, "step": step, "time": round(step * STEP, 6), "mean": mean, "sd": sd}
 
 
 CELL_COLUMNS = (
@@ -149,8 +149,8 @@ RATIO_COLUMNS = (
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: ratios, counts, and the moving averages as data."""
-    cells = [cell_row(episodes, *place) for place in product(SENDERS, detectors, ARMS)]
-    ratios = tuple(ratio_row(episodes, *place) for place in product(SENDERS, detectors))
+    cells = [cell_row(episodes, *key) for key in product(SENDERS, detectors, ARMS)]
+    ratios = tuple(ratio_row(episodes, *key) for key in product(SENDERS, detectors))
     sections = (
         Section("Set-up", _setup(int(cells[0]["episodes"] or 0))),
         *result_sections(_conclusions(episodes, cells, ratios), DataTable("detection_ratios", RATIO_COLUMNS, ratios)),
@@ -186,11 +186,12 @@ def _conclusions(episodes: Sequence[Episode], cells: Sequence[Row], ratios: Sequ
     texts = [f"Cooperation finds more objects in {more} of {len(ratios)} panels (paper: 4 of 4). Ratios: {listed}."]
     for detector in dict.fromkeys(str(row["detector"]) for row in ratios):
         vehicle, units = (_means(episodes, scenario, detector, "cooperation") for scenario in SENDERS)
-        found = paired_difference(vehicle, units)
+        difference = paired_difference(vehicle, units)
         paper = [COUNTS[scenario, detector, "cooperation"].mean for scenario in SENDERS]
         texts.append(
-            f"`{detector}`: with the roadside units the ego knows {found.mean:+.1f} objects more than with the vehicle "
-            f"(95 % interval: {interval_text(found.low, found.high, '+.1f')}; paper {paper[1] - paper[0]:+.1f})."
+            f"`{detector}`: with the roadside units the ego knows {difference.mean:+.1f} objects more than with the "
+            f"vehicle (95 % interval: {interval_text(difference.low, difference.high, '+.1f')}; "
+            f"paper {paper[1] - paper[0]:+.1f})."
         )
     fewer = [row for row in cells if float(row["mean"] or 0.0) < float(row["paper_mean"] or 0.0)]
     if fewer:

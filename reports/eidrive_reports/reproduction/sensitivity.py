@@ -145,20 +145,20 @@ def offsets(seed: int) -> dict[str, str]:
 
 def cases(detectors: Sequence[str]) -> list[Case]:
     """Return the runs of the maps and of the curves."""
-    found = []
+    runs = []
     for stack, scenario in product(product(detectors, PLANNERS), SCENARIOS):
         for start, speed, (arm, channel) in product(STARTS[scenario], SPEEDS, ARMS.items()):
-            place = {"IncomingStart": repr(start), "EgoSpeed": repr(speed)}
-            found.append(_case(scenario, stack, f"map {start} {speed} {arm}", channel, place))
+            parameters = {"IncomingStart": repr(start), "EgoSpeed": repr(speed)}
+            runs.append(_case(scenario, stack, f"map {start} {speed} {arm}", channel, parameters))
         for latency, block in product(LATENCIES, range(CURVE_SEEDS)):
-            found.append(_case(scenario, stack, f"curve {latency} {block}", delay(latency), {}, block=block))
-    return found
+            runs.append(_case(scenario, stack, f"curve {latency} {block}", delay(latency), {}, block=block))
+    return runs
 
 
 def _case(
     scenario: str,
     stack: tuple[str, str],
-    place: str,
+    label: str,
     channel: str | Mapping[str, Any],
     parameters: Mapping[str, str],
     block: int = 0,
@@ -168,26 +168,26 @@ def _case(
     settings = RunSettings(
         detector=detector, planner=planner, channel=channel, parameters=parameters, time_limit=DURATION
     )
-    return Case(scenario, f"{detector} {planner} {place}", settings, varied=lambda seed: offsets(1000 * block + seed))
+    return Case(scenario, f"{detector} {planner} {label}", settings, varied=lambda seed: offsets(1000 * block + seed))
 
 
 def map_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the collisions of each cell of the maps."""
-    found = by_case(episodes)
+    runs = by_case(episodes)
     for detector, planner, scenario, arm in product(detectors, PLANNERS, SCENARIOS, ARMS):
         for start, speed in product(STARTS[scenario], SPEEDS):
-            mine = found[scenario, f"{detector} {planner} map {start} {speed} {arm}"]
+            mine = runs[scenario, f"{detector} {planner} map {start} {speed} {arm}"]
             hits = sum(map(collided, mine))
-            place: dict[str, Value] = {"scenario": scenario, "detector": detector, "planner": planner, "arm": arm}
-            yield {**place, "start": start, "speed": speed, "episodes": len(mine), "collisions": hits}
+            key: dict[str, Value] = {"scenario": scenario, "detector": detector, "planner": planner, "arm": arm}
+            yield {**key, "start": start, "speed": speed, "episodes": len(mine), "collisions": hits}
 
 
 def curve_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the collisions over the latency."""
-    found = by_case(episodes)
+    runs = by_case(episodes)
     for detector, planner, scenario, latency in product(detectors, PLANNERS, SCENARIOS, LATENCIES):
         names = [f"{detector} {planner} curve {latency} {block}" for block in range(CURVE_SEEDS)]
-        mine = [one for name in names for one in found[scenario, name]]
+        mine = [episode for name in names for episode in runs[scenario, name]]
         share = wilson(sum(map(collided, mine)), len(mine))
         yield {
             "scenario": scenario,

@@ -293,19 +293,21 @@ def compare(column: Sequence[Cell]) -> Iterator[dict[str, Value]]:
     """Yield the comparisons of the arms of a column, with the difference that the paper has."""
     by_arm = {cell.arm.name: cell for cell in column}
     first = column[0]
-    for one in COMPARISONS:
-        greater, smaller = by_arm[one.greater], by_arm[one.smaller]
-        found = one.measured(centers(smaller.episodes), centers(greater.episodes))
-        paper = {name: TABLE_2[first.scenario, first.detector, name] for name in (one.greater, one.smaller)}
-        means = [(value.sd if one.spread else value.mean) for value in paper.values()]
+    for comparison in COMPARISONS:
+        greater, smaller = by_arm[comparison.greater], by_arm[comparison.smaller]
+        difference = comparison.measured(centers(smaller.episodes), centers(greater.episodes))
+        paper = {
+            name: TABLE_2[first.scenario, first.detector, name] for name in (comparison.greater, comparison.smaller)
+        }
+        means = [(value.sd if comparison.spread else value.mean) for value in paper.values()]
         yield {
             **column_fields(first.scenario, first.detector, first.planner, first.variant),
-            "statement": one.statement,
-            "difference": found.mean,
-            "low": finite(found.low),
-            "high": finite(found.high),
-            "holds": found.mean > 0.0,
-            "certain": found.low > 0.0,
+            "statement": comparison.statement,
+            "difference": difference.mean,
+            "low": finite(difference.low),
+            "high": finite(difference.high),
+            "holds": difference.mean > 0.0,
+            "certain": difference.low > 0.0,
             "paper_difference": means[0] - means[1],
         }
 
@@ -339,7 +341,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: what agrees with the paper, the cells, and the comparisons."""
     columns = list(cells_of(episodes, detectors))
     rows = tuple(cell.row() for column in columns for cell in column)
-    order = [one.statement for one in COMPARISONS]
+    order = [comparison.statement for comparison in COMPARISONS]
     compared = [row for column in columns for row in compare(column)]
     compared.sort(key=lambda row: order.index(str(row["statement"])))
     sections = [
