@@ -3,9 +3,11 @@
 #     docker build -t eidrive .
 #     docker run --rm -v "$PWD:/work" eidrive run my_scenario.xosc --out runs
 FROM python:3.11-slim
+# numba uses a cache only where it may write; the container may run as any user.
+ENV NUMBA_CACHE_DIR=/var/cache/numba
 COPY . /src
 RUN pip install --no-cache-dir -c /src/constraints.txt "/src[onnx,export,tables]" && rm -rf /src \
-    && python -m eidrive_scenario.cli.compile_kernels
+    && python -m eidrive_scenario.cli.compile_kernels && chmod -R a+rwX "$NUMBA_CACHE_DIR"
 WORKDIR /work
 ENTRYPOINT ["eidrive"]
 CMD ["--help"]
