@@ -68,6 +68,7 @@ def test_mlflow_runs_logs_each_run_once(tmp_path: Path, monkeypatch: pytest.Monk
     assert (speeds[0][0], speeds[1][2]["step"] - speeds[0][2]["step"]) == ("speed", 50)
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of SQLAlchemy, in mlflow
 def test_mlflow_runs_writes_a_local_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mlflow = pytest.importorskip("mlflow")
     store = f"sqlite:///{tmp_path / 'mlflow.db'}"
