@@ -18,8 +18,6 @@ CELLS, SIDE = 256, 0.4
 OUT, STRIDE_SIDE = 128, 0.8
 REACH = CELLS * SIDE / 2.0
 FEATURES, LATENT = 96, 8
-CODES = 256
-"""Entries of the code book."""
 LATENT_LIMIT = 8.0
 """Maximum of a transmitted value; 127 steps on each side of zero."""
 BOX = 13
@@ -62,8 +60,6 @@ class Pillars(nn.Module):
         bias = self.head.bias
         assert bias is not None
         nn.init.constant_(bias[: len(CLASSES)], -4.0)
-        self.codebook: Tensor
-        self.register_buffer("codebook", torch.zeros(CODES, LATENT))
 
     def features(self, grid: Tensor) -> Tensor:
         """Return features (N, 96, 128, 128) of grids (N, 12, 256, 256)."""
@@ -76,22 +72,6 @@ class Pillars(nn.Module):
         latent: Tensor = self.compress(features).clamp(-LATENT_LIMIT, LATENT_LIMIT)
         scale = LATENT_LIMIT / 127.0
         return latent + (torch.round(latent / scale) * scale - latent).detach()
-
-    def nearest(self, values: Tensor) -> Tensor:
-        """Return the number (M,) of the nearest entry of the code book to each of values (M, 8)."""
-        return (values @ self.codebook.T - self.codebook.square().sum(dim=1) / 2.0).argmax(dim=1)
-
-    def coded(self, latent: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        """Return sent values (N, 8, H, W) with the cells of a mask (N, H, W) replaced by entries of the code book, and
-        the mean square of the change; gradients pass the replacement.
-        """
-        cells = latent.float().permute(0, 2, 3, 1)
-        chosen = mask > 0.0
-        values = cells[chosen]
-        entries = self.codebook[self.nearest(values.detach())]
-        coded = cells.clone()
-        coded[chosen] = values + (entries - values).detach()
-        return coded.permute(0, 3, 1, 2), (values - entries).square().mean()
 
     def received(self, latent: Tensor) -> Tensor:
         """Return the features of received values."""
@@ -122,7 +102,6 @@ class Pillars(nn.Module):
         for name in ("compress", "expand", "head"):
             arrays[f"{name}.weight"] = getattr(self, name).weight.detach().float().cpu().numpy()
             arrays[f"{name}.bias"] = getattr(self, name).bias.detach().float().cpu().numpy()
-        arrays["codebook"] = self.codebook.cpu().numpy()
         arrays["latent_scale"] = np.array(LATENT_LIMIT / 127.0, dtype=np.float32)
         return arrays
 

@@ -169,48 +169,63 @@ def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Te
 def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor:
     """Return the input of the network (N, 12, 256, 256), with the channels of a cell side by side in memory."""
     number = len(points)
-    size = number * CELLS * CELLS
     cell, values = _in_cells(points, now.returned, now.intensity)
     ground = values[:, 0] <= CLEARANCE
-    below = torch.zeros(size, device=points.device).index_add_(0, cell[ground], torch.ones_like(values[ground, 0]))
-    count, high, sums = _statistics(cell[~ground], values[~ground], size)
-    low = torch.full((size,), 1e9, device=points.device)
-    low.scatter_reduce_(0, cell[~ground], values[~ground, 0], "amin")
-    height, x, y, intensity = (sums / count.clamp(min=1.0)[:, None]).unbind(1)
+    below = _sums(number, torch.where(ground, cell, _outside(cell, number)), torch.ones_like(values[:, :1]))[:, 0]
+    cell = torch.where(ground, _outside(cell, number), cell)
+    count, high, means = _statistics(number, cell, values)
+    low = -_maxima(number, cell, -values[:, 0], -torch.inf)
+    height, x, y, intensity = means.unbind(1)
     channels = [torch.log1p(count) / 3.0, high / 4.0, torch.where(count > 0.0, low, 0.0) / 4.0, height / 4.0,
                 intensity, x, y, torch.log1p(below) / 3.0]  # fmt: skip
     cell, values = _in_cells(before, earlier.returned, earlier.intensity)
-    standing = values[:, 0] > CLEARANCE
-    count, high, sums = _statistics(cell[standing], values[standing], size)
-    _, x, y, _ = (sums / count.clamp(min=1.0)[:, None]).unbind(1)
+    cell = torch.where(values[:, 0] <= CLEARANCE, _outside(cell, number), cell)
+    count, high, means = _statistics(number, cell, values)
+    _, x, y, _ = means.unbind(1)
     channels += [torch.log1p(count) / 3.0, high / 4.0, x, y]
     grids = torch.stack(channels, dim=1).reshape(number, CELLS, CELLS, CHANNELS)
     return grids.permute(0, 3, 1, 2)
 
 
-def _in_cells(points: Tensor, returned: Tensor, intensity: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the cells (P,) of the points within the grids (N, 256, 256), and their height, offset from the center of
-    the cell along x and y, and intensity (P, 4).
+def _outside(cell: Tensor, number: int) -> Tensor:
+    """Return cells of one more grid, for points that count nowhere.
+
+    A selection of points would wait for the device. One cell for all of them would make additions wait for each other.
     """
+    return torch.arange(len(cell), device=cell.device) % CELLS**2 + number * CELLS**2
+
+
+def _in_cells(points: Tensor, returned: Tensor, intensity: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the cells (P,) of the points of N scans in (N, 256, 256), and their height, offset from the center of the
+    cell along x and y, and intensity (P, 4).
+    """
+    number, rays = returned.shape
     coordinates = (points[..., :2] + REACH) / SIDE
     index = torch.floor(coordinates)
     inside = returned & ((index >= 0) & (index < CELLS)).all(dim=2) & (points[..., 2] < TALLEST)
-    # Indices are looked up once: each use of a mask waits for the device.
-    kept = inside.flatten().nonzero()[:, 0]
-    index = index.reshape(-1, 2)[kept]
-    scan = kept // points.shape[1]
-    cell = (scan * CELLS + index[:, 0].long()) * CELLS + index[:, 1].long()
-    offset = coordinates.reshape(-1, 2)[kept] - index - 0.5
-    height = points[..., 2].flatten()[kept]
-    return cell, torch.stack([height, offset[:, 0], offset[:, 1], intensity.flatten()[kept]], dim=1)
+    scan = torch.arange(number, device=points.device)[:, None]
+    cell = ((scan * CELLS + index[..., 0].long()) * CELLS + index[..., 1].long()).flatten()
+    cell = torch.where(inside.flatten(), cell, _outside(cell, number))
+    offset = coordinates - index - 0.5
+    return cell, torch.stack([points[..., 2], offset[..., 0], offset[..., 1], intensity], dim=2).reshape(-1, 4)
 
 
-def _statistics(cell: Tensor, values: Tensor, size: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Return number of points and maximum height of each cell (size,), and sums of the values (size, 4)."""
-    sums = torch.zeros(size, 5, device=cell.device)
-    sums.index_add_(0, cell, torch.cat([torch.ones_like(values[:, :1]), values], dim=1))
-    high = torch.zeros(size, device=cell.device).scatter_reduce_(0, cell, values[:, 0], "amax")
-    return sums[:, 0], high, sums[:, 1:]
+def _sums(number: int, cell: Tensor, values: Tensor) -> Tensor:
+    """Return the sums (N · 256 · 256, V) of values (P, V) in each cell."""
+    sums = torch.zeros((number + 1) * CELLS**2, values.shape[1], device=cell.device)
+    return sums.index_add_(0, cell, values)[: number * CELLS**2]
+
+
+def _maxima(number: int, cell: Tensor, values: Tensor, least: float) -> Tensor:
+    """Return the maxima (N · 256 · 256,) of `least` and the values (P,) in each cell."""
+    maxima = torch.full(((number + 1) * CELLS**2,), least, device=cell.device)
+    return maxima.scatter_reduce_(0, cell, values, "amax")[: number * CELLS**2]
+
+
+def _statistics(number: int, cell: Tensor, values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Return number of points and maximum height (C,) of each cell, and the means of the values (C, 4)."""
+    sums = _sums(number, cell, torch.cat([torch.ones_like(values[:, :1]), values], dim=1))
+    return sums[:, 0], _maxima(number, cell, values[:, 0], 0.0), sums[:, 1:] / sums[:, :1].clamp(min=1.0)
 
 
 @dataclass(frozen=True)
@@ -218,7 +233,8 @@ class Targets:
     """Targets of N grids.
 
     heat     (N, K, 128, 128) 1 at the cell of an object's center, lower around it
-    cells    (P,) cells with boxes in the flattened (N, 128, 128), values (P, 13) of their boxes, weights (P,)
+    cells    (P,) cells around objects in the flattened (N, 128, 128), values (P, 13) of their boxes
+    weights  (P,) of the boxes; 0 for those that are not required
     moving   (P,) whether the displacement is known
     objects  number of required objects
     """
@@ -232,49 +248,49 @@ class Targets:
 
 
 def targets(batch: Batch, points: Tensor, step: int = 1) -> Targets:
-    """Return the targets of every station, or of every `step`th, for bodies with these numbers of points (N, B)."""
+    """Return the targets of every station, or of every `step`th, for bodies with these numbers of points (N, B).
+
+    All shapes depend on those of the batch only, so that nothing waits for the device.
+    """
     device = points.device
     stations = torch.arange(0, len(points), step, device=device)
     points, center, own = (part[stations] for part in (points, batch.center, batch.own))
     number, slots = points.shape
     scene = stations // STATIONS
-    boxes, velocity, classes = batch.boxes[scene], batch.velocity[scene], batch.classes[scene]
-    offset = boxes[..., :2] - center[:, None]
-    i, j = (torch.floor((offset[..., axis] + REACH) / STRIDE_SIDE) for axis in (0, 1))
-    inside = (i >= 0) & (i < OUT) & (j >= 0) & (j < OUT) & (classes >= 0) & (points > 0)
+    box, velocity, kind = batch.boxes[scene], batch.velocity[scene], batch.classes[scene]
+    middle = box[..., :2] - center[:, None]
+    i, j = torch.floor((middle + REACH) / STRIDE_SIDE).long().unbind(2)
+    inside = (i >= 0) & (i < OUT) & (j >= 0) & (j < OUT) & (kind >= 0) & (points > 0)
     inside &= torch.arange(slots, device=device) != own[:, None]
-    n, b = torch.nonzero(inside, as_tuple=True)
-    required = points[n, b] >= FEWEST
-    box, kind, middle = boxes[n, b], classes[n, b], offset[n, b]
-    i, j = i[n, b].long(), j[n, b].long()
-    sigma = (0.17 / STRIDE_SIDE * torch.sqrt(box[:, 3] * box[:, 4])).clamp(0.6, 1.5)
+    required = inside & (points >= FEWEST)
+    sigma = (0.17 / STRIDE_SIDE * torch.sqrt(box[..., 3] * box[..., 4])).clamp(0.6, 1.5)
     around = torch.arange(-PATCH, PATCH + 1, device=device)
     di, dj = (part.flatten() for part in torch.meshgrid(around, around, indexing="ij"))
-    pi, pj = i[:, None] + di, j[:, None] + dj
-    on = (pi >= 0) & (pi < OUT) & (pj >= 0) & (pj < OUT)
-    value = torch.exp(-(di * di + dj * dj) / (2.0 * sigma[:, None] ** 2))
-    value = torch.where((di == 0) & (dj == 0) & ~required[:, None], 0.99, value)
-    cell = (n[:, None] * OUT + pi.clamp(0, OUT - 1)) * OUT + pj.clamp(0, OUT - 1)
-    heat = torch.zeros(number * OUT * OUT, len(CLASSES), device=device)
-    flat = cell * len(CLASSES) + kind[:, None]
-    heat.view(-1).scatter_reduce_(0, flat[on], value[on], "amax")
+    pi, pj = i[..., None] + di, j[..., None] + dj
+    on = inside[..., None] & (pi >= 0) & (pi < OUT) & (pj >= 0) & (pj < OUT)
+    value = torch.exp(-(di * di + dj * dj) / (2.0 * sigma[..., None] ** 2))
+    value = torch.where((di == 0) & (dj == 0) & ~required[..., None], 0.99, value) * on
+    grid = torch.arange(number, device=device)[:, None, None]
+    cell = (grid * OUT + pi.clamp(0, OUT - 1)) * OUT + pj.clamp(0, OUT - 1)
+    heat = torch.zeros(number * OUT * OUT * len(CLASSES), device=device)
+    heat.scatter_reduce_(0, (cell * len(CLASSES) + kind.clamp(min=0)[..., None]).flatten(), value.flatten(), "amax")
     heat = heat.reshape(number, OUT, OUT, len(CLASSES)).permute(0, 3, 1, 2)
-    near = on & (di.abs() <= 1) & (dj.abs() <= 1) & required[:, None]
-    entries, patch_cells = torch.nonzero(near, as_tuple=True)
-    box, middle = box[entries], middle[entries]
-    cx = (pi[entries, patch_cells] + 0.5) * STRIDE_SIDE - REACH
-    cy = (pj[entries, patch_cells] + 0.5) * STRIDE_SIDE - REACH
-    shift = velocity[n, b][entries] * LAG
-    values = torch.stack(
+    near = (di.abs() <= 1) & (dj.abs() <= 1)
+    pi, pj, cell, weights = (part[..., near] for part in (pi, pj, cell, value * required[..., None]))
+    beside = [((part + 0.5) * STRIDE_SIDE - REACH) for part in (pi, pj)]
+    fixed = torch.cat(
         [
-            (middle[:, 0] - cx) / STRIDE_SIDE, (middle[:, 1] - cy) / STRIDE_SIDE, box[:, 2],
-            *torch.log(box[:, 3:6].clamp(min=0.1)).unbind(1), torch.cos(box[:, 6]), torch.sin(box[:, 6]),
-            torch.cos(2.0 * box[:, 6]), torch.sin(2.0 * box[:, 6]), shift[:, 0], shift[:, 1],
-            torch.zeros_like(box[:, 0]),
+            box[..., 2:3], torch.log(box[..., 3:6].clamp(min=0.1)), torch.cos(box[..., 6:]), torch.sin(box[..., 6:]),
+            torch.cos(2.0 * box[..., 6:]), torch.sin(2.0 * box[..., 6:]), velocity * LAG,
+            torch.zeros_like(box[..., :1]),
         ],
-        dim=1,
+        dim=2,
     )  # fmt: skip
-    assert values.shape[1] == BOX
-    weights = value[entries, patch_cells]
-    moving = batch.has_earlier_scan[stations][n][entries].float()
-    return Targets(heat, cell[entries, patch_cells], values, weights, moving, required.sum().clamp(min=1).float())
+    offsets = torch.stack([middle[..., :1] - beside[0], middle[..., 1:] - beside[1]], dim=3) / STRIDE_SIDE
+    values = torch.cat([offsets, fixed[:, :, None].expand(-1, -1, offsets.shape[2], -1)], dim=3)
+    assert values.shape[3] == BOX
+    moving = batch.has_earlier_scan[stations][:, None, None].expand_as(cell).float()
+    return Targets(
+        heat, cell.flatten(), values.flatten(0, 2), weights.flatten(), moving.flatten(),
+        required.sum().clamp(min=1).float(),
+    )  # fmt: skip

@@ -22,7 +22,6 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from training.pillars.network import (
     BOX,
-    CODES,
     OUT,
     REACH,
     STRIDE_SIDE,
@@ -44,14 +43,6 @@ SHARES = (1.0, 1.0, 0.1, 0.05, 0.02, 0.01)
 """Shares of the cells that senders of a batch send."""
 LARGEST_NOISE = 0.6
 """Largest standard deviation of the pose error of a sender, in meters and in degrees; half of the batches have none."""
-CODED = 0.35
-"""Share of the batches with features of the code book."""
-CHANGE_WEIGHT = 0.1
-"""Weight of the change of features by the code book in the loss."""
-OBJECT = 0.1
-"""Confidence from which a cell has an object."""
-OTHERS = 0.1
-"""Share of the other cells in 5 % of a map from which the code book is made; more would have most of its entries."""
 TEST_SEED = 10**6
 _BOX_WEIGHTS = (2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 K = len(CLASSES)
@@ -104,43 +95,6 @@ def union(batch: Batch) -> Tensor:
     return batch.points.reshape(-1, STATIONS, batch.points.shape[1]).sum(dim=1).repeat_interleave(STATIONS, dim=0)
 
 
-class CodeBook:
-    """Code book that follows the features (van den Oord, Vinyals, Kavukcuoglu: Neural discrete representation
-    learning, 2017, appendix A.1): its entries are moving means of the features that are nearest to them.
-    """
-
-    DECAY = 0.99
-    FEWEST = 0.02
-    """Moving count of features below which an entry is replaced by a feature."""
-
-    def __init__(self, network: Pillars) -> None:
-        self._network = network
-        self._count = torch.zeros(CODES, device=network.codebook.device)
-        self._sum = torch.zeros_like(network.codebook)
-
-    @torch.no_grad()
-    def update(self, values: Tensor) -> None:
-        """Update the entries by features (M, 8)."""
-        if not len(values):
-            return
-        book = self._network.codebook
-        nearest = self._network.nearest(values)
-        count = torch.zeros_like(self._count).index_add_(0, nearest, torch.ones_like(values[:, 0]))
-        self._count.lerp_(count, 1.0 - self.DECAY)
-        self._sum.lerp_(torch.zeros_like(self._sum).index_add_(0, nearest, values), 1.0 - self.DECAY)
-        unused = self._count < self.FEWEST
-        picked = values[torch.randint(len(values), (CODES,), device=values.device)]
-        book.copy_(torch.where(unused[:, None], picked, self._sum / self._count.clamp(min=1e-6)[:, None]))
-        self._sum = torch.where(unused[:, None], picked, self._sum)
-        self._count = torch.where(unused, 1.0, self._count)
-
-
-def _book_cells(confidence: Tensor) -> Tensor:
-    """Return the cells (N, H, W) that the code book follows."""
-    others = most_confident(confidence, 0.05) > 0.0
-    return (confidence >= OBJECT) | (others & (torch.rand_like(confidence) < OTHERS))
-
-
 def pose_errors(number: int, noise: float, device: torch.device) -> Tensor:
     """Return errors (number, 3) in x, y [m] and heading [rad] with the standard deviation `noise` in m and degrees."""
     errors = noise * torch.randn(number, 3, device=device)
@@ -148,20 +102,20 @@ def pose_errors(number: int, noise: float, device: torch.device) -> Tensor:
     return errors
 
 
-def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, noise: float) -> tuple[Tensor, Tensor]:
-    """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells."""
-    number = len(latent)
-    grids = torch.arange(number, device=latent.device)
+def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells.
+
+    errors  (STATIONS - 1, N, 3) of the pose of each other station in x, y [m] and heading [rad]
+    """
+    grids = torch.arange(len(latent), device=latent.device)
     scene, station = grids // STATIONS, grids % STATIONS
     maps, present = [], []
-    for step in range(1, STATIONS):
+    for step, error in enumerate(errors, start=1):
         sender = scene * STATIONS + (station + step) % STATIONS
-        error = pose_errors(number, noise, latent.device)
         shift = batch.center - batch.center[sender] + error[:, :2]
         values, sent_cells = warp(latent[sender], mask[sender], shift, error[:, 2])
-        sent_cells = sent_cells * ~_own_cells(batch)
         maps.append(network.received(values.to(latent.dtype)))
-        present.append(sent_cells)
+        present.append(sent_cells * ~_own_cells(batch))
     return torch.stack(maps), torch.stack(present)
 
 
@@ -179,6 +133,25 @@ def _own_cells(batch: Batch) -> Tensor:
     return on & (batch.own >= 0)[:, None, None]
 
 
+def own_loss(network: Pillars, features: Tensor, target: Targets) -> Tensor:
+    """Return the loss of detections in features, and in those that a receiver decodes."""
+    restored = network.head(network.received(network.sent(features)))
+    return loss_of(network.head(features), target) + 0.5 * loss_of(restored, target)
+
+
+def fused_loss(
+    network: Pillars, features: Tensor, batch: Batch, mask: Tensor, errors: Tensor, target: Targets, method: str
+) -> Tensor:
+    """Return the loss of detections in the features of all stations of a scene; senders send the cells of the mask."""
+    maps, present = received_maps(network, batch, network.sent(features), mask, errors)
+    return loss_of(network.head(fuse(features, maps, present, method)), target)
+
+
+def merged_loss(network: Pillars, features: Tensor, target: Targets) -> Tensor:
+    """Return the loss of detections in features of the points of all stations."""
+    return loss_of(network.head(features), target)
+
+
 def train(
     network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], arguments: argparse.Namespace
 ) -> tuple[Pillars, int]:
@@ -186,7 +159,7 @@ def train(
     joint = arguments.stage == "fusion"
     network.train()
     average = copy.deepcopy(network).eval()
-    parameters = [entry for entry in network.parameters() if entry.requires_grad]
+    parameters = list(network.parameters())
     optimizer = torch.optim.AdamW(parameters, lr=RATE, weight_decay=DECAY, fused=sampler.device_type == "cuda")
     entries = [
         pair
@@ -194,9 +167,12 @@ def train(
         if pair[0].dtype.is_floating_point
     ]
     averages, currents = (list(part) for part in zip(*entries, strict=True))
-    features = torch.compile(network.features, dynamic=False) if arguments.compile else network.features
+    features_of, own_of, fused_of, merged_of = (
+        torch.compile(part, dynamic=False) if arguments.compile else part
+        for part in (network.features, own_loss, fused_loss, merged_loss)
+    )
     random = np.random.default_rng(arguments.seed + (1 if joint else 0))
-    book, device = CodeBook(network), network.codebook.device
+    device = parameters[0].device
     start, step, losses = time.monotonic(), 0, []
     peak = RATE * (0.4 if joint else 1.0)
     while (progress := (time.monotonic() - start) / (60.0 * arguments.minutes)) < 1.0:
@@ -212,28 +188,16 @@ def train(
             # In one batch, so that normalization has the same statistics in training as later.
             grids = torch.cat([batch.grids, batch.merged])
         with torch.autocast(sampler.device_type, torch.bfloat16):
-            all_features = features(grids.contiguous(memory_format=torch.channels_last))
-            own_features = all_features[:number]
-            own_maps = network.head(own_features)
-            latent = network.sent(own_features)
-            restored = network.head(network.received(latent))
-        loss = loss_of(own_maps, own) + 0.5 * loss_of(restored, own)
-        if joint:
-            together = targets(batch, union(batch))
-            share = float(random.choice(SHARES))
-            confidence = probabilities(own_maps.detach())
-            mask = most_confident(confidence, share)
-            book.update(latent.detach().float().permute(0, 2, 3, 1)[_book_cells(confidence)])
-            if random.random() < CODED:
-                latent, change = network.coded(latent, mask)
-                loss = loss + CHANGE_WEIGHT * change
-            with torch.autocast(sampler.device_type, torch.bfloat16):
-                maps, present = received_maps(network, batch, latent, mask, noise)
-                fused = fuse(own_features.float(), maps.float(), present, str(random.choice(["max", "attention"])))
-                fused_maps = network.head(fused)
-                merged_maps = network.head(all_features[number:])
-            loss = loss + loss_of(fused_maps, together)
-            loss = loss + 0.5 * loss_of(merged_maps, targets(batch, union(batch), step=STATIONS))
+            features = features_of(grids.contiguous(memory_format=torch.channels_last))
+            loss = own_of(network, features[:number], own)
+            if joint:
+                with torch.no_grad():
+                    together, merged = (targets(batch, union(batch), every) for every in (1, STATIONS))
+                    mask = most_confident(probabilities(network.head(features[:number])), float(random.choice(SHARES)))
+                    errors = pose_errors((STATIONS - 1) * number, noise, device).unflatten(0, (STATIONS - 1, number))
+                method = str(random.choice(["max", "attention"]))
+                loss = loss + fused_of(network, features[:number], batch, mask, errors, together, method)
+                loss = loss + 0.5 * merged_of(network, features[number:], merged)
         optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(parameters, 10.0)
@@ -280,7 +244,7 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
     objects: dict[str, int] = {}
     for number in range(batches):
         arrays = maker.batch((TEST_SEED, number), arguments.scenes)
-        batch = sampler.batch(arrays, pose_errors(arguments.scenes * STATIONS, 0.0, network.codebook.device))
+        batch = sampler.batch(arrays, pose_errors(arguments.scenes * STATIONS, 0.0, network.head.weight.device))
         features = network.features(batch.grids)
         own = network.head(features)
         latent = network.sent(features)
@@ -289,13 +253,11 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
         for share, noise, methods in ((1.0, 0.0, ("max", "attention")), (0.01, 0.0, ("attention",)),
                                       (0.05, 0.0, ("attention",)), (1.0, 0.4, ("attention",))):  # fmt: skip
             mask = most_confident(probabilities(own), share)
-            maps, present = received_maps(network, batch, latent, mask, noise)
+            errors = pose_errors((STATIONS - 1) * len(own), noise, own.device).unflatten(0, (STATIONS - 1, len(own)))
+            maps, present = received_maps(network, batch, latent, mask, errors)
             for method in methods:
                 name = f"{method} {share:g} {noise:g}"
                 results[name] = (network.head(fuse(features, maps, present, method)), union(batch))
-            if noise == 0.0:
-                maps, present = received_maps(network, batch, network.coded(latent, mask)[0], mask, 0.0)
-                results[f"codes {share:g}"] = network.head(fuse(features, maps, present, "attention")), union(batch)
         results["early"] = network.head(network.features(batch.merged)), union(batch)
         scene = torch.arange(len(batch.own), device=batch.own.device) // STATIONS
         centers = batch.boxes[scene][..., :2] - batch.center[:, None]
@@ -345,6 +307,7 @@ def main() -> None:
     loader = DataLoader(
         Scenes(arguments.assets, arguments.seed + (1000 if arguments.stage == "fusion" else 0), arguments.scenes),
         batch_size=None, num_workers=arguments.workers, prefetch_factor=4 if arguments.workers else None,
+        pin_memory=sampler.device_type == "cuda",
     )  # fmt: skip
     average, steps = train(network, sampler, iter(loader), arguments)
     arguments.out.mkdir(parents=True, exist_ok=True)
