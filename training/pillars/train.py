@@ -102,21 +102,21 @@ def pose_errors(number: int, noise: float, device: torch.device) -> Tensor:
     return errors
 
 
-def received_maps(network: Pillars, batch: Batch, latent: Tensor, mask: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the features of the other stations in each grid (STATIONS - 1, N, 96, H, W), and the present cells.
+def warped(batch: Batch, latent: Tensor, mask: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the values of the other stations in each grid (STATIONS - 1, N, 8, H, W), and the present cells.
 
     errors  (STATIONS - 1, N, 3) of the pose of each other station in x, y [m] and heading [rad]
     """
     grids = torch.arange(len(latent), device=latent.device)
     scene, station = grids // STATIONS, grids % STATIONS
-    maps, present = [], []
+    values, present = [], []
     for step, error in enumerate(errors, start=1):
         sender = scene * STATIONS + (station + step) % STATIONS
         shift = batch.center - batch.center[sender] + error[:, :2]
-        values, sent_cells = warp(latent[sender], mask[sender], shift, error[:, 2])
-        maps.append(network.received(values.to(latent.dtype)))
-        present.append(sent_cells * ~_own_cells(batch))
-    return torch.stack(maps), torch.stack(present)
+        received, cells = warp(latent[sender], mask[sender], shift, error[:, 2])
+        values.append(received)
+        present.append(cells * ~_own_cells(batch))
+    return torch.stack(values), torch.stack(present)
 
 
 def _own_cells(batch: Batch) -> Tensor:
@@ -133,18 +133,25 @@ def _own_cells(batch: Batch) -> Tensor:
     return on & (batch.own >= 0)[:, None, None]
 
 
-def own_loss(network: Pillars, features: Tensor, target: Targets) -> Tensor:
-    """Return the loss of detections in features, and in those that a receiver decodes."""
-    restored = network.head(network.received(network.sent(features)))
-    return loss_of(network.head(features), target) + 0.5 * loss_of(restored, target)
+def own_loss(network: Pillars, features: Tensor, target: Targets) -> tuple[Tensor, Tensor, Tensor]:
+    """Return the loss of detections in features and in those that a receiver decodes, the sent values, and the
+    confidence.
+    """
+    own, latent = network.head(features), network.sent(features)
+    restored = network.head(network.received(latent))
+    return loss_of(own, target) + 0.5 * loss_of(restored, target), latent, probabilities(own.detach())
 
 
-def fused_loss(
-    network: Pillars, features: Tensor, batch: Batch, mask: Tensor, errors: Tensor, target: Targets, method: str
-) -> Tensor:
-    """Return the loss of detections in the features of all stations of a scene; senders send the cells of the mask."""
-    maps, present = received_maps(network, batch, network.sent(features), mask, errors)
-    return loss_of(network.head(fuse(features, maps, present, method)), target)
+def fused_maps(network: Pillars, own: Tensor, values: Tensor, present: Tensor, method: str) -> Tensor:
+    """Return head maps of own features (N, 96, H, W) fused with those of received values (S, N, 8, H, W)."""
+    received = network.received(values.flatten(0, 1)).unflatten(0, values.shape[:2])
+    maps: Tensor = network.head(fuse(own, received, present, method))
+    return maps
+
+
+def fused_loss(network: Pillars, own: Tensor, values: Tensor, present: Tensor, target: Targets, method: str) -> Tensor:
+    """Return the loss of detections in fused features."""
+    return loss_of(fused_maps(network, own, values, present, method), target)
 
 
 def merged_loss(network: Pillars, features: Tensor, target: Targets) -> Tensor:
@@ -189,14 +196,15 @@ def train(
             grids = torch.cat([batch.grids, batch.merged])
         with torch.autocast(sampler.device_type, torch.bfloat16):
             features = features_of(grids.contiguous(memory_format=torch.channels_last))
-            loss = own_of(network, features[:number], own)
+            loss, latent, confidence = own_of(network, features[:number], own)
             if joint:
                 with torch.no_grad():
                     together, merged = (targets(batch, union(batch), every) for every in (1, STATIONS))
-                    mask = most_confident(probabilities(network.head(features[:number])), float(random.choice(SHARES)))
+                    mask = most_confident(confidence, float(random.choice(SHARES)))
                     errors = pose_errors((STATIONS - 1) * number, noise, device).unflatten(0, (STATIONS - 1, number))
+                values, present = warped(batch, latent, mask, errors)
                 method = str(random.choice(["max", "attention"]))
-                loss = loss + fused_of(network, features[:number], batch, mask, errors, together, method)
+                loss = loss + fused_of(network, features[:number], values, present, together, method)
                 loss = loss + 0.5 * merged_of(network, features[number:], merged)
         optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
@@ -254,10 +262,10 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
                                       (0.05, 0.0, ("attention",)), (1.0, 0.4, ("attention",))):  # fmt: skip
             mask = most_confident(probabilities(own), share)
             errors = pose_errors((STATIONS - 1) * len(own), noise, own.device).unflatten(0, (STATIONS - 1, len(own)))
-            maps, present = received_maps(network, batch, latent, mask, errors)
+            values, present = warped(batch, latent, mask, errors)
             for method in methods:
                 name = f"{method} {share:g} {noise:g}"
-                results[name] = (network.head(fuse(features, maps, present, method)), union(batch))
+                results[name] = (fused_maps(network, features, values, present, method), union(batch))
         results["early"] = network.head(network.features(batch.merged)), union(batch)
         scene = torch.arange(len(batch.own), device=batch.own.device) // STATIONS
         centers = batch.boxes[scene][..., :2] - batch.center[:, None]
