@@ -199,7 +199,7 @@ def _in_cells(points: Tensor, returned: Tensor, intensity: Tensor) -> tuple[Tens
     """Return the cells (P,) of the points of N scans in (N, 256, 256), and their height, offset from the center of the
     cell along x and y, and intensity (P, 4).
     """
-    number, rays = returned.shape
+    number = len(returned)
     coordinates = (points[..., :2] + REACH) / SIDE
     index = torch.floor(coordinates)
     inside = returned & ((index >= 0) & (index < CELLS)).all(dim=2) & (points[..., 2] < TALLEST)
