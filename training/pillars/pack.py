@@ -1,4 +1,4 @@
-"""Shipped weights of `pillars` from the result of training: ranges for 8-bit integers, confidence, card."""
+"""Shipped weights of `pillars` from the result of training: code book, ranges for 8-bit integers, confidence, card."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
+from scipy.cluster.vq import kmeans2
 
 from eidrive_scenario.base.arrays import Array, Bools, Floats
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.base.geometry import iou_bev, points_in_box
 from eidrive_scenario.experiments.average_precision import average_precision, best_confidence, match_by_share
 from eidrive_scenario.perception.learned.network_loading import SHIPPED
+from eidrive_scenario.perception.learned.pillars.codec import CODES, LATENT
 from eidrive_scenario.perception.learned.pillars.detector import PillarDetector, PillarSettings, grid_frame
 from eidrive_scenario.perception.learned.pillars.grid import CELLS, ScanHistory
 from eidrive_scenario.perception.learned.pillars.network import features_onnx
@@ -39,15 +42,18 @@ LEAST = 0.02
 """Confidence of the detections for the average precision."""
 MARGIN = 0.1
 """Growth of a body on each side, for the noise of points on its surface [m]."""
+OBJECT = 0.1
+"""Confidence from which a cell has an object."""
 WITHIN = 45.0
 """Maximum distance of required objects from the lidar along each axis [m]."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Grid (1, 12, 256, 256), detections, boxes (M, 7) of road users, and which are required (M,)."""
+    """Grid (1, 12, 256, 256), features, detections, boxes (M, 7) of road users, and which are required (M,)."""
 
     grid: Floats
+    features: FeatureMap
     detections: Detections
     boxes: Array
     required: Bools
@@ -64,7 +70,9 @@ def measured(scenes: Iterator[StationScene], path: Path, precision: str = "float
             detections = detector.detect(replace(readings, time=time))
             grid = history.add(time, [cloud], grid_frame(cloud), foot)
         boxes = scene.boxes[[row for row, name in enumerate(scene.categories) if name in CLASSES]]
-        yield Measured(grid.channels[None], detections, boxes, _required(boxes, cloud))
+        features = detector.feature_map
+        assert features is not None
+        yield Measured(grid.channels[None], features, detections, boxes, _required(boxes, cloud))
 
 
 def _required(boxes: Array, cloud: LidarReading) -> Bools:
@@ -74,6 +82,25 @@ def _required(boxes: Array, cloud: LidarReading) -> Bools:
     hit: Bools = np.array([points_in_box(points, box).sum() >= FEWEST for box in grown], dtype=bool)
     required: Bools = near & hit
     return required
+
+
+def codebook(scans: list[Measured], seed: int = 1) -> Floats:
+    """Return the centers (256, 8) of the compressed features of cells with objects, by k-means.
+
+    Most of the cells that a station sends have no object: they are a fifth of the sample, or they would have most of
+    the entries.
+    """
+    rng = np.random.default_rng(seed)
+    parts = []
+    for scan in scans:
+        latent, confidence = scan.features.latent.reshape(LATENT, -1).T, scan.features.confidence.ravel()
+        order = np.argsort(-confidence)
+        objects = int((confidence >= OBJECT).sum())
+        others = order[objects : confidence.size // 20]
+        chosen = rng.choice(others, min(len(others), objects // 4), replace=False)
+        parts.append(latent[np.concatenate([order[:objects], chosen])])
+    centers, _ = kmeans2(np.concatenate(parts).astype(float), CODES, minit="++", rng=rng)
+    return np.asarray(centers, np.float32)
 
 
 def scores(results: list[Measured], overlap: float) -> tuple[float, float]:
@@ -101,8 +128,11 @@ def main() -> None:
     with np.load(options.trained) as file:
         arrays = {name: file[name] for name in file.files}
     description = {"network": "pillars", "classes": CLASSES, "input_size": [CELLS, CELLS], "confidence": 0.3}
+    arrays["codebook"] = np.zeros((CODES, LATENT), dtype=np.float32)
     write(options.out, arrays, description)
     training = list(measured(random_scenes(1, "train", options.places, Weather(), sensors=SENSORS), options.out))
+    arrays["codebook"] = codebook(training)
+    write(options.out, arrays, description)
     ranges = layer_ranges(features_onnx(arrays), (scan.grid for scan in training))
     rounded = {name: np.round(limits, 5).tolist() for name, limits in ranges.items()}
     _, confidence = scores(training, 0.5)
