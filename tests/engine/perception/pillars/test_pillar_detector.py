@@ -242,10 +242,8 @@ def test_tracker_begins_with_measured_velocity(tmp_path: Path) -> None:
     np.testing.assert_allclose(tracks.velocity, [[8.0, 0.0]] * 4, atol=0.5)
 
 
-def test_stated_deviation_of_velocities_is_that_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each axis, within a factor of two: scenario 7 has 200 detections of moving, and 80 of standing vehicles, which
-    are near and therefore more accurate than others.
-    """
+def test_stated_deviation_of_velocities_is_that_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each axis, within a factor of two: 500 detections of moving, and 580 of standing vehicles."""
     detect, detected = PillarDetector.detect, list[Detections]()
 
     def recorded(detector: PillarDetector, given: Readings) -> Detections:
@@ -253,21 +251,23 @@ def test_stated_deviation_of_velocities_is_that_of_a_run(monkeypatch: pytest.Mon
         return detected[-1]
 
     monkeypatch.setattr(PillarDetector, "detect", recorded)
-    collector = FrameCollector()
-    simulate(resolve_scenario("coop/scenario_7"), "ideal", collector, detector="pillars", time_limit=3.0)
-    views = {round(frame.view.time, 6): frame.view for frame in collector.frames}
     errors: dict[bool, list[Array]] = {True: [], False: []}
-    for detections in detected:
-        view = views[round(detections.time, 6)]
-        overlap = iou_bev(detections.boxes, view.boxes)
-        for row in np.flatnonzero(overlap.max(axis=1, initial=0.0) > 0.3).tolist():
-            true = view.velocity[overlap[row].argmax(), :2]
-            speed = math.hypot(*true)
-            if (speed < 0.1 or speed > 0.5) and np.isfinite(detections.velocity[row]).all():
-                errors[speed > 0.5].append(detections.velocity[row] - true)
+    for number in (5, 6, 7, 8):
+        detected.clear()
+        collector = FrameCollector()
+        simulate(resolve_scenario(f"coop/scenario_{number}"), "ideal", collector, detector="pillars", time_limit=3.0)
+        views = {round(frame.view.time, 6): frame.view for frame in collector.frames}
+        for detections in detected:
+            view = views[round(detections.time, 6)]
+            overlap = iou_bev(detections.boxes, view.boxes)
+            for row in np.flatnonzero(overlap.max(axis=1, initial=0.0) > 0.3).tolist():
+                true = view.velocity[overlap[row].argmax(), :2]
+                speed = math.hypot(*true)
+                if (speed < 0.1 or speed > 0.5) and np.isfinite(detections.velocity[row]).all():
+                    errors[speed > 0.5].append(detections.velocity[row] - true)
     deviation = {moves: float(np.sqrt(np.mean(np.square(values)))) for moves, values in errors.items()}
     assert 0.5 < deviation[True] / PillarDetector.velocity_deviation < 2.0
-    assert 0.0 < deviation[False] < 2.0 * KNOWN_SPEED
+    assert 0.5 < deviation[False] / KNOWN_SPEED < 2.0
 
 
 def test_registry_loads_detector_by_entry_point() -> None:
