@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
@@ -59,3 +61,18 @@ def test_command_imports_no_module_without_need(arguments: list[str], excluded: 
 
 def test_version_of_the_engine_is_that_of_its_distribution() -> None:
     assert __version__ == version("eidrive-scenario")
+
+
+@pytest.mark.parametrize("selected", [None, "SkylakeX"])
+def test_blas_kernel_is_equal_on_all_processors_unless_it_is_selected(selected: str | None) -> None:
+    processor = Path("/proc/cpuinfo")
+    if not (processor.exists() and " avx2" in processor.read_text(encoding="utf-8")):
+        pytest.skip("the processor has no AVX2")
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
+    program = "import eidrive_scenario, os; print(os.environ['OPENBLAS_CORETYPE'])"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment if selected is None else {**environment, "OPENBLAS_CORETYPE": selected},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.strip() == (selected or "Haswell")
