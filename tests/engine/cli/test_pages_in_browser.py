@@ -431,6 +431,24 @@ def test_report_links_to_replay_of_a_run(browser: Any, report: Path) -> None:
     page.close("replay-from-report")
 
 
+@pytest.mark.parametrize("size", WIDTHS)
+def test_long_name_of_station_leaves_width_and_values_of_replay(
+    browser: Any, eidrive: Eidrive, tmp_path: Path, size: str
+) -> None:
+    source = resolve_scenario("coop/scenario_1")
+    text = source.read_text(encoding="utf-8").replace('"../', f'"{source.parent.parent}/')
+    name = 200 * "E"
+    path = tmp_path / "long.xosc"
+    path.write_text(text.replace('"Ego"', f'"{name}"').replace("of: Ego", f"of: {name}"), encoding="utf-8")
+    assert eidrive("run", path, "--channel", "ideal", "--out", tmp_path / "run").exit_code == 0
+    assert eidrive("view", tmp_path / "run", "--out", tmp_path / "long.html").exit_code == 0
+    page = Page(browser, tmp_path / "long.html", WIDTHS[size])
+    assert not page.wide()
+    widths = page.page.evaluate("[...document.querySelectorAll('.side dd')].map((value) => value.clientWidth)")
+    assert min(width for width in widths if width) > 90
+    page.close(f"replay-long-name-{size}")
+
+
 LONG = "über_" + 120 * "x"
 ATTACK = "</script><img src=x onerror=alert(1)>"
 
