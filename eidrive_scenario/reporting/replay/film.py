@@ -81,8 +81,9 @@ class RecordedStation:
         self.name = name or next(iter([*driven, *stations, *actors]))
         self._entry = actors.get(self.name, (0.0, 0.0))
         decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result, actors)
-        self.decisive: float = decisive["time"] if decisive is not None else self.times[0]
-        """Decisive instant [s]."""
+        instant = decisive["time"] if decisive is not None else self.times[0]
+        self.decisive: float = min(max(instant, self.times[0]), self.times[-1])
+        """Decisive instant [s]; at most that of the last frame of an incomplete recording."""
         self.damage = report.lines()
 
     def snapshots(self) -> Iterator[StationSnapshot]:

@@ -20,6 +20,7 @@ from eidrive_scenario.reporting.drawing.labels import label_places, overlaps, wr
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.reporting.replay import film
 from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder
 from eidrive_scenario.simulation import RunSettings, Simulation
 
@@ -97,6 +98,16 @@ def test_speed_at_a_contact_is_that_of_the_impact() -> None:
 def test_picture_outside_of_run_is_refused(street: Play, tmp_path: Path, time: float) -> None:
     with pytest.raises(SettingError, match="not in the run"):
         recorded(street(1), tmp_path).figure(time)
+
+
+def test_picture_of_incomplete_recording_is_within_its_frames(street: Play, tmp_path: Path) -> None:
+    """Ten frames of 0.05 s, beside a result whose smallest distance is at 4 s."""
+    recorded(street(1)[:10], tmp_path)
+    metrics: dict[str, float | None] = {"min_distance.Ego.Other.center": 2.0, "min_distance.Ego.Other.time": 4.0}
+    result = ReportedRun(scenario="street", seed=1, passed=True, end_reason="stop trigger", metrics=metrics)
+    station = RecordedStation(open_recording(tmp_path / "run.mcap"), result=result)
+    assert station.decisive == pytest.approx(0.45)
+    assert station.figure() is not None
 
 
 @pytest.mark.usefixtures("small")
