@@ -16,6 +16,9 @@ from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, read_runs
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
+LONGEST_NAME = 200
+"""Maximum length of the name of a figure [bytes]."""
+
 
 def report_files(
     locations: Sequence[Path],
@@ -67,7 +70,7 @@ def write_rate_figures(runs: Sequence[ReportedRun], folder: Path, size: Size) ->
     """Write the curves and heat maps of a report as SVG and PDF of a size [mm], and return their number."""
     names: list[str] = []
     for title, figure in rate_figures(group_runs(runs), size):
-        name = re.sub(r"[^\w.-]+", "_", title)
+        name = re.sub(r"[^\w.-]+", "_", title).encode(errors="replace")[:LONGEST_NAME].decode(errors="ignore")
         while name in names:
             name += "-"
         names.append(name)

@@ -309,7 +309,9 @@ def rate_map_figure(
     with paper_style():
         figure, axes = _paper_axes(size)
         mesh = _draw_rates(axes, xs, ys, rates, (x_title, y_title))
-        figure.colorbar(mesh, format=PercentFormatter(1.0), label="success rate")
+        bar = figure.colorbar(mesh, format=PercentFormatter(1.0), label="success rate")
+        if bar.solids is not None:  # matplotlib draws bars of 50 or more colors as images
+            bar.solids.set(rasterized=False, edgecolor="face")
     return figure
 
 

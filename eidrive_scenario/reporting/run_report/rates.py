@@ -301,8 +301,12 @@ def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, 
     for scenario, axis, _, lines in _curves(groups):
         x_range = _range([value for line in lines for value in line.x])
         yield f"{scenario}-{axis}", rate_figure(lines, x_title=axis, y_title=RATE, x_range=x_range, size=size)
+    by_scenario: dict[str, list[RunGroup]] = defaultdict(list)
     for group in groups:
-        for columns, rows, rates in _maps(group):
-            title = f"{group.scenario}-{columns.name}-{rows.name}"
-            titles = {"x_title": columns.name, "y_title": rows.name}
-            yield title, rate_map_figure(columns.centers, rows.centers, rates, **titles, size=size)
+        by_scenario[group.scenario].append(group)
+    for scenario, members in by_scenario.items():
+        for group, name in zip(members, group_names(members), strict=True):
+            for columns, rows, rates in _maps(group):
+                title = f"{scenario}-{columns.name}-{rows.name}" + f"-{name}" * (len(members) > 1)
+                titles = {"x_title": columns.name, "y_title": rows.name}
+                yield title, rate_map_figure(columns.centers, rows.centers, rates, **titles, size=size)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -182,6 +183,18 @@ def test_three_numbers_have_a_heat_map_per_pair(tmp_path: Path) -> None:
     assert [table[0][0] for table in tables(page)] == ["B \\ A", "C \\ A", "C \\ B"]
     assert [table[1][1] for table in tables(page)] == ["100 % 2/2 0.34 … 1.00"] * 3
     assert "Combined over all values of C." in page.text_content()
+
+
+def test_figures_of_heat_maps_are_vectors_named_by_settings(tmp_path: Path) -> None:
+    points = [*grid(("planner", ("behavior", 60 * "ü")), ("A", (1, 2)), ("B", (1, 2)))]
+    with ResultStore.open(tmp_path / "s.db", {}) as store:
+        store.add(*(row(number, True, **point) for number, point in enumerate(points)))
+    report_files([tmp_path / "s.db"], tmp_path / "report", figures=tmp_path / "figures")
+    names = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert names == [f"s-A-B-ideal_planner_{name}.{end}" for name in ("behavior", 60 * "ü") for end in ("pdf", "svg")]
+    for name in names[:2]:
+        content = (tmp_path / "figures" / name).read_bytes()
+        assert not re.search(rb"<image|/Subtype\s*/Image", content), "an image in a vector figure"
 
 
 def test_many_values_are_combined_to_ranges_of_equal_width(tmp_path: Path) -> None:
