@@ -98,7 +98,7 @@ def judge_recording(location: str | Path, criteria: Any = None) -> Judgement:
 
 def _judge(recording: Recording, criteria: Any) -> Judgement:
     outcome, text = recorded_outcome(recording), recording.attachments.get(ROAD_FILE)
-    roads = None if text is None else RoadNetwork.parse(text)
+    roads = None if text is None else RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}")
     judge = _Judge(recording, roads, outcome)
     if criteria is not None:
         judge.add_others(criteria)

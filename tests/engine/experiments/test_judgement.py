@@ -173,6 +173,12 @@ def test_recording_without_frames_raises_setting_error(tmp_path: Path) -> None:
         judge_recording(tmp_path / "r.mcap", "{time_limit: {within: 3}}")
 
 
+def test_damaged_roads_of_recording_are_named_with_its_path(tmp_path: Path) -> None:
+    Recorder(tmp_path / "r.mcap", metadata={}, attachments={"road.xodr": b"<OpenDRIVE>"}).close()
+    with pytest.raises(InputError, match=r"r\.mcap/road\.xodr:1: not well-formed"):
+        judge_recording(tmp_path / "r.mcap", "{time_limit: {within: 3}}")
+
+
 def test_equal_runs_give_equal_recordings_with_outcome(tmp_path: Path) -> None:
     files = [run_and_save(PASSING_BY, out=tmp_path / name).recording for name in ("a", "b")]
     assert len({path.read_bytes() for path in files if path is not None}) == 1
