@@ -92,12 +92,14 @@ class Registry:
         return f"{singular(self.kind)} {name!r} ({self.value(name)})"
 
     def distribution(self, name: str) -> str | None:
-        """Return package, version and entry point of an extension; None if it is built-in or unknown."""
+        """Return package, version and entry point of an extension; None if it is built-in or unknown.
+
+        Extensions of a project that is not installed have no package.
+        """
         point = self._points.get(name)
         if point is None or point.value.split(".")[0].split(":")[0] in _BUILT_IN:
             return None
-        package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "unknown package"
-        return f"{package} ({point.value})"
+        return f"{point.dist.name} {point.dist.version} ({point.value})" if point.dist is not None else point.value
 
     def unknown(self, name: str, *, also: Iterable[str] = (), source: str = "", line: int | None = None) -> Diagnostic:
         """Return the diagnostic of a name that no extension has; hints list the names in `also` as well."""

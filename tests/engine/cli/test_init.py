@@ -30,6 +30,7 @@ def test_new_project_passes_its_tests(eidrive: Eidrive, tmp_path: Path) -> None:
     assert {"my_demo_criteria.py", ".github/workflows/scenarios.yml", ".gitignore"} <= written
     assert tomllib.loads((folder / "pyproject.toml").read_text())["project"]["name"] == "my-demo"
     assert not any("@package@" in path.read_text() for path in folder.rglob("*.py"))
+    assert "pypi.org" not in (folder / "README.md").read_text(), "the project is on no package index"
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider"]
     tests = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert tests.returncode == 0, tests.stdout

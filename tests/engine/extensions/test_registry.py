@@ -67,3 +67,5 @@ def test_distribution_names_the_package_of_third_parties_only(tmp_path: Path, mo
     assert detectors.distribution("radar") == "radar-kit 1.4 (radar_kit:Radar)"
     assert detectors.distribution("oracle") is None
     assert detectors.distribution("no such") is None
+    detectors.add("sonar", "own_project:Sonar")
+    assert detectors.distribution("sonar") == "own_project:Sonar"
