@@ -38,7 +38,7 @@ def test_folded_weights_give_the_outputs_of_the_trained_network(tmp_path: Path) 
     description = {"network": "pillars", "classes": CLASSES, "input_size": [256, 256]}
     path = tmp_path / "pillars.npz"
     arrays: dict[str, Any] = {**network.folded(), DESCRIPTION: np.array(json.dumps(description))}
-    np.savez(path, **arrays)
+    np.savez(path, codebook=np.zeros((256, 8), dtype=np.float32), **arrays)
     grid = np.random.default_rng(3).random((12, 256, 256), dtype=np.float32)
     engine = PillarNetwork(path, "opencv")
     features = engine.features(grid)

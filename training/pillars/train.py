@@ -10,9 +10,10 @@ import copy
 import json
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -35,6 +36,7 @@ from training.pillars.samples import Batch, Sampler, Targets, targets
 from training.pillars.scans import Meshes
 from training.pillars.scenes import CLASSES, STATIONS, Assets, SceneMaker
 
+F = TypeVar("F", bound=Callable[..., Any])
 RATE = 3e-3
 DECAY = 0.01
 AVERAGE = 0.998
@@ -144,7 +146,8 @@ def own_loss(network: Pillars, features: Tensor, target: Targets) -> tuple[Tenso
 
 def fused_maps(network: Pillars, own: Tensor, values: Tensor, present: Tensor, method: str) -> Tensor:
     """Return head maps of own features (N, 96, H, W) fused with those of received values (S, N, 8, H, W)."""
-    received = network.received(values.flatten(0, 1)).unflatten(0, values.shape[:2])
+    received = network.received(values.flatten(0, 1))
+    received = received.reshape(*values.shape[:2], *received.shape[1:])
     maps: Tensor = network.head(fuse(own, received, present, method))
     return maps
 
@@ -157,6 +160,10 @@ def fused_loss(network: Pillars, own: Tensor, values: Tensor, present: Tensor, t
 def merged_loss(network: Pillars, features: Tensor, target: Targets) -> Tensor:
     """Return the loss of detections in features of the points of all stations."""
     return loss_of(network.head(features), target)
+
+
+def _unchanged(function: F) -> F:
+    return function
 
 
 def train(
@@ -174,10 +181,9 @@ def train(
         if pair[0].dtype.is_floating_point
     ]
     averages, currents = (list(part) for part in zip(*entries, strict=True))
-    features_of, own_of, fused_of, merged_of = (
-        torch.compile(part, dynamic=False) if arguments.compile else part
-        for part in (network.features, own_loss, fused_loss, merged_loss)
-    )
+    compiled = partial(torch.compile, dynamic=False) if arguments.compile else _unchanged
+    features_of, own_of = compiled(network.features), compiled(own_loss)
+    fused_of, merged_of = compiled(fused_loss), compiled(merged_loss)
     random = np.random.default_rng(arguments.seed + (1 if joint else 0))
     device = parameters[0].device
     start, step, losses = time.monotonic(), 0, []
@@ -201,13 +207,13 @@ def train(
                 with torch.no_grad():
                     together, merged = (targets(batch, union(batch), every) for every in (1, STATIONS))
                     mask = most_confident(confidence, float(random.choice(SHARES)))
-                    errors = pose_errors((STATIONS - 1) * number, noise, device).unflatten(0, (STATIONS - 1, number))
+                    errors = pose_errors((STATIONS - 1) * number, noise, device).reshape(STATIONS - 1, number, 3)
                 values, present = warped(batch, latent, mask, errors)
                 method = str(random.choice(["max", "attention"]))
                 loss = loss + fused_of(network, features[:number], values, present, together, method)
                 loss = loss + 0.5 * merged_of(network, features[number:], merged)
         optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         torch.nn.utils.clip_grad_norm_(parameters, 10.0)
         optimizer.step()
         with torch.no_grad():
@@ -261,7 +267,7 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
         for share, noise, methods in ((1.0, 0.0, ("max", "attention")), (0.01, 0.0, ("attention",)),
                                       (0.05, 0.0, ("attention",)), (1.0, 0.4, ("attention",))):  # fmt: skip
             mask = most_confident(probabilities(own), share)
-            errors = pose_errors((STATIONS - 1) * len(own), noise, own.device).unflatten(0, (STATIONS - 1, len(own)))
+            errors = pose_errors((STATIONS - 1) * len(own), noise, own.device).reshape(STATIONS - 1, len(own), 3)
             values, present = warped(batch, latent, mask, errors)
             for method in methods:
                 name = f"{method} {share:g} {noise:g}"
