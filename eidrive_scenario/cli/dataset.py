@@ -68,7 +68,13 @@ def dataset(
     Complete runs are kept, so that the same command continues a killed one.
     """
     if from_folder is not None:
-        given = {"scenarios": scenarios, "--seeds": seeds, "--vary": vary, "--sensors": sensors}
+        given = {
+            "scenarios": scenarios,
+            "--seeds": seeds,
+            "--vary": vary,
+            "--sensors": sensors,
+            "options of a run": settings != RunSettings(),
+        }
         excluded = ", ".join(name for name, value in given.items() if value)
         if excluded:
             hint = "stations of recordings get their settings in the file that is written"

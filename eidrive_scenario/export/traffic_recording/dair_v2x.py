@@ -287,7 +287,8 @@ def _continue(tracks: list[_OpenTrack], labels: list[_Label], time: float) -> li
     started: list[_OpenTrack] = []
     free: list[_Label] = []
     for label in labels:
-        track = identified.get((label.identity, label.category))
+        # A second label of one identity in a frame is of another road user, or a track would be at two positions.
+        track = identified.pop((label.identity, label.category), None)
         if track is not None:
             track.add(time, label)
         elif label.identity:

@@ -175,5 +175,7 @@ def test_command_without_a_source_or_with_two_is_invalid_input(eidrive: Eidrive,
     assert "give an .xosc file, a library name, or --import DIR" in eidrive("dataset").stderr
     both = eidrive("dataset", "coop/scenario_1", "--sensors", LIDAR, "--import", tmp_path)
     assert (both.exit_code, "--import excludes scenarios, --sensors; " in both.stderr) == (2, True)
+    options = eidrive("dataset", "--import", tmp_path, "--channel", "ideal", "--time-limit", "1")
+    assert (options.exit_code, "--import excludes options of a run; " in options.stderr) == (2, True)
     assert eidrive("dataset", "coop/scenario_1", "--vary", "wether=sunny", "--out", tmp_path / "x").exit_code == 2
     assert not (tmp_path / "x").exists()

@@ -20,6 +20,7 @@ from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.export.dataset_import import import_recordings
 from eidrive_scenario.export.opv2v.dataset import export_dataset, plan_dataset, read_sensors
+from eidrive_scenario.export.traffic_recording.dair_v2x import read_scenes
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.sensing.readings import LidarReading
@@ -359,6 +360,18 @@ def test_recording_of_dair_v2x_is_replayed_with_associated_labels(tmp_path: Path
     text = path.read_text()
     assert "mount: {x: " in text
     assert "z: 1.9, yaw: 0.0, pitch: 0.0}" in text  # 20.3 + 1.6 - 20 above the ground
+
+
+def test_repeated_track_id_in_frame_is_another_road_user(tmp_path: Path) -> None:
+    """Each frame has two cars of one id, 10 m apart: no road user is at two positions at one time."""
+    folder = dair(tmp_path / "in", frames=3)
+    for path in (folder / "cooperative/label_world").iterdir():
+        boxes = np.array([[x, 240.0, 20.75, 4.2, 1.8, 1.5, 0.0] for x in (80.0, 90.0)])
+        corners = box_corners(boxes)[:, CORNERS_IN_CIRCLES].tolist()
+        write_json(path, [{"type": "car", "track_id": "7", "world_8_points": box} for box in corners])
+    (scene,) = read_scenes(folder)
+    for track in scene.tracks:
+        assert np.all(np.diff(track.times) > 0.0)
 
 
 @pytest.mark.parametrize(
