@@ -11,9 +11,9 @@ from eidrive_scenario.v2x.link_models.composed import ComposedProfile as Compose
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame as FeatureFrame
 from eidrive_scenario.v2x.messages.message import LinkEvent as LinkEvent
 from eidrive_scenario.v2x.messages.message import Message as Message
-from eidrive_scenario.v2x.messages.message import PointCloud as PointCloud
 from eidrive_scenario.v2x.messages.message import ReceivedMessage as ReceivedMessage
 from eidrive_scenario.v2x.messages.message import StationState as StationState
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud as PointCloud
 from eidrive_scenario.v2x.profile import ChannelProfile as ChannelProfile
 from eidrive_scenario.v2x.profile import build_channel as build_channel
 from eidrive_scenario.v2x.profile import load_profile as load_profile

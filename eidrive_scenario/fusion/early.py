@@ -18,7 +18,8 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionSettings,
 )
 from eidrive_scenario.sensing.readings import LidarReading, Readings
-from eidrive_scenario.v2x.messages.message import Payload, PointCloud, compress
+from eidrive_scenario.v2x.messages.message import Payload
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):

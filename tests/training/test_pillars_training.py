@@ -17,7 +17,7 @@ from eidrive_scenario.perception.learned.pillars.grid import ScanHistory
 from eidrive_scenario.perception.learned.pillars.network import PillarNetwork
 from eidrive_scenario.perception.learned.weights import DESCRIPTION
 from eidrive_scenario.sensing.readings import LidarReading
-from eidrive_scenario.v2x.messages.message import compress
+from eidrive_scenario.v2x.messages.point_cloud import compress
 from training.pillars.scenes import CLASSES, overlaps
 
 torch = pytest.importorskip("torch")

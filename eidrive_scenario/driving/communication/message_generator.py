@@ -28,7 +28,8 @@ from eidrive_scenario.v2x.messages.generation import (
     cpm_size,
     objects_that_fit,
 )
-from eidrive_scenario.v2x.messages.message import Message, Payload, PointCloud, StationState, station_id
+from eidrive_scenario.v2x.messages.message import Message, Payload, StationState, station_id
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 from eidrive_scenario.world.actor import ActorSpec
 
 

@@ -21,7 +21,8 @@ from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, pose_covariance_at
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
-from eidrive_scenario.v2x.messages.message import Message, Payload, PointCloud, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import Message, Payload, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 
 def relative_state(state: StationState | None, ego: EgoState, covariance: Array | None) -> StationState | None:

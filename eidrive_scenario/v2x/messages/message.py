@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import struct
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
@@ -12,108 +11,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.v2x.messages.feature_frames import Bytes, FeatureFrame
-
-_HEADER = struct.Struct("<d3iH3s3sI")
-HEADER_BYTES = _HEADER.size
-"""Size of the header [bytes]: time (8), corner in cells (3 x 4), cell in mm (2), cells along y and z (2 x 3),
-points (4)."""
-_MILLIMETERS = 1000.0
-_SEVEN_BITS = 7
-_MAX_BYTES = 9
-"""Maximum length of one encoded step [bytes]: 63 bits."""
-
-
-@dataclass(frozen=True)
-class PointCloud:
-    """Points measured at `time` [s], in the world frame by the pose estimate of the sender.
-
-    corner  (3,) corner of the grid [m]
-    cell    edge length of the cells [m], a multiple of 1 mm
-    shape   number of cells along x, y and z
-    steps   index differences between occupied cells in the order of x, y, z, in LEB128 as in protobuf: base 128, least
-            significant digit first, highest bit set in all bytes of a number except the last
-    """
-
-    time: float
-    corner: tuple[float, float, float]
-    cell: float
-    shape: tuple[int, int, int]
-    steps: Bytes
-
-    @property
-    def size(self) -> int:
-        """Size of the encoded point cloud [bytes]."""
-        return HEADER_BYTES + len(self.steps)
-
-    def points(self) -> Array:
-        """Return the centers of the occupied cells (N, 3) [m]."""
-        _, along, up = self.shape
-        cells = np.cumsum(_decode_numbers(self.steps))
-        indices = np.stack([cells // (along * up), cells // up % along, cells % up], axis=1)
-        return np.asarray(np.asarray(self.corner) + (indices + 0.5) * self.cell, dtype=np.float64)
-
-    def encode(self) -> bytes:
-        """Return the bytes of the point cloud."""
-        low = [round(edge / self.cell) for edge in self.corner]
-        along, up = (cells.to_bytes(3, "little") for cells in self.shape[1:])
-        points = int((self.steps < 128).sum())
-        header = _HEADER.pack(self.time, *low, round(self.cell * _MILLIMETERS), along, up, points)
-        return header + self.steps.tobytes()
-
-    @classmethod
-    def decode(cls, data: bytes) -> PointCloud:
-        """Return the point cloud of these bytes. Raise ValueError if they are none."""
-        if len(data) < HEADER_BYTES:
-            raise ValueError(f"a point cloud has at least {HEADER_BYTES} bytes (got {len(data)})")
-        time, *low, edge, along, up, points = _HEADER.unpack_from(data)
-        along, up = int.from_bytes(along, "little"), int.from_bytes(up, "little")
-        steps = np.frombuffer(data, np.uint8, offset=HEADER_BYTES)
-        if int((steps < 128).sum()) != points or (points and not (along and up and edge and steps[-1] < 128)):
-            raise ValueError(f"the bytes of a point cloud do not contain {points} points")
-        wide = int(_decode_numbers(steps).sum()) // (along * up) + 1 if points else 0
-        cell = edge / _MILLIMETERS
-        x, y, z = (place * cell for place in low)
-        return cls(time, (x, y, z), cell, (wide, along, up), steps)
-
-
-def compress(points: Array, time: float, cell: float) -> PointCloud:
-    """Return the points (N, 3) on a grid of this cell size, one point per cell, within half a cell.
-
-    cell  edge length of the cells [m], which is rounded to mm
-    """
-    cell = max(1, round(cell * _MILLIMETERS)) / _MILLIMETERS
-    if not len(points):
-        return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))
-    low = np.floor(points.min(axis=0) / cell).astype(np.int64)
-    indices = np.floor(points / cell).astype(np.int64) - low
-    wide, along, up = (indices.max(axis=0) + 1).tolist()
-    occupied = np.unique((indices[:, 0] * along + indices[:, 1]) * up + indices[:, 2])
-    x, y, z = (low * cell).tolist()
-    return PointCloud(time, (x, y, z), cell, (wide, along, up), _encode_numbers(np.diff(occupied, prepend=0)))
-
-
-def _encode_numbers(numbers: NDArray[np.int64]) -> Bytes:
-    groups = numbers[:, None] >> (_SEVEN_BITS * np.arange(_MAX_BYTES)) & 127
-    later = np.cumsum(groups[:, ::-1], axis=1)[:, ::-1] - groups
-    needed = (later > 0) | (groups > 0)
-    needed[:, 0] = True
-    last = later == 0
-    digits: Bytes = np.where(last, groups, groups + 128)[needed].astype(np.uint8)
-    return digits
-
-
-def _decode_numbers(data: Bytes) -> NDArray[np.int64]:
-    if not len(data):
-        return np.empty(0, dtype=np.int64)
-    ends = np.flatnonzero(data < 128)
-    starts = np.concatenate([[0], ends[:-1] + 1])
-    place = np.arange(len(data)) - np.repeat(starts, ends - starts + 1)
-    return np.asarray(np.add.reduceat((data.astype(np.int64) & 127) << (_SEVEN_BITS * place), starts), dtype=np.int64)
-
+from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 Payload = PointCloud | FeatureFrame
 """Sensor data of the sender in a message."""
@@ -176,7 +77,7 @@ class Message(msgspec.Struct, frozen=True, gc=False):
 
 def station_id(name: str) -> int:
     """Return the number of a station in encoded messages: the last four bytes of its name."""
-    return sum(byte << (8 * place) for place, byte in enumerate(name.encode()[-4:]))
+    return sum(byte << (8 * number) for number, byte in enumerate(name.encode()[-4:]))
 
 
 class ReceivedMessage(msgspec.Struct, frozen=True, gc=False):

@@ -20,7 +20,8 @@ from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 from eidrive_scenario.v2x.messages.asn1 import cpm_value
-from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState, compress
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.point_cloud import compress
 from eidrive_scenario.world.actor import ActorSpec
 
 AHEAD = ViewSector(2.0, 0.0, 1.5, 0.0, math.radians(50.0), 60.0)

@@ -27,7 +27,8 @@ from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.camera_images import camera_file, image_file
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings
-from eidrive_scenario.v2x.messages.message import Message, StationState, compress
+from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.messages.point_cloud import compress
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
 LAYOUT = Path(__file__).parents[3] / "examples" / "foxglove_layout.json"

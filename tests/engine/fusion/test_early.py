@@ -18,7 +18,8 @@ from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import Simulation
-from eidrive_scenario.v2x.messages.message import HEADER_BYTES, PointCloud, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import ReceivedMessage
+from eidrive_scenario.v2x.messages.point_cloud import HEADER_BYTES, PointCloud
 from eidrive_scenario.world.actor import ActorSpec
 
 EGO = ActorSpec("Ego", "car", "car", (4.6, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.85, max_steering=0.6)

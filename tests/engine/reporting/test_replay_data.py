@@ -30,7 +30,8 @@ from eidrive_scenario.reporting.replay.page import camera_files
 from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
-from eidrive_scenario.v2x.messages.message import LinkEvent, Message, PointCloud, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, StationState
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 from eidrive_scenario.world.view import Contact
 
 Play = Callable[..., list[Frame]]

@@ -19,7 +19,8 @@ from eidrive_scenario.v2x.messages.generation import (
     objects_that_fit,
     quality,
 )
-from eidrive_scenario.v2x.messages.message import Message, StationClock, StationState, compress
+from eidrive_scenario.v2x.messages.message import Message, StationClock, StationState
+from eidrive_scenario.v2x.messages.point_cloud import compress
 
 DT = 0.05
 

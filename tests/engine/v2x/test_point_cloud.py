@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.recording.codec import codec
-from eidrive_scenario.v2x.messages.message import HEADER_BYTES, PointCloud, compress
+from eidrive_scenario.v2x.messages.point_cloud import HEADER_BYTES, PointCloud, compress
 
 COORDINATE = st.floats(-500.0, 500.0)
 
@@ -69,6 +69,23 @@ def test_decoded_cloud_equals_encoded_one(count: int, cell: float) -> None:
         PointCloud.decode(data[:31])
     with pytest.raises(ValueError, match="point"):
         PointCloud.decode(data + b"x")
+
+
+@pytest.mark.parametrize(
+    ("points", "steps"),
+    [
+        (0, [255]),
+        (1, [1, 255]),
+        (1, [*[255] * 9, 1]),
+        (2, [*[255] * 8, 127, *[255] * 8, 127]),
+    ],
+)
+def test_decode_steps_that_are_no_numbers_raises_error(points: int, steps: list[int]) -> None:
+    """A step that does not end, one of more than 63 bits, and steps whose sum has more."""
+    header = bytearray(compress(np.zeros((1, 3)), 0.0, 0.1).encode()[:HEADER_BYTES])
+    header[-4:] = points.to_bytes(4, "little")
+    with pytest.raises(ValueError, match="point"):
+        PointCloud.decode(bytes(header) + bytes(steps))
 
 
 def test_compress_rounds_cells_to_millimeters() -> None:
