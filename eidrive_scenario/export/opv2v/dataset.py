@@ -10,7 +10,6 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -153,7 +152,10 @@ def export_dataset(
         "versions": dict(package_versions()),
     }
     check_writable(folder)
-    with _locked(folder):
+    lock = FileLock.acquire(folder / _LOCK)
+    if lock is None:
+        raise OutputError(Diagnostic("another command writes to this folder", "choose another folder", str(folder)))
+    with lock:
         complete = dict(_manifests(folder))
         _check_same(folder, about)
         # Before the first run, so that a killed command is continued with the same sensors and versions only.
@@ -164,17 +166,6 @@ def export_dataset(
         finally:
             shutil.rmtree(folder / PARTIAL_RUNS, ignore_errors=True)
             _write_json(folder / MANIFEST, {**about, "runs": dict(_manifests(folder))})
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    lock = FileLock.acquire(folder / _LOCK)
-    if lock is None:
-        raise OutputError(Diagnostic("another command writes to this folder", "choose another folder", str(folder)))
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def _check_same(folder: Path, about: Mapping[str, Any]) -> None:

@@ -161,7 +161,6 @@ class Opv2vWriter:
     ) -> StationFrame:
         row = view.rows[name]
         (cloud,) = readings.lidars.values()
-        pose = _base_pose(view, row)
         vehicles: dict[int, ObjectEntry] = {}
         pedestrians: dict[int, ObjectEntry] = {}
         for other in hit_actors:
@@ -171,8 +170,8 @@ class Opv2vWriter:
                 entries[self._id(other)] = _entry(view, view.rows[other])
         return StationFrame(
             opv2v_pose(cloud.pose),
-            opv2v_pose(pose),
-            opv2v_pose(pose if estimate is None else _base_pose(view, row, estimate)),
+            opv2v_pose(_base_pose(view, row)),
+            opv2v_pose(_base_pose(view, row, estimate)),
             _speed(view, row),
             (view.size[row] / 2.0).tolist(),
             [_camera(camera, cloud.pose) for camera in readings.cameras.values()],
@@ -219,22 +218,21 @@ _NO_VEHICLES = frozenset({"misc", "pedestrian"})
 """Categories that are no vehicles."""
 
 
-def _center_pose(view: WorldView, row: int) -> Array:
-    """Return the pose (4, 4) of the center of the box of an actor."""
+def _center_pose(view: WorldView, row: int, estimate: EgoState | None = None) -> Array:
+    """Return the pose (4, 4) of the center of the box of an actor, the assumed one if an estimate is given."""
+    if estimate is None:
+        position, angles = view.position[row], (view.yaw[row], view.pitch[row], view.roll[row])
+    else:
+        position, angles = estimate.position, (estimate.yaw, estimate.pitch, estimate.roll)
     pose = np.eye(4)
-    pose[:3, :3] = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
-    pose[:3, 3] = view.position[row] + pose[:3, :3] @ view.offset[row]
+    pose[:3, :3] = rotation_matrix(*angles)
+    pose[:3, 3] = position + pose[:3, :3] @ view.offset[row]
     return pose
 
 
 def _base_pose(view: WorldView, row: int, estimate: EgoState | None = None) -> Array:
-    """Return the pose (4, 4) of the point below the center of the box, as the station assumes it if it does."""
-    if estimate is None:
-        pose = _center_pose(view, row)
-    else:
-        pose = np.eye(4)
-        pose[:3, :3] = rotation_matrix(estimate.yaw, estimate.pitch, estimate.roll)
-        pose[:3, 3] = estimate.position + pose[:3, :3] @ view.offset[row]
+    """Return the pose (4, 4) of the point below the center of the box, see `_center_pose`."""
+    pose = _center_pose(view, row, estimate)
     pose[2, 3] -= view.size[row, 2] / 2.0
     return pose
 

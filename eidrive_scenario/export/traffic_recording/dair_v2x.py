@@ -312,7 +312,8 @@ def _continue(tracks: list[_OpenTrack], labels: list[_Label], time: float) -> li
 
 
 def _track(number: int, track: _OpenTrack) -> Track:
-    return Track(f"Vehicle{number}", track.category, _size(track.labels), np.array(track.times), _poses(track.labels))
+    poses = np.stack([label.pose for label in track.labels])
+    return Track(f"Vehicle{number}", track.category, _size(track.labels), np.array(track.times), poses)
 
 
 def _size(labels: list[_Label]) -> tuple[float, float, float]:
@@ -321,27 +322,17 @@ def _size(labels: list[_Label]) -> tuple[float, float, float]:
     return length, width, height
 
 
-def _poses(labels: list[_Label]) -> Array:
-    return np.stack([label.pose for label in labels])
-
-
 def _station_track(times: list[float], lidars: list[Array], own: list[_Label | None]) -> Track:
     """Return the track of the vehicle with the lidar: its labels, else a body below its lidar."""
-    labels = [label for label in own if label is not None]
-    size = _size(labels) if labels else STATION_SIZE
-    relative = None
-    for lidar, label in zip(lidars, own, strict=True):
-        if label is not None:
-            relative = np.linalg.inv(lidar) @ label.pose
-            break
-    if relative is None:
+    labeled = [(lidar, label) for lidar, label in zip(lidars, own, strict=True) if label is not None]
+    if labeled:
+        lidar, label = labeled[0]
+        category, size = label.category, _size([label for _, label in labeled])
+        relative = np.linalg.inv(lidar) @ label.pose
+    else:
+        category, size = "car", STATION_SIZE
         relative = np.eye(4)
         relative[2, 3] = size[2] / 2.0 - LIDAR_HEIGHT
-    poses = []
-    for lidar in lidars:
-        pose = lidar @ relative
-        level = np.eye(4)
-        level[:3, :3] = rotation_matrix(math.atan2(pose[1, 0], pose[0, 0]))
-        level[:3, 3] = pose[:3, 3]
-        poses.append(level)
-    return Track(VEHICLE_NAME, labels[0].category if labels else "car", size, np.array(times), np.stack(poses))
+    poses = np.stack(lidars) @ relative
+    poses[:, :3, :3] = rotation_matrix(np.arctan2(poses[:, 1, 0], poses[:, 0, 0]))
+    return Track(VEHICLE_NAME, category, size, np.array(times), poses)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from lxml import etree
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.export.geometry import angles
 from eidrive_scenario.export.traffic_recording.bodies import Body, body_of
-from eidrive_scenario.export.traffic_recording.scene import MobileStation, RoadsideStation, Track, TrafficScene
+from eidrive_scenario.export.traffic_recording.scene import RoadsideStation, Track, TrafficScene
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER
 from eidrive_scenario.files.encodable import encodable, printable
 from eidrive_scenario.files.yaml_text import flow_yaml
@@ -72,7 +74,8 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
         entity.append(actor.body.element)
         station = stations.get(track.name)
         if station is not None:
-            _add_stack(entity, track.name, _mount(station, actor.body), lidar)
+            yaw, pitch, _ = angles(station.lidar[:3, :3])
+            _add_stack(entity, track.name, _mount(station.lidar[:3, 3] + actor.body.center, yaw, pitch), lidar)
         _add_motion(start, act, actor, scene.end, is_station=station is not None)
     for unit in scene.roadside:
         _add_mast(entities, start, unit, lidar)
@@ -96,14 +99,9 @@ def _actor(track: Track) -> _Actor:
     return _Actor(track.name, body, track.times, poses)
 
 
-def _mount(station: MobileStation, body: Body) -> dict[str, float]:
-    """Return the mount of the lidar of a vehicle in the frame of its reference point [m, degrees]."""
-    yaw, pitch, _ = angles(station.lidar[:3, :3])
-    x, y, z = station.lidar[:3, 3] + body.center
-    return _rounded_mount(x, y, z, yaw, pitch)
-
-
-def _rounded_mount(x: float, y: float, z: float, yaw: float, pitch: float) -> dict[str, float]:
+def _mount(position: Sequence[float] | Array, yaw: float, pitch: float) -> dict[str, float]:
+    """Return the mount of a lidar in the frame of the reference point of its station [m, degrees]."""
+    x, y, z = position
     values = {"x": x, "y": y, "z": z, "yaw": math.degrees(yaw), "pitch": math.degrees(pitch)}
     return {name: round(float(value), 6) + 0.0 for name, value in values.items()}
 
@@ -129,16 +127,16 @@ def _add_motion(start: etree._Element, act: etree._Element, actor: _Actor, end: 
     first, last = float(actor.times[0]), float(actor.times[-1])
     enters, leaves = first > STEP / 2.0, last < end - STEP / 2.0
     trajectory = None if actor.stands else _follow(actor)
-    private = None
-    if not enters or is_station:
-        private = _add(start, "Private", entityRef=actor.name)
-    if private is not None and not enters:
-        _position(_add(_add(_add(private, "PrivateAction"), "TeleportAction"), "Position"), actor.poses[0])
-    if is_station and private is not None:  # scripted, while its stack perceives and communicates
+    private = etree.Element("Private", entityRef=actor.name)
+    if not enters:
+        _add_teleport(private, actor.poses[0])
+    if is_station:  # scripted, while its stack perceives and communicates
         action = _add(_add(private, "PrivateAction"), "ControllerAction")
         _add(action, "ActivateControllerAction", lateral="false", longitudinal="false")
-    if private is not None and not enters and trajectory is not None:
+    if not enters and trajectory is not None:
         private.append(trajectory)
+    if len(private):
+        start.append(private)
     if not enters and not leaves:
         return
     group = _add(act, "ManeuverGroup", name=actor.name, maximumExecutionCount="1")
@@ -176,6 +174,10 @@ def _follow(actor: _Actor) -> etree._Element:
     return private
 
 
+def _add_teleport(private: etree._Element, pose: Array) -> None:
+    _position(_add(_add(_add(private, "PrivateAction"), "TeleportAction"), "Position"), pose)
+
+
 def _position(parent: etree._Element, pose: Array) -> None:
     yaw, pitch, roll = angles(pose[:3, :3])
     values = dict(zip("xyzhpr", (*pose[:3, 3].tolist(), yaw, pitch, roll), strict=True))
@@ -191,12 +193,11 @@ def _add_mast(entities: etree._Element, start: etree._Element, unit: RoadsideSta
     mast = max(height, MAST_BASE)
     assignments = _add(reference, "ParameterAssignments")
     _add(assignments, "ParameterAssignment", parameterRef="Height", value=repr(mast))
-    _add_stack(entity, unit.name, _rounded_mount(0.0, 0.0, height, 0.0, pitch), lidar)
+    _add_stack(entity, unit.name, _mount((0.0, 0.0, height), 0.0, pitch), lidar)
     pose = np.eye(4)
-    pose[:3, :3] = [[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
+    pose[:3, :3] = rotation_matrix(yaw)
     pose[:2, 3] = x, y
-    private = _add(start, "Private", entityRef=unit.name)
-    _position(_add(_add(_add(private, "PrivateAction"), "TeleportAction"), "Position"), pose)
+    _add_teleport(_add(start, "Private", entityRef=unit.name), pose)
 
 
 def _trigger(tag: str, name: str, time: float) -> etree._Element:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -95,15 +95,12 @@ def at_ground(scene: TrafficScene) -> TrafficScene:
     tracks, roadside = scene.tracks, scene.roadside
     if abs(ground) > GROUND_TOLERANCE:
         warnings.append(f"all heights are reduced by {ground:.3f} m: the ground without roads is at the height 0")
-        tracks = [
-            Track(track.name, track.category, track.size, track.times, _lowered(track.poses, ground))
-            for track in tracks
-        ]
-        roadside = [RoadsideStation(station.name, _lowered(station.lidar, ground)) for station in roadside]
+        tracks = [replace(track, poses=_lowered(track.poses, ground)) for track in tracks]
+        roadside = [replace(station, lidar=_lowered(station.lidar, ground)) for station in roadside]
         top -= ground
     if top > GROUND_TOLERANCE:
         warnings.append(f"the ground is a plane without roads: road users are up to {top:.2f} m above it")
-    return TrafficScene(scene.name, scene.end, tracks, scene.mobile, roadside, warnings)
+    return replace(scene, tracks=tracks, roadside=roadside, warnings=warnings)
 
 
 def _lowered(poses: Array, height: float) -> Array:

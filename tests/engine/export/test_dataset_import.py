@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from command_fixtures import Eidrive, eidrive
+from scenario_1 import FrameCollector
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import box_corners, rotation_matrix
@@ -22,7 +22,6 @@ from eidrive_scenario.export.dataset_import import import_recordings
 from eidrive_scenario.export.opv2v.dataset import export_dataset, plan_dataset, read_sensors
 from eidrive_scenario.export.traffic_recording.dair_v2x import read_scenes
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.world.view import WorldView
@@ -31,25 +30,22 @@ __all__ = ["eidrive"]
 SMALL = "{lidar: {channels: 8, points_per_second: 16000, rotation: 10, range: 80}}"
 
 
-@dataclass
-class Views:
-    """Collector of the views of a run by tick."""
-
-    views: dict[int, WorldView] = field(default_factory=dict)
-
-    def observe(self, frame: Frame) -> None:
-        self.views[frame.view.tick] = frame.view
-
-    def close(self) -> None: ...
+def with_small_lidar(path: Path) -> Path:
+    """Give the stations of a scenario a small lidar at the recorded mount."""
+    path.write_text(path.read_text().replace("channels: 64", "channels: 8").replace("1300000", "16000"))
+    return path
 
 
-def replay(path: Path, **settings: Any) -> dict[int, WorldView]:
-    """Return the views of a replay with a small lidar at the recorded mount."""
-    text = path.read_text().replace("channels: 64", "channels: 8").replace("1300000", "16000")
-    path.write_text(text)
-    views = Views()
-    run_file(path, settings=RunSettings(no_criteria=True, **settings), observers=[views])
-    return views.views
+def play(scenario: str | Path, settings: RunSettings) -> dict[int, WorldView]:
+    """Return the views of a run by tick."""
+    collector = FrameCollector()
+    run_file(scenario, settings=settings, observers=[collector])
+    return {frame.view.tick: frame.view for frame in collector.frames}
+
+
+def replay(path: Path) -> dict[int, WorldView]:
+    """Return the views of a replay by tick."""
+    return play(with_small_lidar(path), RunSettings(no_criteria=True))
 
 
 def center_of(view: WorldView, name: str) -> Array:
@@ -69,14 +65,12 @@ def test_replayed_scene_is_within_a_centimeter_of_its_source(scenario: str, time
     export_dataset(jobs, workers=1)
     (path,) = (written for written, _ in import_recordings(tmp_path / "opv2v", tmp_path / "replay"))
     assert check_scenario(path).errors == ()
-    source = Views()
-    run_file(scenario, settings=RunSettings(time_limit=time), observers=[source])
-    views = replay(path)
+    source, views = play(scenario, RunSettings(time_limit=time)), replay(path)
     stations = json.loads((jobs[0].path / "manifest.json").read_text())["stations"]
     for name, number in stations.items():
         if number >= 0:
             for tick in range(0, round(time / 0.05) + 1, 2):
-                moved = center_of(views[tick], f"Station{number}") - center_of(source.views[tick], name)
+                moved = center_of(views[tick], f"Station{number}") - center_of(source[tick], name)
                 assert np.linalg.norm(moved) < 0.01
     listed = 0
     for file in jobs[0].path.glob("*/*.yaml"):
@@ -97,9 +91,7 @@ def test_replayed_stations_measure_at_recorded_poses_and_send_over_a_channel(tmp
     jobs = plan_dataset(["coop/scenario_1"], tmp_path / "a", RunSettings(time_limit=1.0), sensors=read_sensors(SMALL))
     export_dataset(jobs, workers=1)
     (path,) = (written for written, _ in import_recordings(jobs[0].path, tmp_path / "b"))
-    text = path.read_text().replace("channels: 64", "channels: 8").replace("1300000", "16000")
-    path.write_text(text)
-    with Simulation(path, settings=RunSettings(channel="80211p_urban")) as simulation:
+    with Simulation(with_small_lidar(path), settings=RunSettings(channel="80211p_urban")) as simulation:
         received = 0
         for _ in range(21):
             frame, _ = simulation.tick()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import yaml
 from numpy.typing import NDArray
 from opendrive_xml import elevation_xml, map_xml, road_xml, superelevation_xml
 from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
+from scenario_1 import FrameCollector
 from storyboard_xml import (
     act_xml,
     acts_xml,
@@ -39,7 +40,6 @@ from eidrive_scenario.export.opv2v.frame_files import StationFrame, write_pcd
 from eidrive_scenario.export.opv2v.poses import opv2v_pose, pose_matrix
 from eidrive_scenario.export.opv2v.reader_limits import ReaderLimits
 from eidrive_scenario.export.opv2v.writer import Opv2vWriter
-from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.view import WorldView
 
@@ -73,18 +73,6 @@ def read_pcd(path: Path) -> tuple[Array, NDArray[np.uint32]]:
     return cloud["xyz"].astype(float), cloud["rgb"]
 
 
-@dataclass
-class Views:
-    """Collector of the views of a run by frame number."""
-
-    views: dict[int, WorldView] = field(default_factory=dict)
-
-    def observe(self, frame: Frame) -> None:
-        self.views[frame.view.tick] = frame.view
-
-    def close(self) -> None: ...
-
-
 @dataclass(frozen=True)
 class Exported:
     folder: Path
@@ -98,10 +86,11 @@ class Exported:
 
 
 def export(folder: Path, scenario: str | Path, time_limit: float, **settings: Any) -> Exported:
-    writer, views = Opv2vWriter(folder, SENSORS), Views()
+    writer, collector = Opv2vWriter(folder, SENSORS), FrameCollector()
     given = RunSettings(time_limit=time_limit, **settings)
-    result = run_file(scenario, settings=given, observers=[writer, views])
-    return Exported(folder, writer, views.views, result.trace_hash)
+    result = run_file(scenario, settings=given, observers=[writer, collector])
+    views = {frame.view.tick: frame.view for frame in collector.frames}
+    return Exported(folder, writer, views, result.trace_hash)
 
 
 @pytest.fixture(scope="module")
