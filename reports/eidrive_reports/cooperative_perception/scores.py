@@ -225,11 +225,11 @@ class Pool:
             for tally, record in zip(self._tallies, self._records, strict=True)
             if self._total(record.hidden)
         ]
-        detected, total = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
-        if not total:
-            return HiddenRecall(float("nan"), float("nan"), float("nan"), 0, 0)
+        if not pairs:
+            return HiddenRecall(math.nan, math.nan, math.nan, 0, 0)
+        detected, total = (sum(counts) for counts in zip(*pairs, strict=True))
         value = detected / total
-        left_out = [(detected - part) / (total - whole) if whole < total else float("nan") for part, whole in pairs]
+        left_out = [(detected - part) / (total - whole) if whole < total else math.nan for part, whole in pairs]
         return HiddenRecall(value, *_limits(value, left_out), detected, total)
 
 
@@ -239,7 +239,7 @@ def _limits(value: float, left_out: Sequence[float]) -> tuple[float, float]:
     They are NaN for a single run, or if the value is not defined without one of the runs.
     """
     if len(left_out) < 2 or any(map(math.isnan, left_out)):
-        return float("nan"), float("nan")
+        return math.nan, math.nan
     if value in (0.0, 1.0):
         # The runs do not differ, so that only their number says how rare the other outcome may be
         share = wilson(int(value) * len(left_out), len(left_out))

@@ -85,13 +85,14 @@ def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
     """
     passed = sum(episode.passed is True for episode in episodes)
     share = wilson(passed, len(episodes))
-    nearest = [
-        min(values)
-        for episode in episodes
-        if (
-            values := [v for name, v in episode.metrics.items() if name[:13] == "min_distance." and name[-4:] == ".box"]
-        )
-    ]
+    nearest = []
+    for episode in episodes:
+        distances = [
+            distance
+            for name, distance in episode.metrics.items()
+            if name.startswith("min_distance.") and name.endswith(".box")
+        ]
+        nearest += [min(distances)] if distances else []
     interval = mean_interval(nearest) if nearest else None
     busy = [episode.metrics[BUSY] for episode in episodes if BUSY in episode.metrics]
     rates = [episode.metrics[BYTES] / episode.simulated_s for episode in episodes if episode.simulated_s > 0.0]

@@ -43,6 +43,7 @@ from eidrive_reports.reproduction.perception_tables import (
     curve_sections,
     data_sections,
     hidden_rows,
+    interval_column,
     object_counts,
     pool,
     records,
@@ -134,9 +135,7 @@ def _gain(measured: Sequence[PerceptionRecord], compared: Sequence[Condition], o
 
 def _gain_column(title: str, prefix: str = "") -> Column:
     """Return the column of a gain in AP 0.7 with its interval; `prefix` begins the names of the fields."""
-    fields = (f"{prefix}gain_70", f"{prefix}low_70", f"{prefix}high_70")
-    gain, low, high = (f"{{{name}:{form}}}" for name, form in zip(fields, ("+.3f", "+.2f", "+.2f"), strict=True))
-    return Column(title, f"{gain} ({low} to {high})", fields)
+    return interval_column(title, (f"{prefix}gain_70", f"{prefix}low_70", f"{prefix}high_70"), "+")
 
 
 def gain_table(gains: Sequence[Row], late: str) -> DataTable:

@@ -124,19 +124,20 @@ def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Itera
         yield fields | {f"ap_{_key(overlap)}": pooled.precision(index).value for index, overlap in enumerate(OVERLAPS)}
 
 
-def _fault(axis: str, value: float) -> dict[str, Value]:
-    return {"axis": axis, "value": value}
-
-
 def _key(overlap: float) -> int:
     """Return the overlap in percent, for names of fields."""
     return round(100.0 * overlap)
 
 
+def interval_column(title: str, fields: tuple[str, str, str], sign: str = "") -> Column:
+    """Return the column of a value with its interval, by the names of value, low and high; `sign` is their format."""
+    value, low, high = fields
+    return Column(title, f"{{{value}:{sign}.3f}} ({{{low}:{sign}.2f}} to {{{high}:{sign}.2f}})", fields)
+
+
 def _precision(overlap: float) -> Column:
-    fields = (f"ap_{_key(overlap)}", f"low_{_key(overlap)}", f"high_{_key(overlap)}")
-    value, low, high = (f"{{{name}:{form}}}" for name, form in zip(fields, (".3f", ".2f", ".2f"), strict=True))
-    return Column(f"AP {overlap:g} (95 %)", f"{value} ({low} to {high})", fields)
+    key = _key(overlap)
+    return interval_column(f"AP {overlap:g} (95 %)", (f"ap_{key}", f"low_{key}", f"high_{key}"))
 
 
 VOLUME_COLUMNS = (
@@ -180,7 +181,7 @@ def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
         (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
     }
     lines: list[Row] = [
-        _fault(axis, value)
+        {"axis": axis, "value": value}
         | {
             f"{arm}_{_key(overlap)}": precisions[axis, value, arm, overlap]
             for arm in study.compared
@@ -205,7 +206,7 @@ def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of the recall at the overlap 0.5 with one column per arm."""
     recalls = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
     lines: list[Row] = [
-        _fault(axis, value)
+        {"axis": axis, "value": value}
         | {arm: recalls[axis, value, arm]["recall"] for arm in study.compared}
         | {"hidden": recalls[axis, value, study.compared[0]]["hidden"]}
         for axis in study.axes
