@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,7 +107,7 @@ class Sampler:
 
 def _turn(scene: dict[str, Tensor]) -> None:
     """Turn each scene by a random angle."""
-    angle = torch.rand(len(scene["bodies"]), device=scene["bodies"].device) * 6.283185307
+    angle = torch.rand(len(scene["bodies"]), device=scene["bodies"].device) * math.tau
     cos, sin = torch.cos(angle)[:, None], torch.sin(angle)[:, None]
 
     def turned(x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:

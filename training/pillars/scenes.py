@@ -137,7 +137,7 @@ class SceneMaker:
             heading += float(rng.uniform(-math.pi, math.pi)) if turned else float(rng.normal(0.0, 0.06))
             fastest = {"pedestrian": 2.5, "bicycle": 7.0}.get(shape, 15.0)
             stands = kind == 1 or shape in ("rsu", "box") or rng.random() < (0.7 if turned and not person else 0.3)
-            scale = tuple(rng.uniform(0.95, 1.05, 3).tolist()) if shape not in ("rsu",) else (1.0, 1.0, 1.0)
+            scale = tuple(rng.uniform(0.95, 1.05, 3).tolist()) if shape != "rsu" else (1.0, 1.0, 1.0)
             return add(mesh, x, y, heading, 0.0 if stands else float(rng.uniform(0.5, fastest)), scale)
 
         stations = []

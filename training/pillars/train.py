@@ -222,22 +222,22 @@ def train(
         losses.append(loss.detach())
         step += 1
         if step % 100 == 0:
-            mean = torch.stack(losses[-100:]).mean().item()
+            mean = torch.stack(losses).mean().item()
+            losses.clear()
             print(f"step {step}  {time.monotonic() - start:.0f} s  loss {mean:.3f}  rate {rate:.2e}", flush=True)
     return average, step
 
 
-def peaks(maps: Tensor, count: int = 100) -> tuple[Tensor, Tensor, Tensor]:
-    """Return scores (N, count), classes and centers (N, count, 2) of the best local maxima of head maps."""
-    share = torch.sigmoid(maps[:, :K].float())
-    best, kind = share.max(dim=1)
+def peaks(maps: Tensor, count: int = 100) -> tuple[Tensor, Tensor]:
+    """Return scores (N, count) and centers (N, count, 2) of the best local maxima of head maps."""
+    best = probabilities(maps)
     best = torch.where(functional.max_pool2d(best[:, None], 3, 1, 1)[:, 0] == best, best, 0.0)
     scores, cells = best.flatten(1).topk(count, dim=1)
     i, j = cells // OUT, cells % OUT
     offset = maps[:, K : K + 2].float().flatten(2).gather(2, cells[:, None].expand(-1, 2, -1))
     x = (i + 0.5 + offset[:, 0]) * STRIDE_SIDE - REACH
     y = (j + 0.5 + offset[:, 1]) * STRIDE_SIDE - REACH
-    return scores, kind.flatten(1).gather(1, cells), torch.stack([x, y], dim=2)
+    return scores, torch.stack([x, y], dim=2)
 
 
 def average_precision(entries: list[tuple[float, bool]], objects: int) -> float:
@@ -278,7 +278,7 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, 
         inside = (centers.abs() < REACH).all(dim=2) & (batch.classes[scene] >= 0)
         inside &= torch.arange(centers.shape[1], device=centers.device) != batch.own[:, None]
         for name, (maps, points) in results.items():
-            scores, _, peak_centers = (part.cpu().numpy() for part in peaks(maps))
+            scores, peak_centers = (part.cpu().numpy() for part in peaks(maps))
             step = len(inside) // len(maps)
             truth = (inside & (points > 0))[::step].cpu().numpy()
             distance = torch.cdist(torch.as_tensor(peak_centers), centers[::step].cpu().float()).numpy()
