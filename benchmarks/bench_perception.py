@@ -72,7 +72,7 @@ def evaluate_scenario(name: str, stations: tuple[str, ...], every: int, seed: in
                 results.detector.append(time.perf_counter() - read)
                 results.sensor.append(read - start)
                 cloud = readings.lidars["lidar"]
-                points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+                points = cloud.world_points
                 compare(
                     results, detections, points[points[:, 2] > 0.25], view.boxes, view.names, view.categories, station
                 )
@@ -104,7 +104,7 @@ def evaluate_random_scenes(count: int, seed: int) -> None:
     detector = LidarDetector()
     for scene in random_scenes(count, seed):
         detections, cloud = detector.detect(scene.readings), scene.readings.lidars["lidar"]
-        points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+        points = cloud.world_points
         points = points[points[:, 2] > 0.25]
         for kind, box in zip(scene.kinds, scene.boxes, strict=True):
             if np.count_nonzero(points_in_box(points, box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0]))) < LEAST_POINTS:

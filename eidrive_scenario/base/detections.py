@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import wrap_angle
 
 NOT_ESTIMATED: Array = np.empty(0)
 """Existence of objects for which no tracker and no fusion method has estimated it."""
@@ -64,6 +67,21 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
 
     def __len__(self) -> int:
         return len(self.boxes)
+
+    def move(self, before: Array, after: Array, turn: float) -> Detections:
+        """Return the detections of a station as it reports them from another pose.
+
+        before, after  (2,) positions of the station of these detections, and of the returned ones [m]
+        turn           change of its heading [rad]
+        """
+        cos, sin = math.cos(turn), math.sin(turn)
+        rotation = np.array([[cos, -sin], [sin, cos]])
+        boxes = self.boxes.copy()
+        boxes[:, :2] = (boxes[:, :2] - before) @ rotation.T + after
+        boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
+        return replace(
+            self, boxes=boxes, velocity=self.velocity @ rotation.T, covariance=rotation @ self.covariance @ rotation.T
+        )
 
     def subset(self, rows: Sequence[int]) -> Detections:
         """Return these rows, in the given order."""

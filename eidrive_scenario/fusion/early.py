@@ -25,7 +25,7 @@ from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
 class EarlyFusionSettings(CovarianceIntersectionSettings):
     """Settings of early fusion (property `fusion_settings`). Inherited ones apply to stations without shared points.
 
-    cell         cell size of the grid of transmitted points [m]
+    cell          cell size of the grid of transmitted points [m]
     max_lateness  maximum age of merged points; older ones show past positions [s]. Also the maximum lead of a clock
     """
 
@@ -42,25 +42,25 @@ class EarlyFusion(CovarianceIntersectionFusion):
     """
 
     settings_type: ClassVar[type[Settings] | None] = EarlyFusionSettings
+    settings: EarlyFusionSettings
 
     shares: ClassVar[Literal["points", "features"] | None] = "points"
 
     def __init__(self, settings: EarlyFusionSettings | None = None) -> None:
-        self.early = settings or EarlyFusionSettings()
+        super().__init__(settings or EarlyFusionSettings())
         self._received: dict[str, tuple[float, Array]] = {}
         """Time and points (N, 3) of the newest cloud of each station."""
-        super().__init__(self.early)
 
     @property
     def max_payload_age(self) -> float:
-        return self.early.max_lateness
+        return self.settings.max_lateness
 
     def payloads(self, readings: Readings, limit: int) -> tuple[Payload, ...]:
         """Return the points of all lidars of a station."""
         if not readings.lidars:
             return ()
-        points = np.concatenate([_to_world(reading) for reading in readings.lidars.values()])
-        return (compress(points, readings.time, self.early.cell),)
+        points = np.concatenate([reading.world_points for reading in readings.lidars.values()])
+        return (compress(points, readings.time, self.settings.cell),)
 
     def add_payload(self, sender: str, payload: Payload, body: Array) -> None:
         """Store a received cloud. An out-of-sequence cloud does not replace a newer one."""
@@ -76,15 +76,9 @@ class EarlyFusion(CovarianceIntersectionFusion):
         if not readings.lidars or not self._received:
             return readings
         name, first = next(iter(readings.lidars.items()))
-        own = [_to_world(reading) for other, reading in readings.lidars.items() if other != name]
+        own = [reading.world_points for other, reading in readings.lidars.items() if other != name]
         received = [points for _, (_, points) in sorted(self._received.items())]
         offset = np.concatenate([*own, *received]) - first.pose[:3, 3]
         points = np.concatenate([first.points, offset @ first.pose[:3, :3]])
         intensity = np.concatenate([first.intensity, np.ones(len(offset))])
         return replace(readings, lidars={name: LidarReading(points, intensity, first.pose)})
-
-
-def _to_world(reading: LidarReading) -> Array:
-    """Return the points (N, 3) in the world frame [m]."""
-    points: Array = reading.points @ reading.pose[:3, :3].T + reading.pose[:3, 3]
-    return points

@@ -24,22 +24,22 @@ class Grid:
     cell: float
     shape: tuple[int, int]
 
-    def to_world(self, places: Array | Integers) -> Array:
-        """Return the points (..., 2) in the world of places in cells, where integers are centers of cells."""
-        local = (places + 0.5 - np.array(self.shape) / 2.0) * self.cell
+    def to_world(self, coordinates: Array | Integers) -> Array:
+        """Return the points (..., 2) in the world of coordinates in cells, where integers are centers of cells."""
+        local = (coordinates + 0.5 - np.array(self.shape) / 2.0) * self.cell
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         world: Array = local @ np.array([[cos, sin], [-sin, cos]]) + (self.x, self.y)
         return world
 
-    def to_places(self, points: Array) -> Array:
-        """Return the places (..., 2) in cells of points in the world."""
+    def to_coordinates(self, points: Array) -> Array:
+        """Return the coordinates (..., 2) in cells of points in the world."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         local = (points - (self.x, self.y)) @ np.array([[cos, -sin], [sin, cos]])
         return np.asarray(local / self.cell + np.array(self.shape) / 2.0 - 0.5)
 
     def cells(self, points: Array) -> tuple[Integers, Bools]:
         """Return the cells (N, 2) that contain points (N, 2) of the world, and whether they are in the grid (N,)."""
-        cells = np.floor(self.to_places(points) + 0.5)
+        cells = np.floor(self.to_coordinates(points) + 0.5)
         inside: Bools = np.all((cells >= 0) & (cells < self.shape), axis=1)
         return np.where(inside[:, None], cells, 0).astype(np.int64), inside
 
@@ -59,13 +59,13 @@ def warp(
     of the present ones divided by their sum. The result is present if the nearest cell is, or if this sum is at least
     `ENOUGH`.
     """
-    corners = sender.to_places(receiver.to_world(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))
+    corners = sender.to_coordinates(receiver.to_world(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))
     transform = np.array([corners[0], corners[1] - corners[0], corners[2] - corners[0]])
     boxes = np.empty((len(moving), 8))
     if len(moving):
         turned = moving[:, 2] - sender.yaw
-        shift = sender.to_places(moving[:, :2] + moving[:, 5:7] * age)
-        boxes[:, :2] = sender.to_places(moving[:, :2])
+        shift = sender.to_coordinates(moving[:, :2] + moving[:, 5:7] * age)
+        boxes[:, :2] = sender.to_coordinates(moving[:, :2])
         boxes[:, 2], boxes[:, 3] = np.cos(turned), np.sin(turned)
         boxes[:, 4:6] = moving[:, 3:5] / (2.0 * sender.cell)
         boxes[:, 6:] = shift - boxes[:, :2]
@@ -79,7 +79,7 @@ def warp(
 def _warp(latent: Floats, present: Bools, transform: Array, boxes: Array, warped: Floats, is_present: Bools) -> None:
     """Fill the arrays of `warp`.
 
-    transform  (3, 2) place of cell (0, 0) of the receiver on the grid of the sender, and its change along x and y
+    transform  (3, 2) coordinates of cell (0, 0) of the receiver on the grid of the sender, and its change along x and y
     boxes      (B, 8) center, cos and sin of the heading, half length, half width, displacement; in cells of the sender
     """
     rows, columns, channels = latent.shape

@@ -91,11 +91,12 @@ class IntermediateFusion(CovarianceIntersectionFusion):
     """
 
     settings_type: ClassVar[type[Settings] | None] = IntermediateFusionSettings
+    settings: IntermediateFusionSettings
 
     shares: ClassVar[Literal["points", "features"] | None] = "features"
 
     def __init__(self, settings: IntermediateFusionSettings | None = None) -> None:
-        self.intermediate = settings or IntermediateFusionSettings()
+        super().__init__(settings or IntermediateFusionSettings())
         self._detector: Detector | None = None
         self._maps = 0
         """Number of maps of this station."""
@@ -108,7 +109,6 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         """Newest report of each station."""
         self._boxes: dict[str, dict[int, _MovingBox]] = {}
         """Newest moving boxes of each station, by object."""
-        super().__init__(self.intermediate)
 
     @abstractmethod
     def fuse_maps(self, own: Floats, received: Floats, present: Bools) -> Floats:
@@ -121,7 +121,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
 
     @property
     def max_payload_age(self) -> float:
-        return self.intermediate.max_lateness
+        return self.settings.max_lateness
 
     def setup(self, detector: Detector) -> None:
         self._detector = detector
@@ -138,7 +138,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         features = readings.features
         if features is None:
             return ()
-        codec, settings = self._codec, self.intermediate
+        codec, settings = self._codec, self.settings
         confidence = _smoothed(features.confidence).ravel()
         count = max(1, round(settings.share * confidence.size))
         chosen = np.argsort(-confidence, kind="stable")[:count]
@@ -248,8 +248,8 @@ class IntermediateFusion(CovarianceIntersectionFusion):
             return replace(readings, lidars={})
         oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
         self._received = {sender: held for sender, held in self._received.items() if held.time >= oldest}
-        shape = features.confidence.shape
-        self._grid = Grid(features.x, features.y, features.yaw, features.cell, (shape[0], shape[1]))
+        rows, columns = shape = features.confidence.shape
+        self._grid = Grid(features.x, features.y, features.yaw, features.cell, (rows, columns))
         if not self._received:
             return readings
         received = np.zeros((len(self._received), *features.features.shape), np.float32)
@@ -260,14 +260,8 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                  box.length + 2.0 * BOX_MARGIN, box.width + 2.0 * BOX_MARGIN, box.vx, box.vy)
                 for box in self._boxes.get(sender, {}).values() if self._is_usable(box, held.time)
             ]).reshape(-1, 7)  # fmt: skip
-            latent, present[station] = warp(
-                held.latent,
-                held.present,
-                held.grid,
-                self._grid_for(sender, self._grid),
-                moving,
-                features.time - held.time,
-            )
+            grid, age = self._grid_for(sender, self._grid), features.time - held.time
+            latent, present[station] = warp(held.latent, held.present, held.grid, grid, moving, age)
             expanded = self._codec.expand(np.ascontiguousarray(latent[present[station]].T))
             scatter(expanded, present[station], received[station])
         fused = self.fuse_maps(features.features, received, present)

@@ -13,12 +13,7 @@ is. Which objects are the same is not known: pairs are assigned within gates of 
 of e, and an error is only corrected if its hypothesis is much more probable than all others, among them that no object
 is common. So a row of cars in equal distances is not shifted by one car.
 
-Fusion of boxes uses `PoseAligner`. Fusion of feature maps uses the corrected pose of a sender:
-
-    alignment = align_pose(own, report)   # own detections, and the report of the sender as the fusion method gets it
-    x, y, yaw = alignment.pose            # of the sender at `report.state.time`, relative to the assumed own pose
-
-For a map with another pose, give the report a state with the pose of the map and the covariance of the sender.
+Fusion of boxes uses `PoseAligner`, fusion of feature maps the corrected pose of a sender by `align_pose`.
 """
 
 from __future__ import annotations
@@ -134,19 +129,9 @@ def aligned_report(report: Report, alignment: PoseAlignment) -> Report:
     if state is None or not alignment.is_corrected:
         return report
     x, y, yaw = alignment.pose
-    cos, sin = math.cos(alignment.error[2]), math.sin(alignment.error[2])
-    rotation = np.array([[cos, sin], [-sin, cos]])
-    boxes = detections.boxes.copy()
-    boxes[:, :2] = (boxes[:, :2] - (state.x, state.y)) @ rotation.T + (x, y)
-    boxes[:, 6] = wrap_angle(boxes[:, 6] - alignment.error[2])
     return replace(
         report,
-        detections=replace(
-            detections,
-            boxes=boxes,
-            velocity=detections.velocity @ rotation.T,
-            covariance=rotation @ detections.covariance @ rotation.T,
-        ),
+        detections=detections.move(np.array([state.x, state.y]), np.array([x, y]), -float(alignment.error[2])),
         state=replace(state, x=x, y=y, yaw=yaw, pose_covariance=alignment.covariance),
     )
 
@@ -330,7 +315,7 @@ def _seeded(candidates: _Candidates, seeds: Integers) -> tuple[Array, Array, Arr
     The log odds add those of the best pair of each other object of the sender. The last result adds the best of them
     only, up to MAX_EVIDENCE pairs.
     """
-    jacobian = _jacobian(candidates.lever)
+    jacobian = pose_jacobian(candidates.lever, 0.0, 0.0)
     own = jacobian[seeds]
     cross = candidates.prior @ np.swapaxes(own, 1, 2)
     innovation = candidates.covariance[seeds] + own @ cross
@@ -444,17 +429,12 @@ def _squared(offset: Array, covariance: Array) -> tuple[Array, Array]:
     return (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant, determinant
 
 
-def _jacobian(lever: Array) -> Array:
-    """Return the derivatives (K, 2, 3) of the positions at these levers (K, 2) by the pose."""
-    return pose_jacobian(lever, 0.0, 0.0)
-
-
 def _moved(candidates: _Candidates, pairs: Integers, error: Array) -> tuple[Array, Array]:
     """Return the offsets (K, 2) of pairs after the correction of an error (3,), and their derivatives (K, 2, 3)."""
     lever = candidates.lever[pairs]
     cos, sin = math.cos(error[2]), math.sin(error[2])
     turned = lever @ np.array([[cos, -sin], [sin, cos]])
-    return candidates.offset[pairs] + turned - lever - error[:2], _jacobian(turned)
+    return candidates.offset[pairs] + turned - lever - error[:2], pose_jacobian(turned, 0.0, 0.0)
 
 
 def _fits(candidates: _Candidates, pairs: Integers, error: Array, covariance: Array) -> Array:

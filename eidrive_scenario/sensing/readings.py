@@ -160,6 +160,11 @@ class LidarReading(msgspec.Struct, frozen=True):
     azimuth: Array = msgspec.field(default_factory=lambda: np.empty(0))
     rows: NDArray[np.int32] = msgspec.field(default_factory=lambda: np.empty(0, dtype=np.int32))
 
+    @property
+    def world_points(self) -> Array:
+        """Points (N, 3) in the world frame [m]."""
+        return np.asarray(self.points @ self.pose[:3, :3].T + self.pose[:3, 3])
+
 
 class GnssReading(msgspec.Struct, frozen=True):
     """Position of the reference point of the station, measured by GNSS.

@@ -62,8 +62,6 @@ class _Revolution:
         if len(self._parts) == 1:
             return reading
         rotation, origin = reading.pose[:3, :3], reading.pose[:3, 3]
-        points = [
-            (old.points @ old.pose[:3, :3].T + old.pose[:3, 3] - origin) @ rotation for _, old in list(self._parts)[:-1]
-        ]
+        points = [(old.world_points - origin) @ rotation for _, old in list(self._parts)[:-1]]
         intensities = [old.intensity for _, old in self._parts]
         return LidarReading(np.concatenate([*points, reading.points]), np.concatenate(intensities), reading.pose)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.api.common import ActorSpec, Array, wrap_angle
+from eidrive_scenario.api.common import ActorSpec
 from eidrive_scenario.api.driving import Agent, AgentSettings, Detections, EgoState, StackContext, build_agent
 from eidrive_scenario.api.perception import Detector, FeatureMap, PoseNoise, Readings
 from eidrive_scenario.api.v2x import Message, ReceivedMessage, build_channel, load_profile
@@ -188,14 +188,7 @@ WAIT = 0.001
 
 def move_detections(detections: Detections, before: EgoState, after: EgoState) -> Detections:
     """Return detections of a station at pose `before` as it reports them from pose `after`."""
-    turn = after.yaw - before.yaw
-    cos, sin = np.cos(turn), np.sin(turn)
-    rotation = np.array([[cos, -sin], [sin, cos]])
-    boxes = detections.boxes.copy()
-    boxes[:, :2] = (boxes[:, :2] - before.position[:2]) @ rotation.T + after.position[:2]
-    boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
-    covariance = rotation @ detections.covariance @ rotation.T
-    return replace(detections, boxes=boxes, velocity=detections.velocity @ rotation.T, covariance=covariance)
+    return detections.move(before.position[:2], after.position[:2], after.yaw - before.yaw)
 
 
 def move_features(features: FeatureMap, before: EgoState, after: EgoState) -> FeatureMap:
@@ -362,10 +355,3 @@ def _without_points(message: Message) -> Message:
     if message.points is None:
         return message
     return replace(message, points=None, size=message.size - message.points.size)
-
-
-def world_points(readings: Readings) -> Array:
-    """Return the points (N, 3) of all lidars of a station in the world frame."""
-    return np.concatenate(
-        [reading.points @ reading.pose[:3, :3].T + reading.pose[:3, 3] for reading in readings.lidars.values()]
-    )

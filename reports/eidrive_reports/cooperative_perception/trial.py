@@ -15,7 +15,6 @@ from eidrive_reports.cooperative_perception.receivers import (
     Receiver,
     Reception,
     Senders,
-    world_points,
 )
 from eidrive_reports.cooperative_perception.scores import (
     RANGES,
@@ -82,7 +81,11 @@ class Measurement:
         ego = self.factory.ego
         truth = None
         if sampled:
-            truth = true_objects(view, ego, {name: world_points(reading) for name, reading in readings.items()})
+            clouds = {
+                name: np.concatenate([lidar.world_points for lidar in reading.lidars.values()])
+                for name, reading in readings.items()
+            }
+            truth = true_objects(view, ego, clouds)
             self.truths.append(truth)
         center = view.boxes[view.row(ego), :2]
         messages = {key: senders.messages(readings, now) for key, senders in self._senders.items()}

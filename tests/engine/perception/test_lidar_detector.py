@@ -97,7 +97,7 @@ def test_detect_from_mast_returns_cars(street: Any) -> None:
     cars = [street.thing("A", 12, 3, 0.4), street.thing("B", -8, -15, 2.0)]
     readings = street.readings(cars, {"roof": LidarSettings()}, mast=(0.0, 0.0, 1.0))
     cloud = readings.lidars["roof"]
-    ground = (cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3])[:, 2]
+    ground = cloud.world_points[:, 2]
     assert np.count_nonzero(np.abs(ground) < 0.1) > 1000
     found = detect(readings)
     assert len(found) == 2

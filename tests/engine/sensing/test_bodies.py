@@ -80,7 +80,7 @@ def test_windows_of_a_car_return_nothing_and_its_body_does() -> None:
         cloud = lidar.read(world, view, 0)
     glass = (hits.rows == 0) & (hits.brightness == 0.0)
     assert 0.1 < glass.sum() / (hits.rows == 0).sum() < 0.4
-    points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+    points = cloud.world_points
     on_car = points[(np.abs(points[:, :2] - (car.offset[0], 0.0)) < (2.5, 0.95)).all(axis=1) & (points[:, 2] > 0.05)]
     # The rear window is between the trunk at 0.65 and the roof at 0.98 of the height, 1.3 m wide.
     height, middle = on_car[:, 2] / 1.49, np.abs(on_car[:, 1]) < 0.5

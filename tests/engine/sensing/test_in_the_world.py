@@ -70,7 +70,7 @@ def test_lidar_measures_rear_of_truck(world: World) -> None:
     """Bumper, lamps and doors are within 3 cm of the end of the box."""
     settings = LidarSettings(channels=16, points_per_second=16 * 360 * 20, range_noise=0.0)
     cloud = Rig(spec("Ego"), {"lidar": settings}).read(world, world.view()).lidars["lidar"]
-    points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+    points = cloud.world_points
     ahead = points[(np.abs(points[:, 1]) < 1.4) & (points[:, 2] > 0.1) & (points[:, 0] > 5)]
     assert len(ahead) > 20
     np.testing.assert_allclose(ahead[:, 0], 15 - 4.234, atol=0.03)
@@ -99,7 +99,7 @@ def test_actor_hidden_from_named_sensor_is_transparent_to_it(world: World) -> No
         assert readings.truth is not None
         assert set(readings.truth.names) == ({"Hidden", "Beside"} if sensor == "truth_sensor" else {"Truck", "Beside"})
         cloud = readings.lidars["roof"]
-        points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+        points = cloud.world_points
         ahead = points[(np.abs(points[:, 1]) < 0.9) & (points[:, 2] > 0.1) & (points[:, 0] > 5)]
         assert ahead[:, 0].min() == pytest.approx(30 - 2.446 if sensor == "roof" else 15 - 4.234, abs=0.1)
         visible = "Hidden" if sensor == "front" else "Truck"

@@ -118,7 +118,7 @@ def test_lidar_points_are_on_ground_and_bodies(boxes: Any) -> None:
     scene = boxes.scene(view, ground=True)
     dense = LIDAR.model_copy(update={"points_per_second": 32000})
     cloud = Rig(boxes.spec("Ego"), {"lidar": dense}).read(scene, view).lidars["lidar"]
-    world = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+    world = cloud.world_points
     on_ground = np.abs(world[:, 2]) < 1e-6
     half = np.array([4.892, 1.837, 1.49]) / 2
     inside = np.all(np.abs(world - [15, -3, 0.745]) < half + 1e-6, axis=1)
@@ -134,6 +134,6 @@ def test_lidar_ego_body_hides_nearby_ground(boxes: Any) -> None:
     view = boxes.view({"Ego": (0, 0, 0)})
     settings = LIDAR.model_copy(update={"lower_fov": -80.0})
     cloud = Rig(boxes.spec("Ego"), {"lidar": settings}).read(boxes.scene(view, ground=True), view).lidars["lidar"]
-    world = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+    world = cloud.world_points
     assert len(world)
     assert not np.any((np.abs(world[:, 0]) < 2.446) & (np.abs(world[:, 1]) < 0.918))

@@ -59,7 +59,7 @@ def test_lidar_does_not_measure_the_own_body_and_measures_the_car(world: World) 
     settings = LidarSettings(channels=32, points_per_second=32 * 360 * 20, range_noise=0.0, dropoff=0.0)
     view = world.view()
     cloud = Rig(world.spec("Ego"), {"lidar": settings}).read(world, view).lidars["lidar"]
-    points = cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3]
+    points = cloud.world_points
     inside = []
     for row in (0, 1):
         turn = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])

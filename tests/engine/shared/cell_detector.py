@@ -11,7 +11,7 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.fusion.feature_warp import Grid
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.perception.learned.pillars.codec import FeatureCodec
+from eidrive_scenario.perception.learned.pillars.codec import CellLayer, FeatureCodec
 from eidrive_scenario.sensing.readings import Readings
 
 CELL, CELLS = 0.8, 128
@@ -23,7 +23,8 @@ def codec() -> FeatureCodec:
     """Return a codec whose latent channels are the first eight features; its code book has 0 and steps of channel 0."""
     codebook = np.zeros((256, 8), np.float32)
     codebook[:, 0] = np.arange(256) / 64.0
-    return FeatureCodec(np.float32(0.03125), codebook, np.eye(96, 8, dtype=np.float32), np.zeros(96, np.float32))
+    expansion = CellLayer(np.eye(96, 8, dtype=np.float32), np.zeros(96, np.float32))
+    return FeatureCodec(np.float32(0.03125), codebook, expansion)
 
 
 class CellDetector(Detector):
@@ -60,7 +61,7 @@ class CellDetector(Detector):
         first = next(iter(readings.lidars.values()))
         yaw = math.atan2(first.pose[1, 0], first.pose[0, 0])
         grid = Grid(float(first.pose[0, 3]), float(first.pose[1, 3]), yaw, CELL, (CELLS, CELLS))
-        points = np.concatenate([one.points @ one.pose[:3, :3].T + one.pose[:3, 3] for one in readings.lidars.values()])
+        points = np.concatenate([reading.world_points for reading in readings.lidars.values()])
         cells, inside = grid.cells(points[:, :2])
         features = np.zeros((96, CELLS, CELLS), np.float32)
         features[0][tuple(cells[inside].T)] = 1.0

@@ -48,34 +48,28 @@ class CellLayer(NamedTuple):
 class FeatureCodec:
     """Codec of the compressed features z (8, N) of N cells, which the network computes from the features.
 
-    scale          latent units of one step of an 8-bit integer
-    codebook       (256, 8), in latent units
-    expand_weight  (96, 8), expand_bias (96,): linear layer from z to the features, followed by a ReLU
+    scale      latent units of one step of an 8-bit integer
+    codebook   (256, 8), in latent units
+    expansion  linear layer from z to the features, followed by a ReLU
     """
 
     scale: np.float32
     codebook: Floats
-    expand_weight: Floats
-    expand_bias: Floats
+    expansion: CellLayer
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray[Any]]) -> FeatureCodec:
         """Return the codec of these weights. Raise ValueError if arrays are missing or do not fit."""
         graph = Graph(arrays)
         scale = graph.array("latent_scale", ())
-        expand = CellLayer.of(arrays, "expand", LATENT, FEATURES)
+        expansion = CellLayer.of(arrays, "expand", LATENT, FEATURES)
         if not 0.0 < scale < np.inf:
             raise ValueError(f"latent_scale is invalid (got {scale:g}; expected a positive number)")
-        return cls(
-            np.float32(scale),
-            graph.array("codebook", (CODES, LATENT)),
-            expand.weight,
-            expand.bias,
-        )
+        return cls(np.float32(scale), graph.array("codebook", (CODES, LATENT)), expansion)
 
     def expand(self, latent: Floats) -> Floats:
         """Return the features (96, N) of cells with these compressed features (8, N)."""
-        features = CellLayer(self.expand_weight, self.expand_bias)(latent)
+        features = self.expansion(latent)
         np.maximum(features, np.float32(0.0), out=features)
         return features
 

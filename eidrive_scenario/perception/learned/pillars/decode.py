@@ -12,8 +12,8 @@ from eidrive_scenario.base.arrays import Array, Floats, Integers
 ATTRIBUTES = 13
 """Maps after those of the classes: offset of the box center from the center of the cell in x and y [cells], height of
 the box center above the ground [m], log of length, width and height [m], cosine and sine of the heading, cosine and
-sine of twice the heading, displacement during STEP in x and y [m], log of the standard deviation of the position in
-each axis [m]."""
+sine of twice the heading, displacement between the two scans in x and y [m], log of the standard deviation of the
+position in each axis [m]."""
 LARGEST_LOG = 5.0
 """Largest magnitude of a logarithm: sizes and deviations are between 7 mm and 148 m."""
 MOST_OBJECTS = 300
@@ -24,7 +24,7 @@ class Objects(NamedTuple):
     """Objects in the level frame of a grid.
 
     boxes         (N, 7), with z above the ground [m, rad];  scores  (N,);  classes  (N,) numbers
-    displacement  (N, 2) during STEP [m];  deviation  (N,) of the position in each axis [m]
+    displacement  (N, 2) between the two scans [m];  deviation  (N,) of the position in each axis [m]
     """
 
     boxes: Array

@@ -73,7 +73,7 @@ class ScanHistory:
 
         foot  height of the ground below the origin of the frame [m]
         """
-        points = np.concatenate([cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3] for cloud in clouds])
+        points = np.concatenate([cloud.world_points for cloud in clouds])
         points[:, :2] = frame.to_local(points[:, :2])
         intensity = np.concatenate([cloud.intensity for cloud in clouds], dtype=float)
         height = points[:, 2] - ground_height(points, foot)
