@@ -119,8 +119,8 @@ def test_ego_detects_what_the_roadside_unit_sees(fusion: str, tmp_path: Path) ->
     steps = frames[-1].steps
     seen = steps["RSU"].detections.boxes
     shares = [
-        (iou_bev(found.boxes, seen).max(axis=0) > SAME_OBJECT).mean()
-        for found in (steps["Ego"].detections, steps["Ego"].fused)
+        (iou_bev(detections.boxes, seen).max(axis=0) > SAME_OBJECT).mean()
+        for detections in (steps["Ego"].detections, steps["Ego"].fused)
     ]
     assert shares[0] < 0.5
     assert shares[1] > 0.8, "all but the ego, and some of several overlapping boxes, of which each keeps another one"

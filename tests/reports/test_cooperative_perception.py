@@ -27,42 +27,42 @@ from eidrive_scenario.perception.localization import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
 
-Place = tuple[float, float, float]
+Pose = tuple[float, float, float]
 NAME = "condition"
 ORIGIN = np.zeros(2)
 
 
-def boxes(*places: Place) -> Array:
+def boxes(*poses: Pose) -> Array:
     """Return boxes of 4.5 m x 2 m at x, y and yaw."""
-    return np.array([(x, y, 0.75, 4.5, 2.0, 1.5, yaw) for x, y, yaw in places]).reshape(-1, 7)
+    return np.array([(x, y, 0.75, 4.5, 2.0, 1.5, yaw) for x, y, yaw in poses]).reshape(-1, 7)
 
 
-def detected(places: list[Place], scores: list[float]) -> Detections:
-    count = len(places)
+def detected(poses: list[Pose], scores: list[float]) -> Detections:
+    count = len(poses)
     none = np.full((count, 2), np.nan)
-    return Detections(0.0, boxes(*places), np.array(scores), ("car",) * count, none, np.full((count, 2, 2), np.nan))
+    return Detections(0.0, boxes(*poses), np.array(scores), ("car",) * count, none, np.full((count, 2, 2), np.nan))
 
 
-def truth(*places: Place, hit: bool = True, hidden: bool = False) -> Truth:
-    found = boxes(*places)
-    every = np.ones(len(found), dtype=bool)
-    return Truth(found, range_classes(found, ORIGIN), every & hit, every & hidden)
+def truth(*poses: Pose, hit: bool = True, hidden: bool = False) -> Truth:
+    bodies = boxes(*poses)
+    every = np.ones(len(bodies), dtype=bool)
+    return Truth(bodies, range_classes(bodies, ORIGIN), every & hit, every & hidden)
 
 
 def record(*frames: tuple[Detections, Truth]) -> PerceptionRecord:
-    samples = [sample_codes(found, objects, ORIGIN) for found, objects in frames]
+    samples = [sample_codes(detections, objects, ORIGIN) for detections, objects in frames]
     truths = [objects for _, objects in frames]
-    places = np.concatenate([objects.range_classes[objects.counted] for objects in truths])
+    counted = np.concatenate([objects.range_classes[objects.counted] for objects in truths])
     hit = np.concatenate([objects.range_classes[objects.counted & objects.hit] for objects in truths])
-    hidden_places = np.concatenate([objects.range_classes[objects.counted & objects.hidden] for objects in truths])
+    hidden = np.concatenate([objects.range_classes[objects.counted & objects.hidden] for objects in truths])
     tally = Tally(
         b"".join(scores.astype("<u2").tobytes() for scores, _, _ in samples),
         b"".join(codes.astype("<u2").tobytes() for _, codes, _ in samples),
-        tuple(map(tuple, np.sum([hidden for _, _, hidden in samples], axis=0).tolist())),
+        tuple(map(tuple, np.sum([by_range for _, _, by_range in samples], axis=0).tolist())),
         0.5,
     )
     counts, hits, unseen = (
-        tuple(int(one) for one in np.bincount(group, minlength=len(RANGES))) for group in (places, hit, hidden_places)
+        tuple(np.bincount(classes, minlength=len(RANGES)).tolist()) for classes in (counted, hit, hidden)
     )
     return PerceptionRecord(len(frames), counts, hits, unseen, {NAME: tally})
 
@@ -88,9 +88,9 @@ GOLDEN = (
 
 def test_golden_frames_have_the_precision_of_opencood() -> None:
     pool = Pool([record(*GOLDEN)], NAME)
-    found = [pool.precision(overlap) for overlap in range(3)]
-    assert [round(one.value, 4) for one in found] == [0.9, 0.9, 0.65], "all detections sorted by score"
-    assert [round(one.local, 4) for one in found] == [0.8542, 0.8542, 0.5], "sorted within each frame only"
+    areas = [pool.precision(overlap) for overlap in range(3)]
+    assert [round(area.value, 4) for area in areas] == [0.9, 0.9, 0.65], "all detections sorted by score"
+    assert [round(area.local, 4) for area in areas] == [0.8542, 0.8542, 0.5], "sorted within each frame only"
 
 
 @pytest.mark.parametrize(
@@ -102,10 +102,10 @@ def test_shifted_box_is_correct_up_to_the_law(shift: float, expected: list[int])
 
 
 def test_correct_detections_count_in_the_range_of_their_objects() -> None:
-    found = detected([(30.2, 0.0, 0.0), (60.0, 0.0, 0.0), (0.0, 99.0, 0.0)], [0.9, 0.8, 0.7])
-    pool = Pool([record((found, truth((29.9, 0.0, 0.0), (0.0, 40.0, 0.0), (0.0, 99.0, 0.0))))], NAME)
-    assert [pool.precision(1, place).value for place in range(3)] == [1.0, 0.0, 0.5]
-    assert [pool.precision(1, place).objects for place in range(3)] == [1, 1, 1]
+    detections = detected([(30.2, 0.0, 0.0), (60.0, 0.0, 0.0), (0.0, 99.0, 0.0)], [0.9, 0.8, 0.7])
+    pool = Pool([record((detections, truth((29.9, 0.0, 0.0), (0.0, 40.0, 0.0), (0.0, 99.0, 0.0))))], NAME)
+    assert [pool.precision(1, range_class).value for range_class in range(3)] == [1.0, 0.0, 0.5]
+    assert [pool.precision(1, range_class).objects for range_class in range(3)] == [1, 1, 1]
 
 
 def test_objects_and_detections_beyond_the_last_range_are_ignored() -> None:
@@ -118,8 +118,8 @@ def test_objects_and_detections_beyond_the_last_range_are_ignored() -> None:
 def test_farther_range_classes_are_ignored() -> None:
     """Within 50 m one of two objects is found, and the wrong detection there has the higher score."""
     near, far = (10.0, 0.0, 0.0), (60.0, 0.0, 0.0)
-    found = detected([near, far, (0.0, 40.0, 0.0), (0.0, 70.0, 0.0)], [0.5, 0.6, 0.9, 0.95])
-    records = [record((found, truth(near, far, (20.0, 0.0, 0.0), hidden=True)))]
+    detections = detected([near, far, (0.0, 40.0, 0.0), (0.0, 70.0, 0.0)], [0.5, 0.6, 0.9, 0.95])
+    records = [record((detections, truth(near, far, (20.0, 0.0, 0.0), hidden=True)))]
     within = Pool(records, NAME, 2)
     assert (within.precision(1).value, within.precision(1).objects) == (0.25, 2)
     assert within.precision_of_hit_objects().value == 0.25
@@ -141,10 +141,11 @@ def test_second_truth_contains_hit_objects_only() -> None:
 
 def test_recall_of_hidden_objects() -> None:
     hidden = truth((10.0, 0.0, 0.0), (20.0, 0.0, 0.0), hidden=True)
-    found = detected([(10.0, 0.0, 0.0), (21.0, 0.0, 0.0)], [0.1, 0.9])
-    pool = Pool([record((found, hidden))], NAME)
+    detections = detected([(10.0, 0.0, 0.0), (21.0, 0.0, 0.0)], [0.1, 0.9])
+    pool = Pool([record((detections, hidden))], NAME)
     recalls = [pool.hidden_recall(overlap) for overlap in range(3)]
-    assert [(one.detected, one.objects, one.value) for one in recalls] == [(2, 2, 1.0), (2, 2, 1.0), (1, 2, 0.5)]
+    assert [(recall.detected, recall.objects) for recall in recalls] == [(2, 2), (2, 2), (1, 2)]
+    assert [recall.value for recall in recalls] == [1.0, 1.0, 0.5]
     assert math.isnan(Pool([record(GOLDEN[0])], NAME).hidden_recall(0).value)
 
 
@@ -157,8 +158,8 @@ def test_precision_of_equal_scores_does_not_depend_on_the_order_of_frames() -> N
 
 def test_detections_of_one_score_count_in_their_own_ranges() -> None:
     """The second detection overlaps its object more and takes part first; the first one is wrong and beyond 50 m."""
-    found = detected([(60.0, 0.0, 0.0), (10.0, 0.0, 0.0)], [0.9, 0.9])
-    pool = Pool([record((found, truth((10.0, 0.0, 0.0))))], NAME)
+    detections = detected([(60.0, 0.0, 0.0), (10.0, 0.0, 0.0)], [0.9, 0.9])
+    pool = Pool([record((detections, truth((10.0, 0.0, 0.0))))], NAME)
     assert (pool.precision(1, 0).value, pool.precision(1).value) == (1.0, 0.5)
 
 
@@ -166,8 +167,8 @@ def test_interval_follows_from_runs_without_each_other() -> None:
     """Runs with precisions 1 and 0: without one of them the precision is 0 or 1. One run has no interval."""
     good = record((detected([(10.0, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0))))
     bad = record((detected([], []), truth((10.0, 0.0, 0.0))))
-    one = Pool([good, bad], NAME).precision(1)
-    assert (one.value, one.low, one.high) == (0.5, 0.0, 1.0)
+    both = Pool([good, bad], NAME).precision(1)
+    assert (both.value, both.low, both.high) == (0.5, 0.0, 1.0)
     same = Pool([record(*GOLDEN)] * 3, NAME).precision(2)
     assert (same.low, same.high) == pytest.approx((0.65, 0.65)), "equal runs have no spread"
     alone = Pool([good], NAME)
@@ -182,37 +183,38 @@ def test_interval_of_runs_that_all_find_everything_is_wilsons() -> None:
     bad = record((detected([], []), hidden))
     for runs, low, high in (([good] * 10, 0.722, 1.0), ([bad] * 10, 0.0, 0.278)):
         pool = Pool(runs, NAME)
-        for one in (pool.precision(1), pool.hidden_recall(1)):
-            assert (one.low, one.high) == pytest.approx((low, high), abs=1e-3)
+        for share in (pool.precision(1), pool.hidden_recall(1)):
+            assert (share.low, share.high) == pytest.approx((low, high), abs=1e-3)
+
+
+BEFORE = EgoState(0.0, np.array([2.0, 1.0, 0.0]), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+AFTER = EgoState(0.0, np.array([2.5, 0.5, 0.0]), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Two poses of one station."""
 
 
 def test_moved_detections_keep_their_place_relative_to_the_station() -> None:
-    found = detected([(12.0, 3.0, 0.4)], [0.9])
-    before = EgoState(0.0, np.array([2.0, 1.0, 0.0]), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
-    after = EgoState(0.0, np.array([2.5, 0.5, 0.0]), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
-    there = move_detections(found, before, after)
+    detections = detected([(12.0, 3.0, 0.4)], [0.9])
+    there = move_detections(detections, BEFORE, AFTER)
     assert there.boxes[0, 6] == pytest.approx(0.6)
-    assert np.linalg.norm(there.boxes[0, :2] - after.position[:2]) == pytest.approx(math.hypot(10.0, 2.0))
-    assert move_detections(there, after, before).boxes == pytest.approx(found.boxes)
+    assert np.linalg.norm(there.boxes[0, :2] - AFTER.position[:2]) == pytest.approx(math.hypot(10.0, 2.0))
+    assert move_detections(there, AFTER, BEFORE).boxes == pytest.approx(detections.boxes)
 
 
 def test_moved_features_keep_their_objects_in_the_same_cells() -> None:
-    before = EgoState(0.0, np.array([2.0, 1.0, 0.0]), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
-    after = EgoState(0.0, np.array([2.5, 0.5, 0.0]), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0)
     none = np.zeros((1, 4, 4), np.float32)
     features = FeatureMap(0.0, 2.4, 0.8, 0.0, 1.9, 0.0, 0.8, none, none, none[0])
     objects = detected([(12.0, 3.0, 0.4)], [0.9])
-    there = move_features(features, before, after)
-    first, second = (Grid(one.x, one.y, one.yaw, one.cell, (4, 4)) for one in (features, there))
-    places = second.to_places(move_detections(objects, before, after).boxes[:, :2])
-    assert places == pytest.approx(first.to_places(objects.boxes[:, :2]))
+    there = move_features(features, BEFORE, AFTER)
+    first, second = (Grid(held.x, held.y, held.yaw, held.cell, (4, 4)) for held in (features, there))
+    cells = second.to_coordinates(move_detections(objects, BEFORE, AFTER).boxes[:, :2])
+    assert cells == pytest.approx(first.to_coordinates(objects.boxes[:, :2]))
     assert (there.x, there.y, there.yaw) != (features.x, features.y, features.yaw)
 
 
 def test_pose_error_lowers_the_precision_at_the_larger_overlap_first() -> None:
     """Fifty cars, all reported by a station with a pose error. Below a shift of 0.2 m all overlaps are above 0.7."""
-    places = [(10.0 * number % 80, 5.0 * (number // 8), 0.3 * number) for number in range(50)]
-    exact, objects = detected(places, [0.9] * 50), truth(*places)
+    poses = [(10.0 * number % 80, 5.0 * (number // 8), 0.3 * number) for number in range(50)]
+    exact, objects = detected(poses, [0.9] * 50), truth(*poses)
     ego = EgoState(0.0, np.array([40.0, 15.0, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def at(deviation: float) -> list[float]:
@@ -233,11 +235,16 @@ def test_pose_error_lowers_the_precision_at_the_larger_overlap_first() -> None:
 
 def test_properties_are_those_of_all_stations() -> None:
     root = etree.fromstring(with_properties("coop/scenario_4", {"detector": "lidar", "tracker": "none"}))
-    stations = [held for held in root.iter("Properties") if any(one.get("value") == "eidrive" for one in held)]
+    stations = [
+        properties
+        for properties in root.iter("Properties")
+        if any(entry.get("value") == "eidrive" for entry in properties)
+    ]
     assert len(stations) == 4
-    for held in stations:
-        values = [(one.get("name"), one.get("value")) for one in held if one.get("name") in ("detector", "tracker")]
-        assert sorted(values) == [("detector", "lidar"), ("tracker", "none")]
+    for properties in stations:
+        values = {entry.get("name"): entry.get("value") for entry in properties}
+        assert len(values) == len(properties)
+        assert (values["detector"], values["tracker"]) == ("lidar", "none")
 
 
 def faulty(arm: str) -> list[Condition]:
@@ -257,15 +264,15 @@ def trial() -> PerceptionRecord:
 def test_no_fusion_is_equal_under_all_faults(trial: PerceptionRecord) -> None:
     alone = trial.tallies[Condition("none").name]
     assert len(alone.scores) > 0
-    assert all(trial.tallies[one.name] == alone for one in faulty("none"))
+    assert all(trial.tallies[condition.name] == alone for condition in faulty("none"))
 
 
 def test_messages_find_objects_hidden_to_the_ego(trial: PerceptionRecord) -> None:
     assert trial.frames == 1
     assert sum(trial.hidden) > 0
-    found = {arm: sum(trial.tallies[Condition(arm).name].hidden[0]) for arm in ("none", "average", "early")}
-    assert found["none"] == 0
-    assert min(found["average"], found["early"]) > 0
+    hidden = {arm: sum(trial.tallies[Condition(arm).name].hidden[0]) for arm in ("none", "average", "early")}
+    assert hidden["none"] == 0
+    assert min(hidden["average"], hidden["early"]) > 0
 
 
 def test_points_need_more_bytes_than_boxes_and_no_fusion_none(trial: PerceptionRecord) -> None:

@@ -22,20 +22,20 @@ CORRECT = 0b11_001_001_001
 """Code of a detection that is correct at all overlaps and for both truths, in the first range."""
 
 
-def tally(found: int, size: float) -> Tally:
+def tally(detected: int, size: float) -> Tally:
     """Return this number of correct detections, and hidden objects of which half are found."""
-    scores, codes = np.full(found, 60_000, dtype="<u2"), np.full(found, CORRECT, dtype="<u2")
+    scores, codes = np.full(detected, 60_000, dtype="<u2"), np.full(detected, CORRECT, dtype="<u2")
     return Tally(scores.tobytes(), codes.tobytes(), ((2, 0, 0), (2, 0, 0), (1, 0, 0)), size)
 
 
 def episodes(study: Study) -> list[Episode]:
     """Return two runs with ten objects: eight found with features, seven with other messages, four without."""
     tallies = {
-        one.name: tally(
-            8 if ARMS[one.arm].shares == "features" else 7 if ARMS[one.arm].cooperates else 4,
-            {"early": 0.5, "none": 0.0}.get(one.arm, 0.01),
+        condition.name: tally(
+            8 if ARMS[condition.arm].shares == "features" else 7 if ARMS[condition.arm].cooperates else 4,
+            {"early": 0.5, "none": 0.0}.get(condition.arm, 0.01),
         )
-        for one in study.conditions
+        for condition in study.conditions
     }
     measured = PerceptionRecord(5, (10, 0, 20), (9, 0, 0), (4, 0, 0), tallies)
     return [
@@ -108,7 +108,7 @@ def test_conditions_are_part_of_the_digest(study: Study) -> None:
     settings = RunSettings(detector="lidar")
     digests = {job_digest("coop/scenario_4", settings, conditions=conditions[:count]) for count in (0, 1, 2)}
     assert len(digests) == 3
-    assert len({one.name for one in conditions}) == len(conditions)
+    assert len({condition.name for condition in conditions}) == len(conditions)
 
 
 def curves(study: Study, arms: dict[str, list[float]], *, steeper: float) -> list[Row]:

@@ -15,9 +15,9 @@ PAGE = (Path(__file__).parents[3] / "docs" / "cooperative_perception.md").read_t
 
 
 def example() -> str:
-    found = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None
-    return found[1]
+    match = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert match is not None
+    return match[1]
 
 
 def test_documented_method_has_at_most_thirty_lines() -> None:

@@ -81,7 +81,7 @@ def test_merge_readings_keeps_world_positions_of_received_points() -> None:
     own = readings(0.0, (1.0, 2.0, 0.3))
     fusion.add_payload("RSU", cloud, np.array([100.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0]))
     merged = fusion.merge_readings(own).lidars["lidar"]
-    world = merged.points @ merged.pose[:3, :3].T + merged.pose[:3, 3]
+    world = merged.world_points
     count = len(own.lidars["lidar"].points)
     np.testing.assert_array_equal(merged.points[:count], own.lidars["lidar"].points)
     np.testing.assert_allclose(world[count:], cloud.points(), atol=1e-9)
@@ -105,12 +105,12 @@ def test_early_fusion_separates_far_cars_in_adjacent_lanes() -> None:
     """Both are near a unit and 76 m from the ego, where the columns of the ego rays are 3 m apart."""
     cars = (76.0, 4.0), (76.0, 7.2)
     ego, rsu = agent(EGO, sensors={"lidar": {"range": 100.0}}), agent(RSU)
-    points = [car(*place, "fblr") for place in cars]
+    points = [car(*position, "fblr") for position in cars]
     sent = rsu.act(readings(0.0, (96.0, 5.6, math.pi), *points), (), 0.0, None).outbox
     fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(sent[0], 0.05)], 0.05, None).fused
-    found = sorted(map(tuple, fused.boxes[:, :2].tolist()))
-    assert len(found) == 2
-    assert max(math.dist(one, place) for one, place in zip(found, sorted(cars), strict=True)) < 0.3
+    centers = sorted(map(tuple, fused.boxes[:, :2].tolist()))
+    assert len(centers) == 2
+    assert max(map(math.dist, centers, sorted(cars))) < 0.3
 
 
 def test_early_fusion_box_from_several_sides_is_more_accurate() -> None:

@@ -58,7 +58,7 @@ def received(messages: Sequence[Message], time: float) -> list[ReceivedMessage]:
     return [ReceivedMessage(message, time) for message in messages]
 
 
-def places(boxes: np.ndarray) -> list[tuple[float, float]]:
+def positions(boxes: np.ndarray) -> list[tuple[float, float]]:
     return sorted(map(tuple, boxes[:, :2].tolist()))
 
 
@@ -82,8 +82,8 @@ def own_objects(time: float, inbox: Sequence[Message], earlier: Sequence[Message
 
 def near(boxes: np.ndarray, *expected: tuple[float, float]) -> bool:
     """Return whether there are boxes at all of these places and nowhere else, within two cells."""
-    found = boxes[:, None, :2] - np.array(expected).reshape(-1, 2)
-    within = np.hypot(found[..., 0], found[..., 1]) <= 2.0 * CELL
+    offsets = boxes[:, None, :2] - np.array(expected).reshape(-1, 2)
+    within = np.hypot(offsets[..., 0], offsets[..., 1]) <= 2.0 * CELL
     return bool(within.any(axis=0).all() and within.any(axis=1).all())
 
 
@@ -172,37 +172,40 @@ def test_poses_as_stated_and_as_assumed_place_the_features() -> None:
     assert near(fused(shifted), (23.2, 4.0))
 
 
-def test_shared_boxes_correct_the_pose_of_the_sender() -> None:
-    """The sender is 1.6 m off and states that. Four objects that both see show it; the fifth is seen by it alone."""
-    common = [(20.0, 4.0), (12.0, -9.0), (-15.0, -8.0), (25.0, 16.0)]
-    off = (THERE[0] + 1.6, THERE[1], THERE[2])
+COMMON = ((20.0, 4.0), (12.0, -9.0), (-15.0, -8.0), (25.0, 16.0))
+"""Objects that both stations see."""
+
+
+def displaced(time: float, hidden: tuple[float, float], **more: Any) -> list[Message]:
+    """Return the messages of a station that is 1.6 m off, states that, and sees another object."""
+    points = [(x + 1.6, y) for x, y in (*COMMON, hidden)]
     covariance = np.diag([0.64, 0.64, math.radians(0.4) ** 2])
-    points = [(x + 1.6, y) for x, y in [*common, (30.0, -4.0)]]
-    messages = sent(MASTS[0], 0.0, *points, at=off, fusion="where2comm")
-    stated = [replace(each, state=replace(each.state, pose_covariance=covariance)) for each in messages]
-    for align_poses, place in ((False, 31.6), (True, 30.0)):
+    messages = sent(MASTS[0], time, *points, at=(THERE[0] + 1.6, *THERE[1:]), **more)
+    return [replace(message, state=replace(message.state, pose_covariance=covariance)) for message in messages]
+
+
+def test_shared_boxes_correct_the_pose_of_the_sender() -> None:
+    """Four objects that both see show the error; the fifth is seen by the sender alone."""
+    stated = displaced(0.0, (30.0, -4.0), fusion="where2comm")
+    for align_poses, x in ((False, 31.6), (True, 30.0)):
         ego = agent(EGO, fusion_settings={"align_poses": align_poses})
-        ego.act(readings(0.05, HERE, *common), received(stated[:1], 0.05), 0.05, None)
-        step = ego.act(readings(0.1, HERE, *common), received(stated[1:], 0.1), 0.1, None)
-        found = step.fused.boxes[:, :2]
-        alone = found[np.hypot(found[:, 0] - place, found[:, 1] + 4.0) < 3.0]
-        assert abs(alone.mean(axis=0)[0] - place) < 0.6, align_poses
+        ego.act(readings(0.05, HERE, *COMMON), received(stated[:1], 0.05), 0.05, None)
+        step = ego.act(readings(0.1, HERE, *COMMON), received(stated[1:], 0.1), 0.1, None)
+        centers = step.fused.boxes[:, :2]
+        alone = centers[np.hypot(centers[:, 0] - x, centers[:, 1] + 4.0) < 3.0]
+        assert abs(alone.mean(axis=0)[0] - x) < 0.6, align_poses
 
 
 def test_shared_boxes_with_features_correct_boxes_without() -> None:
     """As above, but the fifth object is beyond the grid of the receiver, so that only its box reports it."""
-    common = [(20.0, 4.0), (12.0, -9.0), (-15.0, -8.0), (25.0, 16.0)]
-    covariance = np.diag([0.64, 0.64, math.radians(0.4) ** 2])
-    points = [(x + 1.6, y) for x, y in [*common, (80.0, -4.0)]]
-    for align_poses, place in ((False, 81.6), (True, 80.0)):
+    for align_poses, x in ((False, 81.6), (True, 80.0)):
         ego = agent(EGO, fusion_settings={"align_poses": align_poses})
         for tick in range(1, 5):
-            messages = sent(MASTS[0], 0.05 * tick, *points, at=(THERE[0] + 1.6, THERE[1], THERE[2]))
-            stated = [replace(each, state=replace(each.state, pose_covariance=covariance)) for each in messages]
-            step = ego.act(readings(0.05 * tick, HERE, *common), received(stated, 0.05 * tick), 0.05 * tick, None)
+            stated = displaced(0.05 * tick, (80.0, -4.0))
+            step = ego.act(readings(0.05 * tick, HERE, *COMMON), received(stated, 0.05 * tick), 0.05 * tick, None)
         far = step.fused.boxes[step.fused.boxes[:, 0] > 60.0]
         assert len(far) == 1
-        assert abs(far[0, 0] - place) < CELL, align_poses
+        assert abs(far[0, 0] - x) < CELL, align_poses
 
 
 def test_lost_frame_costs_its_cells_only() -> None:
@@ -212,9 +215,10 @@ def test_lost_frame_costs_its_cells_only() -> None:
     grids = {message.number: message.features for message in messages if message.features is not None}
     holding = [number for number, frame in grids.items() if (frame.integers[0] > 0).any()]
     assert len(holding) == 2
-    everything = set(places(fused(messages)))
-    found = {n: set(places(fused([each for each in messages if each.number != n]))) for n in holding}
-    first, second = found.values()
+    everything = set(positions(fused(messages)))
+    first, second = (
+        set(positions(fused([message for message in messages if message.number != lost]))) for lost in holding
+    )
     assert first != everything != second
     assert first | second == everything
     assert len(first) >= 8
@@ -426,8 +430,7 @@ def test_twenty_senders_are_fused() -> None:
         for mast, point in zip(MASTS, points, strict=True)
         for message in sent(mast, 0.0, point, at=(point[0], 20.0, 0.1 * point[0]), fusion="where2comm")[1:]
     ]
-    found = fused(inbox)
-    assert near(found, *points)
+    assert near(fused(inbox), *points)
 
 
 def test_sender_reports_its_own_objects_only() -> None:

@@ -39,10 +39,10 @@ def state_of(
     return StationState(time, SENDER[0] + error[0], SENDER[1] + error[1], 0.0, error[2], 0.0, covariance)
 
 
-def displaced(places: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Return places (N, 2) as the sender reports them with this error of its pose."""
+def displaced(positions: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Return positions (N, 2) as the sender reports them with this error of its pose."""
     cos, sin = math.cos(error[2]), math.sin(error[2])
-    return np.asarray((places - SENDER) @ np.array([[cos, sin], [-sin, cos]]) + SENDER + error[:2])
+    return np.asarray((positions - SENDER) @ np.array([[cos, sin], [-sin, cos]]) + SENDER + error[:2])
 
 
 def scattered(count: int, *names: str | int) -> np.ndarray:
@@ -50,14 +50,14 @@ def scattered(count: int, *names: str | int) -> np.ndarray:
     return generator(5, "layout", *names).uniform(-40.0, 40.0, (count, 2))
 
 
-def pairs_of(places: np.ndarray, measured: np.ndarray, deviation: float, prior: np.ndarray) -> _Candidates:
+def pairs_of(positions: np.ndarray, measured: np.ndarray, deviation: float, prior: np.ndarray) -> _Candidates:
     """Return the known pairs of objects, measured by the sender, without headings."""
-    count = len(places)
+    count = len(positions)
     return _Candidates(
         np.arange(count),
         np.arange(count),
         measured - SENDER,
-        measured - places,
+        measured - positions,
         np.broadcast_to(deviation**2 * np.eye(2), (count, 2, 2)).copy(),
         np.zeros(count),
         np.full(count, np.inf),
@@ -77,30 +77,30 @@ def align_cars(
 def test_estimated_error_with_wide_prior_equals_closed_form(count: int) -> None:
     """Without a prior the rotation of equal weights is that of Kabsch's method in the plane, about both means."""
     rng = generator(6, "closed form", count)
-    places = scattered(count, "closed form")
-    measured = displaced(places, np.array([3.0, -2.0, 0.4])) + rng.normal(size=(count, 2)) * 0.3
-    a, b = measured - measured.mean(axis=0), places - places.mean(axis=0)
+    positions = scattered(count, "closed form")
+    measured = displaced(positions, np.array([3.0, -2.0, 0.4])) + rng.normal(size=(count, 2)) * 0.3
+    a, b = measured - measured.mean(axis=0), positions - positions.mean(axis=0)
     yaw = -math.atan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
     cos, sin = math.cos(yaw), math.sin(yaw)
     # The sender is corrected by the motion that moves the mean of the measured objects to that of the true ones.
-    corrected = places.mean(axis=0) + (SENDER - measured.mean(axis=0)) @ np.array([[cos, -sin], [sin, cos]])
-    error, _, _ = estimate_error(pairs_of(places, measured, 0.3, np.diag([1e8, 1e8, 1e8])), np.arange(count))
+    corrected = positions.mean(axis=0) + (SENDER - measured.mean(axis=0)) @ np.array([[cos, -sin], [sin, cos]])
+    error, _, _ = estimate_error(pairs_of(positions, measured, 0.3, np.diag([1e8, 1e8, 1e8])), np.arange(count))
     assert error == pytest.approx([*(SENDER - corrected), yaw], abs=1e-6)
 
 
 def test_covariance_of_symmetric_layout_equals_inverse_information() -> None:
     """Objects at distance d in all four directions inform on x, y and yaw separately: n/s², n/s² and n d²/s²."""
     distance, deviation, prior = 20.0, 0.2, np.diag(np.square(PRIOR))
-    places = SENDER + distance * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-    _, covariance, _ = estimate_error(pairs_of(places, places, deviation, prior), np.arange(4))
+    positions = SENDER + distance * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    _, covariance, _ = estimate_error(pairs_of(positions, positions, deviation, prior), np.arange(4))
     information = np.array([4.0, 4.0, 4.0 * distance**2]) / deviation**2 + 1.0 / np.diag(prior)
     assert covariance == pytest.approx(np.diag(1.0 / information), abs=1e-12)
     rng = generator(6, "information")
     squared = []
     for _ in range(300):
         truth = rng.normal(size=3) * PRIOR
-        measured = displaced(places, truth) + rng.normal(size=(4, 2)) * deviation
-        error, claimed, _ = estimate_error(pairs_of(places, measured, deviation, prior), np.arange(4))
+        measured = displaced(positions, truth) + rng.normal(size=(4, 2)) * deviation
+        error, claimed, _ = estimate_error(pairs_of(positions, measured, deviation, prior), np.arange(4))
         squared.append((error - truth) @ np.linalg.solve(claimed, error - truth))
     # The mean of 300 chi-squares of 3 degrees is 3 with a standard deviation of sqrt(6 / 300).
     assert np.mean(squared) == pytest.approx(3.0, abs=3.0 * math.sqrt(6.0 / 300.0))
@@ -118,15 +118,15 @@ def test_recovery_of_drawn_errors_equals_published_one(count: int, position: flo
     deviations = 0.4, 0.4, math.radians(0.4)
     errors = []
     for trial in range(200):
-        places, yaws = scattered(count, trial), rng.uniform(-math.pi, math.pi, count)
+        positions, yaws = scattered(count, trial), rng.uniform(-math.pi, math.pi, count)
         truth = rng.normal(size=3) * deviations
         own, other = (
             report(name, 0.0, seen, yaw=axes + np.radians(rng.normal(size=count) * 2.0), covariance=0.01, state=state)
             for name, seen, axes, state in (
-                ("A", places + rng.normal(size=(count, 2)) * 0.1, yaws, None),
+                ("A", positions + rng.normal(size=(count, 2)) * 0.1, yaws, None),
                 (
                     "B",
-                    displaced(places, truth) + rng.normal(size=(count, 2)) * 0.1,
+                    displaced(positions, truth) + rng.normal(size=(count, 2)) * 0.1,
                     yaws + truth[2],
                     state_of(truth, deviations),
                 ),
@@ -139,10 +139,10 @@ def test_recovery_of_drawn_errors_equals_published_one(count: int, position: flo
 
 
 def test_exact_pose_is_not_corrected(report: Make) -> None:
-    places = scattered(8)
+    positions = scattered(8)
     for deviations in (None, (0.0, 0.0, 0.0)):
-        sent = report("B", 0.0, places + 0.3, state=state_of(ERROR, deviations))
-        alignment = align_pose(report("own", 0.0, places).detections, sent)
+        sent = report("B", 0.0, positions + 0.3, state=state_of(ERROR, deviations))
+        alignment = align_pose(report("own", 0.0, positions).detections, sent)
         assert not alignment.is_corrected
         assert (alignment.error == 0.0).all()
         assert (alignment.covariance == 0.0).all()
@@ -151,27 +151,27 @@ def test_exact_pose_is_not_corrected(report: Make) -> None:
 
 def test_exact_coordinate_stays_exact(report: Make) -> None:
     """Only x has an error: y and yaw stay as they are, although boxes differ in them."""
-    places = scattered(8)
+    positions = scattered(8)
     alignment = align_cars(
-        report, places, places + np.array([0.4, 0.1]), state_of(np.array([0.4, 0.0, 0.0]), (0.5, 0.0, 0.0))
+        report, positions, positions + np.array([0.4, 0.1]), state_of(np.array([0.4, 0.0, 0.0]), (0.5, 0.0, 0.0))
     )
     assert alignment.error[0] == pytest.approx(0.4, abs=0.05)
     assert alignment.error[1:] == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
 def test_report_at_corrected_pose_has_true_objects(report: Make) -> None:
-    places = scattered(12)
+    positions = scattered(12)
     sent = report(
         "B",
         0.0,
-        displaced(places, ERROR),
+        displaced(positions, ERROR),
         yaw=ERROR[2] + 0.7,
         velocity=(3.0, 4.0),
         covariance=np.diag([0.04, 0.01]),
         state=state_of(ERROR),
     )
     moved = aligned_report(sent, PoseAlignment((*SENDER, 0.0), ERROR, np.eye(3), 12))
-    assert moved.detections.boxes[:, :2] == pytest.approx(places, abs=1e-12)
+    assert moved.detections.boxes[:, :2] == pytest.approx(positions, abs=1e-12)
     assert moved.detections.boxes[:, 6] == pytest.approx(np.full(12, 0.7), abs=1e-12)
     turned = np.array([3.0 + 4.0 * ERROR[2], 4.0 - 3.0 * ERROR[2]])
     assert moved.detections.velocity[0] == pytest.approx(turned, abs=1e-3)
@@ -181,21 +181,21 @@ def test_report_at_corrected_pose_has_true_objects(report: Make) -> None:
 
 
 def test_reversed_headings_do_not_change_the_correction(report: Make) -> None:
-    places = scattered(6)
+    positions = scattered(6)
     yaws = np.linspace(-3.0, 3.0, 6)
     results = []
     for turned in (0.0, math.pi):
-        sent = report("B", 0.0, displaced(places, ERROR), yaw=wrap_angle(yaws + turned), state=state_of(ERROR))
-        results.append(align_pose(report("own", 0.0, places, yaw=yaws).detections, sent).error)
+        sent = report("B", 0.0, displaced(positions, ERROR), yaw=wrap_angle(yaws + turned), state=state_of(ERROR))
+        results.append(align_pose(report("own", 0.0, positions, yaw=yaws).detections, sent).error)
     assert results[0] == pytest.approx(results[1], abs=1e-12)
 
 
 def test_boxes_across_their_object_do_not_turn_the_pose(report: Make) -> None:
     """Boxes of few points may lie across their object: their heading is ignored, their position is not."""
-    places = scattered(6)
+    positions = scattered(6)
     yaws = np.array([0.0, 0.0, 0.0, 0.5, 0.5, 1.0])
-    sent = report("B", 0.0, displaced(places, ERROR), yaw=yaws + 1.2, state=state_of(ERROR))
-    alignment = align_pose(report("own", 0.0, places, yaw=yaws).detections, sent)
+    sent = report("B", 0.0, displaced(positions, ERROR), yaw=yaws + 1.2, state=state_of(ERROR))
+    alignment = align_pose(report("own", 0.0, positions, yaw=yaws).detections, sent)
     assert alignment.shared == 6
     assert alignment.error == pytest.approx(ERROR, abs=0.05)
 
@@ -214,20 +214,20 @@ def test_no_common_object_leaves_the_pose(report: Make) -> None:
 @pytest.mark.parametrize("trial", range(5))
 def test_objects_of_one_station_and_displaced_ones_are_ignored(trial: int, report: Make) -> None:
     rng = generator(8, "outliers", trial)
-    places, lone, hidden = (scattered(count, trial, name) for count, name in ((8, "both"), (8, "own"), (8, "other")))
-    others = displaced(np.concatenate([places, hidden]), ERROR) + rng.normal(size=(16, 2)) * 0.1
+    positions, lone, hidden = (scattered(count, trial, name) for count, name in ((8, "both"), (8, "own"), (8, "other")))
+    others = displaced(np.concatenate([positions, hidden]), ERROR) + rng.normal(size=(16, 2)) * 0.1
     others[:2] += (1.5, 1.0)
-    alignment = align_cars(report, np.concatenate([places, lone]), others, state_of(ERROR))
+    alignment = align_cars(report, np.concatenate([positions, lone]), others, state_of(ERROR))
     assert alignment.error[:2] == pytest.approx(ERROR[:2], abs=0.25)
     assert math.degrees(abs(alignment.error[2] - ERROR[2])) < 0.5
 
 
 def test_moving_objects_are_predicted_to_the_time_of_a_late_report(report: Make) -> None:
     """Cars drive 6 m in the 0.4 s between both measurements, in two directions."""
-    places = scattered(8)
+    positions = scattered(8)
     velocity = np.array([(15.0, 0.0), (-15.0, 0.0)] * 4)
-    own = report("own", 1.4, places + 0.4 * velocity, velocity=velocity)
-    sent = report("B", 1.0, displaced(places, ERROR), velocity=velocity, state=state_of(ERROR, time=1.0))
+    own = report("own", 1.4, positions + 0.4 * velocity, velocity=velocity)
+    sent = report("B", 1.0, displaced(positions, ERROR), velocity=velocity, state=state_of(ERROR, time=1.0))
     alignment = align_pose(own.detections, sent)
     assert alignment.shared == 8
     assert alignment.error == pytest.approx(ERROR, abs=0.1)
@@ -259,9 +259,9 @@ def test_symmetric_crossing_is_not_rotated(report: Make) -> None:
 
 
 def test_cars_are_not_aligned_to_pedestrians(report: Make) -> None:
-    places = scattered(6)
-    own = report("own", 0.0, places, kind="pedestrian", size=(0.5, 0.5, 1.7)).detections
-    assert not align_pose(own, report("B", 0.0, displaced(places, ERROR), state=state_of(ERROR))).is_corrected
+    positions = scattered(6)
+    own = report("own", 0.0, positions, kind="pedestrian", size=(0.5, 0.5, 1.7)).detections
+    assert not align_pose(own, report("B", 0.0, displaced(positions, ERROR), state=state_of(ERROR))).is_corrected
 
 
 def test_one_ambiguous_object_leaves_the_pose(report: Make) -> None:
@@ -272,8 +272,8 @@ def test_one_ambiguous_object_leaves_the_pose(report: Make) -> None:
 
 
 def test_many_objects_are_aligned(report: Make) -> None:
-    places = generator(5, "many").uniform(-200.0, 200.0, (400, 2))
-    alignment = align_cars(report, places, displaced(places, ERROR), state_of(ERROR))
+    positions = generator(5, "many").uniform(-200.0, 200.0, (400, 2))
+    alignment = align_cars(report, positions, displaced(positions, ERROR), state_of(ERROR))
     assert alignment.shared > 350
     assert alignment.error == pytest.approx(ERROR, abs=0.01)
 
@@ -288,27 +288,27 @@ def test_many_objects_are_aligned(report: Make) -> None:
     ],
 )
 def test_state_without_meaning_leaves_the_pose(changes: dict[str, object], report: Make) -> None:
-    places = scattered(4)
-    assert not align_cars(report, places, places, replace(state_of(ERROR), **changes)).is_corrected
+    positions = scattered(4)
+    assert not align_cars(report, positions, positions, replace(state_of(ERROR), **changes)).is_corrected
 
 
 def test_correction_turns_with_the_world(report: Make) -> None:
     """The same layout, turned by 2 rad and moved by kilometers, has the same correction in turned coordinates."""
-    places = scattered(8)
+    positions = scattered(8)
     yaws = np.linspace(-3.0, 3.0, 8)
     rotation, shift = np.array([[math.cos(2.0), -math.sin(2.0)], [math.sin(2.0), math.cos(2.0)]]), np.array([1e4, -3e4])
     state = state_of(ERROR)
     x, y = rotation @ (state.x, state.y) + shift
     turned = replace(state, x=float(x), y=float(y), yaw=state.yaw + 2.0)
-    others = displaced(places, ERROR)
+    others = displaced(positions, ERROR)
     errors = [
         align_pose(
             report("own", 0.0, own, yaw=wrap_angle(yaws + turn)).detections,
             report("B", 0.0, seen, yaw=wrap_angle(yaws + ERROR[2] + turn), state=sent),
         ).error
         for own, seen, sent, turn in (
-            (places, others, state, 0.0),
-            (places @ rotation.T + shift, others @ rotation.T + shift, turned, 2.0),
+            (positions, others, state, 0.0),
+            (positions @ rotation.T + shift, others @ rotation.T + shift, turned, 2.0),
         )
     ]
     assert errors[1][:2] @ rotation == pytest.approx(errors[0][:2], abs=1e-9)
@@ -333,9 +333,9 @@ def fuse_in_turn(
 
 
 def test_aligned_fusion_moves_objects_that_only_the_sender_sees(report: Make) -> None:
-    places, hidden = scattered(6), np.array([[60.0, 0.0]])
-    own = report("A", 0.0, places, state=StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    sent = report("B", 0.0, displaced(np.concatenate([places, hidden]), ERROR), state=state_of(ERROR))
+    positions, hidden = scattered(6), np.array([[60.0, 0.0]])
+    own = report("A", 0.0, positions, state=StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    sent = report("B", 0.0, displaced(np.concatenate([positions, hidden]), ERROR), state=state_of(ERROR))
     plain, aligned = (
         fuse_in_turn([own, sent], settings, 0.0)[0] for settings in (CovarianceIntersectionSettings(), ALIGNED)
     )
@@ -349,10 +349,10 @@ def test_aligned_fusion_moves_objects_that_only_the_sender_sees(report: Make) ->
 
 def test_aligned_fusion_without_pose_errors_is_equal(report: Make) -> None:
     """Equal bits: exact poses, and inexact ones without a common object."""
-    places = scattered(6)
-    own = report("A", 0.0, places, state=StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    exact = report("B", 0.0, places[2:] + 0.1, state=state_of(np.zeros(3), None))
-    remote = [report("C", 0.1 * k, places + 200.0 + k, state=state_of(ERROR, time=0.1 * k)) for k in range(3)]
+    positions = scattered(6)
+    own = report("A", 0.0, positions, state=StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    exact = report("B", 0.0, positions[2:] + 0.1, state=state_of(np.zeros(3), None))
+    remote = [report("C", 0.1 * k, positions + 200.0 + k, state=state_of(ERROR, time=0.1 * k)) for k in range(3)]
     plain, aligned = (
         fuse_in_turn([own, exact, *remote], settings, 0.3)[0]
         for settings in (CovarianceIntersectionSettings(), ALIGNED)
@@ -369,7 +369,7 @@ def test_aligned_fusion_follows_errors_of_both_poses(correlated: bool, report: M
     Without alignment they are as far off as the errors of both poses together, 0.6 m.
     """
     rng = generator(10, "both", str(correlated))
-    places, hidden = scattered(8), np.array([[60.0, 0.0], [0.0, 55.0]])
+    positions, hidden = scattered(8), np.array([[60.0, 0.0], [0.0, 55.0]])
     prior, relative = np.diag(np.square((0.35, 0.35, 0.005))), (0.5, 0.5, 0.0075)
     off: dict[bool, list[float]] = {False: [], True: []}
     for _ in range(10):
@@ -383,7 +383,7 @@ def test_aligned_fusion_follows_errors_of_both_poses(correlated: bool, report: M
                 errors = rng.normal(size=(2, 3)) * np.sqrt(np.diag(prior))
             seen, others = (
                 displaced(np.concatenate(objects), error) + rng.normal(size=(count, 2)) * 0.05
-                for objects, error, count in (((places,), errors[0], 8), ((places, hidden), errors[1], 10))
+                for objects, error, count in (((positions,), errors[0], 8), ((positions, hidden), errors[1], 10))
             )
             change = np.zeros((3, 3)) if correlated else 2.0 * prior
             own = replace(
@@ -404,13 +404,13 @@ def test_aligned_fusion_follows_errors_of_both_poses(correlated: bool, report: M
 def test_aligned_batch_equals_single_stations(report: Make) -> None:
     reports = []
     for number in range(3):
-        places = scattered(5, number)
-        own = report("A", 0.0, places, state=StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        reports.append([own, report("B", 0.0, displaced(places, ERROR), state=state_of(ERROR))])
+        positions = scattered(5, number)
+        own = report("A", 0.0, positions, state=StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        reports.append([own, report("B", 0.0, displaced(positions, ERROR), state=state_of(ERROR))])
     settings = [ALIGNED, ALIGNED, CovarianceIntersectionSettings()]
     results = []
     for batch in (False, True):
-        methods = [CovarianceIntersectionFusion(one) for one in settings]
+        methods = [CovarianceIntersectionFusion(setting) for setting in settings]
         for method, held in zip(methods, reports, strict=True):
             for sent in held:
                 method.add_report(sent)

@@ -80,9 +80,9 @@ def test_arbitrary_bytes_are_an_error_or_a_frame(data: bytes) -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(st.integers(0, 91), st.integers(0, 255))
-def test_changed_byte_is_an_error_or_another_frame(place: int, value: int) -> None:
+def test_changed_byte_is_an_error_or_another_frame(offset: int, value: int) -> None:
     data = bytearray(frame().encode())
-    data[place] = value
+    data[offset] = value
     with contextlib.suppress(ValueError):
         assert FeatureFrame.decode(bytes(data)).encode() == bytes(data)
 

@@ -18,8 +18,10 @@ COORDINATE = st.floats(-500.0, 500.0)
 @given(
     st.lists(st.tuples(COORDINATE, COORDINATE, st.floats(-5.0, 20.0)), max_size=60), st.sampled_from([0.05, 0.1, 1.0])
 )
-def test_compress_points_are_restored_within_half_a_cell(places: list[tuple[float, float, float]], cell: float) -> None:
-    points = np.array(places).reshape(-1, 3)
+def test_compress_points_are_restored_within_half_a_cell(
+    positions: list[tuple[float, float, float]], cell: float
+) -> None:
+    points = np.array(positions).reshape(-1, 3)
     restored = compress(points, 1.0, cell).points()
     assert len(restored) <= len(points)
     for point in points:

@@ -34,7 +34,7 @@ from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.world.actor import ActorSpec
 
 SPEC = ActorSpec("Ego", "car", "car", (4.6, 1.9, 1.5), (0.0, 0.0, 0.75), wheelbase=2.7)
-PLACES = np.array([[10.0, 2.0], [-20.4, 7.6], [30.8, -31.6], [0.4, -12.4]])
+CENTERS = np.array([[10.0, 2.0], [-20.4, 7.6], [30.8, -31.6], [0.4, -12.4]])
 """Centers of 0.8 m cells of a grid at the origin, with a post each."""
 
 
@@ -48,10 +48,10 @@ def level_ground() -> Array:
     return np.stack([x, y, np.zeros(len(x))], axis=1)
 
 
-def posts(places: Array = PLACES) -> Array:
-    """Return eight points (N, 3) at each place (N, 2), 0.6 m to 1.4 m above the ground."""
+def posts(centers: Array = CENTERS) -> Array:
+    """Return eight points (N, 3) at each center (N, 2), 0.6 m to 1.4 m above the ground."""
     spread = np.array([(dx, dy, z) for dx in (-0.1, 0.1) for dy in (-0.1, 0.1) for z in (0.6, 1.4)])
-    return np.concatenate([spread + np.array([x, y, 0.0]) for x, y in places])
+    return np.concatenate([spread + np.array([x, y, 0.0]) for x, y in centers])
 
 
 def cloud(points: Array, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, height: float = 2.0) -> LidarReading:
@@ -63,7 +63,7 @@ def cloud(points: Array, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, heigh
 
 def readings(time: float, *clouds: LidarReading) -> Readings:
     ego = EgoState(time, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Readings(time, ego, lidars={f"lidar {number}": one for number, one in enumerate(clouds)})
+    return Readings(time, ego, lidars={f"lidar {number}": reading for number, reading in enumerate(clouds)})
 
 
 def scene(time: float = 0.0, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Readings:
@@ -75,15 +75,15 @@ def by_position(boxes: Array) -> Array:
 
 
 def test_detect_occupied_cells_returns_cars_of_weights(tmp_path: Path) -> None:
-    found = detector(tmp_path).detect(scene())
-    expected = np.array([(x, y, 0.75, 4.0, 2.0, 1.5, 0.0) for x, y in PLACES])
-    np.testing.assert_allclose(by_position(found.boxes), by_position(expected), atol=1e-5)
-    assert set(found.classes) == {"car"}
+    detections = detector(tmp_path).detect(scene())
+    expected = np.array([(x, y, 0.75, 4.0, 2.0, 1.5, 0.0) for x, y in CENTERS])
+    np.testing.assert_allclose(by_position(detections.boxes), by_position(expected), atol=1e-5)
+    assert set(detections.classes) == {"car"}
     # Eight points are in four 0.4 m cells of two points each, whose sum the weights form.
     score = 1.0 / (1.0 + math.exp(0.5 - 4.0 * 4.0 * math.log(3.0) / 3.0))
-    np.testing.assert_allclose(found.scores, np.full(4, score), rtol=1e-6)
-    assert np.isnan(found.velocity).all()
-    np.testing.assert_allclose(found.covariance, np.broadcast_to(np.eye(2) * 0.09, (4, 2, 2)), rtol=1e-6)
+    np.testing.assert_allclose(detections.scores, np.full(4, score), rtol=1e-6)
+    assert np.isnan(detections.velocity).all()
+    np.testing.assert_allclose(detections.covariance, np.broadcast_to(np.eye(2) * 0.09, (4, 2, 2)), rtol=1e-6)
 
 
 @pytest.mark.parametrize("degrees", [-135.0, 0.0, 30.0, 90.0, 180.0])
@@ -92,21 +92,21 @@ def test_detect_boxes_and_velocities_have_axes_of_world(degrees: float, tmp_path
     yaw = math.radians(degrees)
     own = detector(tmp_path, plain_arrays((2.0, -1.0)))
     own.detect(scene(0.0, 3.3, -1.7, yaw))
-    found = own.detect(scene(0.2, 3.3, -1.7, yaw))
-    assert len(found) >= 4
-    for place in PLACES:
-        nearest = np.argmin(np.hypot(*(found.boxes[:, :2] - place).T))
-        assert math.dist(found.boxes[nearest, :2], place) < 0.4 * math.sqrt(2.0) + 0.15
-    np.testing.assert_allclose(np.cos(found.boxes[:, 6]), 1.0)
-    np.testing.assert_allclose(found.velocity, np.broadcast_to((10.0, -5.0), found.velocity.shape), atol=1e-5)
+    detections = own.detect(scene(0.2, 3.3, -1.7, yaw))
+    assert len(detections) >= 4
+    for center in CENTERS:
+        nearest = np.argmin(np.hypot(*(detections.boxes[:, :2] - center).T))
+        assert math.dist(detections.boxes[nearest, :2], center) < 0.4 * math.sqrt(2.0) + 0.15
+    np.testing.assert_allclose(np.cos(detections.boxes[:, 6]), 1.0)
+    np.testing.assert_allclose(detections.velocity, np.broadcast_to((10.0, -5.0), detections.velocity.shape), atol=1e-5)
 
 
 def test_detect_overlapping_boxes_returns_best_one(tmp_path: Path) -> None:
     """Posts 1.6 m apart, two cells, with more points at the second."""
-    places = np.array([[10.0, 2.0], [11.6, 2.0]])
-    points = np.concatenate([posts(places), posts(places[1:]) + np.array([0.0, 0.0, 0.05])])
-    found = detector(tmp_path).detect(readings(0.0, cloud(np.concatenate([level_ground(), points]))))
-    np.testing.assert_allclose(found.boxes[:, :2], places[1:], atol=1e-5)
+    centers = np.array([[10.0, 2.0], [11.6, 2.0]])
+    points = np.concatenate([posts(centers), posts(centers[1:]) + np.array([0.0, 0.0, 0.05])])
+    detections = detector(tmp_path).detect(readings(0.0, cloud(np.concatenate([level_ground(), points]))))
+    np.testing.assert_allclose(detections.boxes[:, :2], centers[1:], atol=1e-5)
 
 
 def test_detect_same_readings_returns_equal_bits(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_detect_same_readings_returns_equal_bits(tmp_path: Path) -> None:
         return [own.detect(scene(0.1 * tick, x=0.3 * tick)) for tick in range(4)]
 
     first, second = run(), run()
-    assert any(len(found) for found in first)
+    assert any(len(detections) for detections in first)
     for before, after in zip(first, second, strict=True):
         assert before.classes == after.classes
         for name in ("boxes", "scores", "velocity", "covariance"):
@@ -126,15 +126,15 @@ def test_detect_fused_features_equal_to_own_returns_equal_bits(tmp_path: Path) -
     """Features that no other station changed give the own result; the own feature map stays."""
     own, another = (detector(tmp_path, random_arrays(), confidence=0.2) for _ in range(2))
     own.detect(scene(0.0))
-    found = own.detect(scene(0.2))
+    detections = own.detect(scene(0.2))
     features = own.feature_map
     assert features is not None
     assert features.interval == pytest.approx(0.2)
     for receiver in (own, another):
         again = receiver.detect(replace(scene(0.2), features=features))
-        np.testing.assert_array_equal(again.boxes, found.boxes)
-        np.testing.assert_array_equal(again.scores, found.scores)
-        np.testing.assert_array_equal(again.velocity, found.velocity)
+        np.testing.assert_array_equal(again.boxes, detections.boxes)
+        np.testing.assert_array_equal(again.scores, detections.scores)
+        np.testing.assert_array_equal(again.velocity, detections.velocity)
     assert own.feature_map is features
     assert another.feature_map is None
 
@@ -148,15 +148,15 @@ def test_detect_fused_features_returns_objects_of_others(tmp_path: Path) -> None
     fused = features.features.copy()
     i, j = math.floor((-30.0 + 51.2) / 0.8), math.floor((-30.0 + 51.2) / 0.8)
     fused[0, i, j] = fused[0].max()
-    found = own.detect(replace(scene(), features=replace(features, features=fused)))
-    added = found.boxes[np.argmin(np.hypot(*(found.boxes[:, :2] + 30.0).T)), :2]
-    assert len(found) == 5
+    detections = own.detect(replace(scene(), features=replace(features, features=fused)))
+    added = detections.boxes[np.argmin(np.hypot(*(detections.boxes[:, :2] + 30.0).T)), :2]
+    assert len(detections) == 5
     np.testing.assert_allclose(added, np.array([i + 0.5, j + 0.5]) * 0.8 - 51.2, atol=1e-5)
 
 
 def test_feature_map_states_pose_and_contents(tmp_path: Path) -> None:
     own = detector(tmp_path)
-    found = own.detect(scene(0.7, 3.0, -4.0, 0.5))
+    detections = own.detect(scene(0.7, 3.0, -4.0, 0.5))
     features = own.feature_map
     assert features is not None
     assert (features.time, features.yaw, features.height, features.foot) == (0.7, 0.0, 2.0, 0.0)
@@ -165,7 +165,7 @@ def test_feature_map_states_pose_and_contents(tmp_path: Path) -> None:
     assert features.interval is None
     assert features.features.shape == (96, 128, 128)
     assert features.latent.shape == (8, 128, 128)
-    assert features.confidence.max() == pytest.approx(found.scores.max(), rel=1e-6)
+    assert features.confidence.max() == pytest.approx(detections.scores.max(), rel=1e-6)
     assert np.all(features.features >= 0.0)
 
 
@@ -174,8 +174,8 @@ def test_detect_points_of_several_lidars_are_one_cloud(parts: int, tmp_path: Pat
     points = np.concatenate([level_ground(), posts()])
     poses = [(0.0, 0.0, 0.0, 2.0), (1.0, -0.6, 2.5, 0.8), (-2.0, 0.4, -1.0, 1.4)]
     clouds = [cloud(points[number::parts], *poses[number]) for number in range(parts)]
-    found = detector(tmp_path).detect(readings(0.0, *clouds))
-    np.testing.assert_allclose(by_position(found.boxes)[:, :2], by_position(PLACES), atol=1e-5)
+    detections = detector(tmp_path).detect(readings(0.0, *clouds))
+    np.testing.assert_allclose(by_position(detections.boxes)[:, :2], by_position(CENTERS), atol=1e-5)
 
 
 @pytest.mark.parametrize("points", [np.empty((0, 3)), np.array([[300.0, 0.0, 1.0]]), np.zeros((1, 3))])
@@ -195,10 +195,10 @@ def test_detect_on_slope_returns_heights_of_road(tmp_path: Path) -> None:
     roads = RoadNetwork.parse(map_xml(road_xml(x=-50.0, profiles=profile)))
     own = detector(tmp_path)
     own.setup(DetectorContext(SPEC, {}, roads))
-    points = np.concatenate([level_ground(), posts(PLACES[:1])])
+    points = np.concatenate([level_ground(), posts(CENTERS[:1])])
     points[:, 2] += 0.05 * points[:, 0]
-    found = own.detect(readings(0.0, cloud(points)))
-    np.testing.assert_allclose(found.boxes[:, :3], [[10.0, 2.0, 0.5 + 0.75]], atol=0.02)
+    detections = own.detect(readings(0.0, cloud(points)))
+    np.testing.assert_allclose(detections.boxes[:, :3], [[10.0, 2.0, 0.5 + 0.75]], atol=0.02)
 
 
 def test_in_view_is_zero_outside_of_grid(tmp_path: Path) -> None:
@@ -215,9 +215,9 @@ def test_in_view_is_zero_outside_of_grid(tmp_path: Path) -> None:
 def test_perception_without_tracker_keeps_velocities(tmp_path: Path) -> None:
     perception = Perception(detector(tmp_path, plain_arrays((2.0, 0.0))))
     perception.perceive(scene(0.0))
-    found = perception.perceive(scene(0.2))
-    assert found is not None
-    np.testing.assert_allclose(found.velocity, [[10.0, 0.0]] * 4, atol=1e-5)
+    detections = perception.perceive(scene(0.2))
+    assert detections is not None
+    np.testing.assert_allclose(detections.velocity, [[10.0, 0.0]] * 4, atol=1e-5)
 
 
 def test_default_station_has_scans_at_10_hz_and_tracker(tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_default_station_has_scans_at_10_hz_and_tracker(tmp_path: Path) -> None:
     agent = build_agent(settings, SPEC, None, seed=1, dt=0.05)
     assert agent.perception._tracker is not None
     sensors = settings.rig_sensors(PillarDetector.needs, PillarDetector.default_sensors)
-    assert [(one.kind, one.rate) for one in sensors.values()] == [("lidar", 10.0)]
+    assert [(sensor.kind, sensor.rate) for sensor in sensors.values()] == [("lidar", 10.0)]
 
 
 def test_tracker_begins_with_measured_velocity(tmp_path: Path) -> None:
@@ -235,9 +235,9 @@ def test_tracker_begins_with_measured_velocity(tmp_path: Path) -> None:
     tracker = Tracker(TrackerSettings())
     own.detect(scene(0.0))
     for tick in range(2, 6):
-        moved = PLACES + np.array([0.8 * (tick - 2), 0.0])
-        found = own.detect(readings(0.1 * tick, cloud(np.concatenate([level_ground(), posts(moved)]))))
-        tracks = tracker.update(found)
+        moved = CENTERS + np.array([0.8 * (tick - 2), 0.0])
+        detections = own.detect(readings(0.1 * tick, cloud(np.concatenate([level_ground(), posts(moved)]))))
+        tracks = tracker.update(detections)
     assert len(tracks) == 4
     np.testing.assert_allclose(tracks.velocity, [[8.0, 0.0]] * 4, atol=0.5)
 
@@ -296,7 +296,7 @@ def test_detect_car_of_world_is_near_its_body(street: Any, tmp_path: Path) -> No
     sensors = {"lidar": LidarSettings(rate=10.0)}
     own = detector(tmp_path)
     own.setup(DetectorContext(SPEC, sensors))
-    found = own.detect(street.readings([street.thing("Ego", 0, 0), car], sensors))
-    assert 1 <= len(found) <= 4
-    assert iou_bev(found.boxes, car.box[None]).max() > 0.1
-    assert np.all(np.hypot(*(found.boxes[:, :2] - car.box[:2]).T) < math.hypot(4.892, 1.837) / 2.0 + 0.6)
+    detections = own.detect(street.readings([street.thing("Ego", 0, 0), car], sensors))
+    assert 1 <= len(detections) <= 4
+    assert iou_bev(detections.boxes, car.box[None]).max() > 0.1
+    assert np.all(np.hypot(*(detections.boxes[:, :2] - car.box[:2]).T) < math.hypot(4.892, 1.837) / 2.0 + 0.6)

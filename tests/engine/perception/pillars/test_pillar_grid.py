@@ -77,8 +77,8 @@ def test_fill_three_points_in_cell_has_calculated_channels() -> None:
 @pytest.mark.parametrize("x", [-51.21, 51.2, 1e30, -1e30, math.inf, math.nan])
 def test_fill_points_outside_are_ignored(x: float) -> None:
     points, plan = np.array([[x, 0.0, 1.0], [0.0, x, 1.0]]), np.array([[x, 0.0], [0.0, x]])
-    one = np.ones(2)
-    assert not grid_of(points, one, one, plan, one).any()
+    ones = np.ones(2)
+    assert not grid_of(points, ones, ones, plan, ones).any()
 
 
 def test_fill_border_points_are_in_first_and_last_cell() -> None:
