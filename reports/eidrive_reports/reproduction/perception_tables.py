@@ -181,11 +181,14 @@ def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
         (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
     }
     lines: list[Row] = [
-        {"axis": axis, "value": value}
-        | {
-            f"{arm}_{_key(overlap)}": precisions[axis, value, arm, overlap]
-            for arm in study.compared
-            for overlap in OVERLAPS
+        {
+            "axis": axis,
+            "value": value,
+            **{
+                f"{arm}_{_key(overlap)}": precisions[axis, value, arm, overlap]
+                for arm in study.compared
+                for overlap in OVERLAPS
+            },
         }
         for axis in study.axes
         for value in AXES[axis][2]
@@ -206,9 +209,12 @@ def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of the recall at the overlap 0.5 with one column per arm."""
     recalls = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
     lines: list[Row] = [
-        {"axis": axis, "value": value}
-        | {arm: recalls[axis, value, arm]["recall"] for arm in study.compared}
-        | {"hidden": recalls[axis, value, study.compared[0]]["hidden"]}
+        {
+            "axis": axis,
+            "value": value,
+            **{arm: recalls[axis, value, arm]["recall"] for arm in study.compared},
+            "hidden": recalls[axis, value, study.compared[0]]["hidden"],
+        }
         for axis in study.axes
         for value in AXES[axis][2]
     ]
