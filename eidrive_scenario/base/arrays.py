@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
 
 
 def of_each(function: Callable[[float], float], values: Array) -> Array:

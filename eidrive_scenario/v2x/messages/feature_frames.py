@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from eidrive_scenario.base.arrays import Bytes, Integers
+
 Encoding = Literal["int8", "codes"]
 
 PROTOCOL = 1
@@ -77,7 +78,7 @@ class FeatureFrame:
         return HEADER_BYTES + self.cells.size
 
     @property
-    def indices(self) -> NDArray[np.int64]:
+    def indices(self) -> Integers:
         """Index (N,) of each cell."""
         return self.cells[:, 0] + 256 * self.cells[:, 1].astype(np.int64)
 
@@ -140,7 +141,7 @@ class FeatureFrame:
             raise ValueError("a cell is not in the grid")
 
 
-def to_cells(indices: NDArray[np.int64], codes: NDArray[np.int8] | Bytes) -> Bytes:
+def to_cells(indices: Integers, codes: NDArray[np.int8] | Bytes) -> Bytes:
     """Return cells (N, 2 + K) from indices (N,) and codes (K, N) or (N,), as frames contain them."""
     numbers = np.ascontiguousarray(indices, "<u2").view(np.uint8).reshape(-1, INDEX_BYTES)
     return np.concatenate([numbers, np.atleast_2d(codes).T.view(np.uint8)], axis=1)

@@ -6,11 +6,8 @@ import struct
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array
-
-Bytes = NDArray[np.uint8]
+from eidrive_scenario.base.arrays import Array, Bytes, Integers
 
 _HEADER = struct.Struct("<d3iH3s3sI")
 HEADER_BYTES = _HEADER.size
@@ -96,7 +93,7 @@ def compress(points: Array, time: float, cell: float) -> PointCloud:
     return PointCloud(time, (x, y, z), cell, (wide, along, up), _encode_numbers(np.diff(occupied, prepend=0)))
 
 
-def _encode_numbers(numbers: NDArray[np.int64]) -> Bytes:
+def _encode_numbers(numbers: Integers) -> Bytes:
     groups = numbers[:, None] >> (_SEVEN_BITS * np.arange(_MAX_BYTES)) & 127
     later = np.cumsum(groups[:, ::-1], axis=1)[:, ::-1] - groups
     needed = (later > 0) | (groups > 0)
@@ -106,7 +103,7 @@ def _encode_numbers(numbers: NDArray[np.int64]) -> Bytes:
     return digits
 
 
-def _decode_numbers(data: Bytes) -> NDArray[np.int64]:
+def _decode_numbers(data: Bytes) -> Integers:
     """Return the numbers of complete encodings. Raise ValueError for a number of more than 63 bits."""
     if not len(data):
         return np.empty(0, dtype=np.int64)
