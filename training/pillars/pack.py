@@ -76,9 +76,10 @@ def measured(scenes: Iterator[StationScene], path: Path, precision: str = "float
 
 
 def _required(boxes: Array, cloud: LidarReading) -> Bools:
+    points = cloud.world_points
     near = np.abs(boxes[:, :2] - cloud.pose[:2, 3]).max(axis=1, initial=0.0) < WITHIN
     grown = boxes + np.array([0.0, 0.0, 0.1, MARGIN, MARGIN, -0.1, 0.0])
-    hit: Bools = np.array([points_in_box(cloud.world_points, box).sum() >= FEWEST for box in grown], dtype=bool)
+    hit: Bools = np.array([points_in_box(points, box).sum() >= FEWEST for box in grown], dtype=bool)
     required: Bools = near & hit
     return required
 
