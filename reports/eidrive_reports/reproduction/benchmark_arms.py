@@ -110,7 +110,7 @@ class BenchmarkChannel:
         return self.name if self.rate is None else f"{self.rate:g} Mbit/s, {self.stations} stations"
 
 
-CHANNELS = ("6mbit_2", "3mbit_40", "1mbit_80")
+CHANNELS = tuple(f"{rate}mbit_{stations}" for stations in (2, 40, 80) for rate in (6, 3, 1))
 """Names of the channels without an option, from the emptiest to the fullest."""
 SILENT = BenchmarkChannel(NO_COOPERATION, NO_COOPERATION)
 """Channel of runs without cooperation."""
