@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ from eidrive_reports.paper import (
     evaluate_claims,
 )
 from eidrive_scenario.api.common import Array
+from eidrive_scenario.api.experiments import cores
 from eidrive_scenario.api.pages import (
     ChartSeries,
     ImageCanvas,
@@ -141,12 +143,11 @@ def write_demo(
     `stories` are those of the seed `watched`, by scenario and channel.
     """
     windows = {scenario: _window(scenario, stories) for scenario in links.scenarios}
+    pictures = _pictures(stories, sites, windows)
     values = {
         table.variant.name: {
             "title": table.variant.title,
-            "scenarios": [
-                _scenario(table, name, stories, sites[name], windows[name], watched) for name in links.scenarios
-            ],
+            "scenarios": [_scenario(table, name, stories, pictures, sites[name], watched) for name in links.scenarios],
         }
         for table in (links, own)
     }
@@ -167,9 +168,15 @@ def write_demo(
 
 
 def _scenario(
-    table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], site: DemoSite, window: Window, watched: int
+    table: Table,
+    scenario: str,
+    stories: Mapping[tuple[str, str], Story],
+    pictures: Mapping[tuple[str, str], Sequence[str]],
+    site: DemoSite,
+    watched: int,
 ) -> dict[str, Any]:
-    mine = {arm.name: stories[scenario, arm.channel(table.variant)] for arm in ARMS}
+    keys = {arm.name: (scenario, arm.channel(table.variant)) for arm in ARMS}
+    mine = {name: stories[key] for name, key in keys.items()}
     return {
         "title": SCENARIOS.get(scenario, scenario),
         "cells": [cell for cell in table.cells if cell.scenario == scenario],
@@ -185,7 +192,10 @@ def _scenario(
                 "title": arm.title,
                 "color": COLORS[arm.name],
                 "summary": _summary(table.cell(scenario, arm.name), mine[arm.name], watched),
-                "images": [_figure(moment, mine[arm.name], arm, site, window) for moment in mine[arm.name].moments],
+                "images": [
+                    _figure(moment, mine[arm.name], arm, picture)
+                    for moment, picture in zip(mine[arm.name].moments, pictures[keys[arm.name]], strict=True)
+                ],
             }
             for arm in ARMS
         ],
@@ -198,7 +208,26 @@ def _speed(speed: float) -> str:
     return f"at {rounded} km/h" if rounded >= 0 else f"moving backwards at {-rounded} km/h"
 
 
-def _figure(moment: Moment, story: Story, arm: ExperimentArm, site: DemoSite, window: Window) -> dict[str, Any]:
+def _pictures(
+    stories: Mapping[tuple[str, str], Story], sites: Mapping[str, DemoSite], windows: Mapping[str, Window]
+) -> dict[tuple[str, str], list[str]]:
+    """Return the addresses of the key frames of each story, empty without a snapshot."""
+
+    def address(scenario: str, moment: Moment) -> str:
+        if moment.snapshot is None:
+            return ""
+        canvas = ImageCanvas(windows[scenario], PICTURE)
+        draw_snapshot(canvas, moment.snapshot, sites[scenario].roads, sites[scenario].conflict_areas)
+        _, image = cv2.imencode(".webp", canvas.image, QUALITY)
+        return "data:image/webp;base64," + b64encode(image.tobytes()).decode()
+
+    with ThreadPoolExecutor(cores()) as pool:  # encoding takes most of the time, and releases the lock of Python
+        waiting = {key: [pool.submit(address, key[0], moment) for moment in story.moments]
+                   for key, story in stories.items()}  # fmt: skip
+        return {key: [task.result() for task in tasks] for key, tasks in waiting.items()}
+
+
+def _figure(moment: Moment, story: Story, arm: ExperimentArm, picture: str) -> dict[str, Any]:
     snapshot = moment.snapshot
     if snapshot is None:
         return {"title": moment.title, "caption": "", "address": ""}
@@ -208,13 +237,10 @@ def _figure(moment: Moment, story: Story, arm: ExperimentArm, site: DemoSite, wi
         f"at {snapshot.time:.2f} s, {story.centers[row]:.1f} m between centers, "
         f"{story.ego} {_speed(story.speeds[row])}" + (", last message lost" if lost else "")
     )
-    canvas = ImageCanvas(window, PICTURE)
-    draw_snapshot(canvas, snapshot, site.roads, site.conflict_areas)
-    _, image = cv2.imencode(".webp", canvas.image, QUALITY)
     return {
         "title": moment.title,
         "caption": caption,
-        "address": "data:image/webp;base64," + b64encode(image.tobytes()).decode(),
+        "address": picture,
         "description": f"{arm.title}: {moment.title} {caption}",
     }
 

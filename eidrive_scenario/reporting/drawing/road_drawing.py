@@ -198,14 +198,18 @@ def recorded_network(recording: Recording) -> RoadNetwork | None:
         return None
     if len(text) > _LARGEST_ROAD_FILE:
         raise _too_large(f"{recording.path}/{ROAD_FILE}")
-    return _parse(text, f"{recording.path}/{ROAD_FILE}")
+    try:
+        return _parse(text)
+    except InputError:
+        return RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}")  # for the path in the error
+
+
+@lru_cache(maxsize=1)  # most runs of a batch have the same roads
+def _parse(text: bytes) -> RoadNetwork:
+    return RoadNetwork.parse(text, ROAD_FILE)
 
 
 @lru_cache(maxsize=1)
-def _parse(text: bytes, source: str) -> RoadNetwork:
-    return RoadNetwork.parse(text, source)
-
-
 def network_drawing(network: RoadNetwork | None) -> RoadDrawing:
     """Return the roads of a network with houses; an empty drawing without a network. Errors as for `road_drawing`."""
     if network is None:
