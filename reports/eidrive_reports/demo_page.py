@@ -6,6 +6,7 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -222,9 +223,7 @@ def _pictures(
         return "data:image/webp;base64," + b64encode(image.tobytes()).decode()
 
     with ThreadPoolExecutor(cores()) as pool:  # encoding takes most of the time, and releases the lock of Python
-        waiting = {key: [pool.submit(address, key[0], moment) for moment in story.moments]
-                   for key, story in stories.items()}  # fmt: skip
-        return {key: [task.result() for task in tasks] for key, tasks in waiting.items()}
+        return {key: list(pool.map(partial(address, key[0]), story.moments)) for key, story in stories.items()}
 
 
 def _figure(moment: Moment, story: Story, arm: ExperimentArm, picture: str) -> dict[str, Any]:

@@ -188,7 +188,7 @@ def _drawn(parts: Iterable[tuple[_Part, Sequence[_Edges]]], window: Window | Non
 
 def recorded_roads(recording: Recording) -> RoadDrawing:
     """Return the roads in the attachments of a recording, with houses; an empty drawing without a road file."""
-    return network_drawing(recorded_network(recording))
+    return _recorded_drawing(recorded_network(recording))
 
 
 def recorded_network(recording: Recording) -> RoadNetwork | None:
@@ -200,22 +200,25 @@ def recorded_network(recording: Recording) -> RoadNetwork | None:
         raise _too_large(f"{recording.path}/{ROAD_FILE}")
     try:
         return _parse(text)
-    except InputError:
-        return RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}")  # for the path in the error
+    except InputError as error:
+        source = f"{recording.path}/{ROAD_FILE}"
+        raise type(error)([replace(diagnostic, source=source) for diagnostic in error.diagnostics]) from error
 
 
-@lru_cache(maxsize=1)  # most runs of a batch have the same roads
+@lru_cache(maxsize=1)  # recordings of a batch often have the same roads
 def _parse(text: bytes) -> RoadNetwork:
     return RoadNetwork.parse(text, ROAD_FILE)
 
 
-@lru_cache(maxsize=1)
 def network_drawing(network: RoadNetwork | None) -> RoadDrawing:
     """Return the roads of a network with houses; an empty drawing without a network. Errors as for `road_drawing`."""
     if network is None:
         return RoadDrawing()
     houses = tuple((house_outline(house), house.size[2]) for house in buildings(network))
     return replace(road_drawing(network.roads.values()), houses=houses)
+
+
+_recorded_drawing = lru_cache(maxsize=1)(network_drawing)
 
 
 def house_outline(house: Building) -> Array:

@@ -82,7 +82,6 @@ def _packed(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content, 9)).decode("ascii")
 
 
-@lru_cache(maxsize=1)
 def street_models(network: RoadNetwork | None) -> Data:
     """Return what stands still.
 

@@ -8,6 +8,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -296,10 +297,13 @@ def readable_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
         return RoadDrawing()
 
 
+_recorded_street = lru_cache(maxsize=1)(street_models)  # recordings of a batch often have the same roads
+
+
 def _readable_street(recording: Recording) -> Data:
     """Return the models of the roads of a recording; bare ground for those that `readable_roads` reports."""
     try:
-        return street_models(recorded_network(recording))
+        return _recorded_street(recorded_network(recording))
     except (InputError, *UNDRAWABLE, MemoryError, RecursionError):
         return street_models(None)
 
