@@ -10,7 +10,6 @@ from typing import ClassVar
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.assignment import associate
@@ -101,32 +100,44 @@ def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: flo
     """Return the means over the boxes of each object; a single box is unchanged to the bit.
 
     numbers  object of each box, in order of appearance
-
-    Headings that point backwards from the first one are reversed before: some detectors do not distinguish front and
-    rear, and the mean of opposite headings would be a box across the object.
     """
-    labels = np.array(numbers, dtype=np.intp)
-    boxes = np.concatenate([report.boxes for report in reports])
-    scores = np.concatenate([report.scores for report in reports])
-    velocity = np.concatenate([report.velocity for report in reports])
-    covariance = np.concatenate([report.covariance for report in reports])
-    count = max(numbers) + 1
-    means, score, mean_velocity, mean_covariance = _means((boxes, scores, velocity, covariance), labels, count)
-    words = [word for report in reports for word in report.classes]
-    votes: list[list[str]] = [[] for _ in range(count)]
-    yaws: list[list[float]] = [[] for _ in range(count)]
-    for label, word, yaw in zip(numbers, words, boxes[:, 6].tolist(), strict=True):
-        votes[label].append(word)
-        yaws[label].append(yaw)
-    means[:, 6] = [_mean_yaw(own) for own in yaws]
+    # Plain loops: the usual few boxes take half the time of array operations, and 64 objects take 1.7 times.
+    members: list[list[_Entry]] = [[] for _ in range(max(numbers) + 1)]
+    entries = [
+        entry
+        for report in reports
+        for entry in zip(
+            report.boxes.tolist(),
+            report.scores.tolist(),
+            report.classes,
+            report.velocity.tolist(),
+            report.covariance.reshape(-1, 4).tolist(),
+            strict=True,
+        )
+    ]
+    for number, entry in zip(numbers, entries, strict=True):
+        members[number].append(entry)
+    boxes, scores, classes, velocity, covariance = zip(*map(_mean_entry, members), strict=True)
     return Detections(
         now,
-        means,
-        score,
-        tuple(map(_most_frequent, votes)),
-        mean_velocity,
-        mean_covariance,
+        np.array(boxes),
+        np.array(scores),
+        classes,
+        np.array(velocity),
+        np.array(covariance).reshape(-1, 2, 2),
     )
+
+
+_Entry = tuple[list[float], float, str, list[float], list[float]]
+"""Box, score, class, velocity and covariance of a detection."""
+
+
+def _mean_entry(entries: Sequence[_Entry]) -> _Entry:
+    """Return the mean of the detections of one object."""
+    boxes, scores, classes, velocity, covariance = zip(*entries, strict=True)
+    box = _mean(boxes)
+    box[6] = _mean_yaw([box[6] for box in boxes])
+    return box, sum(scores) / len(scores), _most_frequent(classes), _mean_of_known(velocity), _mean_of_known(covariance)
 
 
 def _most_frequent(words: Sequence[str]) -> str:
@@ -135,7 +146,11 @@ def _most_frequent(words: Sequence[str]) -> str:
 
 
 def _mean_yaw(yaws: Sequence[float]) -> float:
-    """Return the circular mean, with headings reversed that point backwards from the first one."""
+    """Return the circular mean, with headings reversed that point backwards from the first one.
+
+    Some detectors do not distinguish front and rear, and the mean of opposite headings would be a box across the
+    object.
+    """
     if len(yaws) == 1:
         return yaws[0]
     fronts = [-1.0 if math.cos(yaw - yaws[0]) < 0.0 else 1.0 for yaw in yaws]
@@ -145,18 +160,13 @@ def _mean_yaw(yaws: Sequence[float]) -> float:
     )
 
 
-def _means(quantities: Sequence[Array], labels: NDArray[np.intp], count: int) -> list[Array]:
-    """Return the means (G, ...) of quantities (K, ...) without NaN of each label, added in order; NaN if there is none.
+def _mean_of_known(vectors: Sequence[list[float]]) -> list[float]:
+    """Return the mean of the vectors without NaN; NaN if there is none."""
+    known = [vector for vector in vectors if not math.isnan(sum(vector))]
+    return _mean(known) if known else [math.nan] * len(vectors[0])
 
-    Sums begin with -0, the neutral element of addition, so that a single value is unchanged to the bit.
-    """
-    columns = [values.reshape(len(values), -1) for values in quantities]
-    widths = [values.shape[1] for values in columns]
-    table, starts = np.concatenate(columns, axis=1), np.cumsum([0, *widths[:-1]])
-    known = ~np.logical_or.reduceat(np.isnan(table), starts, axis=1).repeat(widths, axis=1)
-    total, counts = np.full((count, table.shape[1]), -0.0), np.zeros((count, table.shape[1]))
-    np.add.at(total, labels, np.where(known, table, -0.0))
-    np.add.at(counts, labels, known)
-    means = np.divide(total, counts, out=np.full(total.shape, math.nan), where=counts > 0)
-    split = zip(starts.tolist(), widths, quantities, strict=True)
-    return [means[:, start : start + width].reshape(-1, *values.shape[1:]) for start, width, values in split]
+
+def _mean(vectors: Sequence[list[float]]) -> list[float]:
+    if len(vectors) == 1:
+        return vectors[0]
+    return [sum(values) / len(vectors) for values in zip(*vectors, strict=True)]
