@@ -15,6 +15,7 @@ from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.physics.contacts import Touch, Touches
 from eidrive_scenario.world.physics.dynamics import Demand
 from eidrive_scenario.world.physics.scenery import Scenery
+from eidrive_scenario.world.view import FEW
 
 _ROLL = Control()
 _MAX_IMPACT = 20.0
@@ -144,7 +145,10 @@ class Physics:
         watched: dict[str, DrivenBody] = {}
         impact = _MAX_IMPACT * self._dt
         movers = list(driven.values())
-        neighbors = bodies.neighbors(movers, 2.0 * (self._slack + impact))
+        if len(movers) * len(bodies.members) <= FEW:  # to select near ones takes longer than to compare all below
+            neighbors = [bodies.current()] * len(movers)
+        else:
+            neighbors = bodies.neighbors(movers, 2.0 * (self._slack + impact))
         nearby = dict.fromkeys(chain.from_iterable(neighbors))
         travels = {other.name: other.travel + self._slack for other in nearby}
         if not any(map(self._may_meet, movers, neighbors, repeat(travels))):
