@@ -21,7 +21,7 @@ from eidrive_scenario.fusion.prediction import (
 )
 from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, make_plausible, survived
 from eidrive_scenario.perception.tracking.association import missed as after_miss
-from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
+from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, MEASURED_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
 
 TRACK = np.dtype(
@@ -36,6 +36,7 @@ TRACK = np.dtype(
         ("pose", "f8", (2, 2)),  # of x y, caused by the pose covariance of the station [m²]
         ("vague", "?"),  # the covariance of the position is unknown
         ("moving", "?"),  # the velocity is known
+        ("measured", "?"),  # the velocity is a measurement of one report, and not the state of a filter
         ("judged", "?"),  # the station tracks the object and reports its existence probability
         ("body", "f8", (4,)),  # z l w h [m]
         ("weight", "f8"),  # weight of the body: sum of scores
@@ -101,6 +102,7 @@ def _converted(reports: Sequence[Report]) -> Table:
     counts = [len(found) for found in lists]
     covariance = table["covariance"]
     covariance[:, :2, :2] = np.concatenate([found.covariance for found in lists])
+    is_exact = covariance[:, 0, 0] + covariance[:, 1, 1] == 0.0
     table["vague"] = make_plausible(covariance)
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
@@ -112,7 +114,9 @@ def _converted(reports: Sequence[Report]) -> Table:
     moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
-    covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
+    measured = table["measured"] = moving & ~table["judged"] & ~table["vague"] & ~is_exact
+    deviation = np.where(moving, np.where(measured, MEASURED_SPEED, KNOWN_SPEED), UNKNOWN_SPEED)
+    covariance[:, 2, 2] = covariance[:, 3, 3] = deviation**2
     table["heading"], table["heading_covariance"] = initiate_heading(boxes[:, 6])
     table["facing"] = 1.0
     table["station"] = np.repeat(np.arange(len(reports)), counts)
@@ -181,9 +185,9 @@ def update_tracks(
 ) -> Table:
     """Return the tracks of several stations after one report of each, sorted by station; `tracks` is changed.
 
-    Tracks that the station did not detect for `max_age` seconds are deleted. A report with velocities replaces the
-    state, because its sender has filtered the object, and filtering it again would count its past twice. Reports with
-    positions only are filtered by a Kalman filter.
+    Tracks that the station did not detect for `max_age` seconds are deleted. Velocities of a station with a tracker,
+    and exact ones, replace the state: filtering it again would count its past twice. Other positions and velocities are
+    measurements of a Kalman filter.
 
     tracks     with the index of the report of its station as station
     receivers  index of the receiving station of each report
@@ -224,14 +228,15 @@ def update_tracks(
 def _update(old: Table, new: Table) -> Table:
     """Update predicted tracks with the boxes `new` of a report; return `new` with the updated state."""
     after = new
-    still = ~new["moving"]
+    still, measured = ~new["moving"], new["measured"]
     if still.any():
-        before, given = old[still], new[still]
         # The existence probability of a tracking station includes its past; other reports are independent.
-        after["existence"][still] = np.where(given["judged"], given["existence"], _existence_after(before, given))
-        mean, covariance = _kalman_update(before, given)
-        after["mean"][still], after["covariance"][still] = mean, covariance
+        given = new[still]
+        after["existence"][still] = np.where(given["judged"], given["existence"], _existence_after(old[still], given))
         after["moving"][still] = True
+    for rows, size in ((still, 2), (measured, 4)):
+        if rows.any():
+            after["mean"][rows], after["covariance"][rows] = _kalman_update(old[rows], new[rows], size)
     after["heading"], after["heading_covariance"], after["facing"] = update_heading(
         old["heading"], old["heading_covariance"], old["facing"], new["heading"][:, 0]
     )
@@ -254,13 +259,13 @@ def _existence_after(old: Table, new: Table) -> Array:
     return detected(old["existence"], likelihood_ratio(squared, determinant, new["score"]))
 
 
-def _kalman_update(old: Table, new: Table) -> tuple[Array, Array]:
-    """Return state and covariance after a Kalman update by the positions of `new`, in Joseph form."""
-    covariance, noise = old["covariance"], new["covariance"][:, :2, :2]
-    gain = covariance[:, :, :2] @ np.linalg.inv(covariance[:, :2, :2] + noise)
-    innovation = new["mean"][:, :2] - old["mean"][:, :2]
+def _kalman_update(old: Table, new: Table, size: int) -> tuple[Array, Array]:
+    """Return state and covariance after a Kalman update by the first `size` components of `new`, in Joseph form."""
+    covariance, noise = old["covariance"], new["covariance"][:, :size, :size]
+    gain = covariance[:, :, :size] @ np.linalg.inv(covariance[:, :size, :size] + noise)
+    innovation = new["mean"][:, :size] - old["mean"][:, :size]
     rest = np.broadcast_to(np.eye(4), covariance.shape).copy()
-    rest[:, :, :2] -= gain
+    rest[:, :, :size] -= gain
     after = rest @ covariance @ np.swapaxes(rest, 1, 2) + gain @ noise @ np.swapaxes(gain, 1, 2)
     return old["mean"] + (gain @ innovation[:, :, None])[:, :, 0], after
 

@@ -27,13 +27,18 @@ def make_report(
     kind: str = "car",
     score: float = 0.9,
     size: tuple[float, float, float] = (4.5, 1.8, 1.5),
-    tracks: tuple[int, ...] = (),
+    tracks: tuple[int, ...] | None = None,
     complete: bool = True,
     arrived: float | None = None,
     state: StationState | None = None,
 ) -> Report:
-    """Return a report of objects at these positions; `covariance` is a variance or one or more matrices."""
+    """Return a report of objects at these positions; `covariance` is a variance or one or more matrices.
+
+    tracks  None: objects with velocities are tracked
+    """
     count = len(places)
+    if tracks is None:
+        tracks = tuple(range(count)) if np.isfinite(velocity).all() else ()
     boxes = np.zeros((count, 7))
     boxes[:, :2] = np.array(places, dtype=float).reshape(count, 2)
     boxes[:, 2], boxes[:, 3:6], boxes[:, 6] = size[2] / 2, size, yaw
