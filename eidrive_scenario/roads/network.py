@@ -264,7 +264,8 @@ class RoadNetwork(RoadAttributes):
         is the visit of the route (`Route.visit`), which may pass a road several times. The distance is measured along
         the lane, or along the reference lines.
         """
-        return self.movement.advance(location, distance, route, choose, visit, to_end, by_reference_line)
+        end = self.movement.travel(location, distance, route, choose, visit, to_end, by_reference_line)
+        return None if end is None else end[0]
 
     def route(
         self,

@@ -63,7 +63,7 @@ class Movement:
         self._links = links
         self._steady: dict[tuple[str, int], SteadyLane] = {}
 
-    def advance(
+    def travel(
         self,
         location: LaneLocation,
         distance: float,
@@ -72,8 +72,11 @@ class Movement:
         visit: int = 0,
         to_end: bool = False,
         by_reference_line: bool = False,
-    ) -> LaneLocation | None:
+    ) -> tuple[LaneLocation, int] | None:
         """Return the location `distance` [m] further in the driving direction (backwards if negative), or None.
+
+        The second result is the direction of travel there: +1 along s, else -1. It is against the traffic of a lane
+        if the only link leads to the end of that lane, as of sidewalks on maps of CARLA.
 
         The distance is measured on the path at the offset of the location, or along the reference lines. Where the lane
         forks, the branch is selected by the route, else by `choose`, else it is that of the default route. If the lane
@@ -118,10 +121,10 @@ class Movement:
             lane = section.lanes[key.lane]
             s = section.s if direction > 0 else section.end
         t, _ = lane_t(road, section, lane, s)
-        return LaneLocation(road.id, lane.id, s, offset, t + offset)
+        return LaneLocation(road.id, lane.id, s, offset, t + offset), direction
 
     def step_in_section(self, location: LaneLocation, distance: float) -> tuple[LaneLocation, Pose] | None:
-        """Return the location of `advance`, and the pose there with the heading of the lane along s.
+        """Return the location of `travel`, and the pose there with the heading of the lane along s.
 
         The result is None if the step leaves the lane section, or if the lane does not exist.
         """

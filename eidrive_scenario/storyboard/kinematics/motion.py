@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 from eidrive_scenario.base.geometry import wrap_angle
@@ -67,11 +68,6 @@ class Motion(MotionState):
     def set_route(self, route: Route | None, branch_selector: BranchSelector | None = None) -> None:
         """Set the route, and the selector of branches at junctions that the route does not cover."""
         self._route, self._visit, self._branch_selector, self._rests = route, 0, branch_selector, False
-
-    def ahead(self, here: LaneLocation, distance: float) -> LaneLocation | None:
-        """Return the location at a distance along lane and route [m]; None if the lane ends before."""
-        assert self.roads is not None
-        return self.roads.advance(here, distance, route=self._route, choose=self._branch_selector, visit=self._visit)
 
     def teleport(self, position: ResolvedPosition) -> None:
         """Teleport the actor; its speed is kept.
@@ -206,7 +202,10 @@ class Motion(MotionState):
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
         lane_pose: Pose | None = None
         if distance != 0.0:
-            here, lane_pose = self._advance(here, distance * self.direction)
+            direction = self.direction
+            here, lane_pose = self._advance(here, distance * direction)
+            if self.direction != direction:
+                left = -left
         if steering is not None:
             self._heading = wrap_angle(
                 (0.0 if self.direction > 0 else math.pi) + self._angle_to_lane(steering, left, distance, total, dt)
@@ -227,6 +226,7 @@ class Motion(MotionState):
     def _advance(self, here: LaneLocation, distance: float) -> tuple[LaneLocation, Pose | None]:
         """Return the location at a distance along lane and route [m] or at the end of the lane, where the actor stops.
 
+        The actor turns by 180° to its lane where it enters one against the traffic, so that it keeps its yaw.
         The pose with the heading of the lane along s is returned as well if the actor remains in its lane section.
         """
         assert self.roads is not None
@@ -236,14 +236,19 @@ class Motion(MotionState):
             if self._route is not None:
                 self._enter_lap(here, within[0])
             return within
-        reached = self.ahead(here, distance)
-        if reached is None:
-            reached = self._lane_end(here, distance)
+        travel = partial(self.roads.movement.travel, here, distance, self._route, self._branch_selector, self._visit)
+        end = travel()
+        if end is None:
+            end = travel(to_end=True)
+            assert end is not None
             if self._end_of_road:
                 self._speed = 0.0
             self._end_of_road = True
         else:
             self._end_of_road = False
+        reached, direction = end
+        if (direction > 0) != (self.roads.driving_direction(reached.road, reached.lane) * distance > 0.0):
+            self._heading = wrap_angle(self._heading + math.pi)
         if self._route is not None and reached.road != here.road:
             self._visit = self._route.visit(reached.road, self._visit)
         self._enter_lap(here, reached)
@@ -284,15 +289,6 @@ class Motion(MotionState):
         if distance == 0.0 or left == 0.0:
             return 0.0
         return math.atan(left * self.direction / distance)
-
-    def _lane_end(self, here: LaneLocation, distance: float) -> LaneLocation:
-        """Return the end of the lane within the distance [m], inside the road or at its end."""
-        assert self.roads is not None
-        last = self.roads.advance(
-            here, distance, route=self._route, choose=self._branch_selector, visit=self._visit, to_end=True
-        )
-        assert last is not None
-        return last
 
     def _move_freely(self, distance: float) -> None:
         x, y, z, h, p, r = self._pose

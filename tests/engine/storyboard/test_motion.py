@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion
@@ -105,6 +105,49 @@ def test_step_beyond_the_end_of_a_lane_stops_there(
     assert motion.end_of_road
     placement = motion.step(0.1)
     assert (placement.x, placement.speed) == (pytest.approx(end), 0.0)
+
+
+def roads_with_opposed_lanes() -> RoadNetwork:
+    """Lane -1 of road 1 meets lane 1 of road 2, whose traffic drives towards it: both along y = -2 from x = 0 to 200.
+
+    Sidewalks on maps of CARLA are linked so.
+    """
+    first = section_xml(right=lane_xml(-1, 4, kind="sidewalk", link=lane_links_xml(after=1)))
+    second = section_xml(lane_xml(1, 4, kind="sidewalk", link=lane_links_xml(-1)))
+    return RoadNetwork.parse(
+        map_xml(
+            road_xml("1", link=successor_xml("2"), lanes=first),
+            road_xml("2", x=100.0, y=-4.0, link=predecessor_xml("1"), lanes=second),
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("heading", "speed", "x"), [(0.0, 10.0, 101.0), (0.0, -10.0, 79.0), (math.pi, -10.0, 101.0), (math.pi, 10.0, 79.0)]
+)
+def test_actor_keeps_its_yaw_in_a_lane_that_it_enters_against_the_traffic(
+    heading: float, speed: float, x: float
+) -> None:
+    motion = on_lane(roads_with_opposed_lanes(), -1, 90.0, heading=heading)
+    motion.set_speed(speed)
+    for _ in range(11):
+        placement = motion.step(0.1)
+    assert (placement.x, placement.y) == pytest.approx((x, -2.0))
+    assert math.cos(placement.yaw - heading) == pytest.approx(1.0)
+    motion.set_speed(-speed)
+    for _ in range(11):
+        placement = motion.step(0.1)
+    assert (placement.x, placement.y) == pytest.approx((90.0, -2.0))
+    assert math.cos(placement.yaw - heading) == pytest.approx(1.0)
+
+
+def test_lateral_step_into_a_lane_against_the_traffic_turns_the_actor_to_the_same_side() -> None:
+    motion = on_lane(roads_with_opposed_lanes(), -1, 99.5)
+    motion.set_speed(10.0)
+    motion.set_lateral_step(LateralStep(0.6))
+    placement = motion.step(0.1)
+    assert (placement.x, placement.y) == pytest.approx((100.3, -1.4))
+    assert placement.yaw == pytest.approx(math.atan2(0.6, 0.8))
 
 
 @pytest.mark.parametrize(("lane", "y"), [(-1, -1.4), (1, 1.4)])
