@@ -89,8 +89,6 @@ class Movement:
         if not with_traffic:
             direction = -direction
         remaining, s, offset = abs(distance), min(max(location.s, 0.0), road.length), location.offset
-        if not with_traffic or direction < 0:
-            section, lane = _section_behind(road, section, lane, s, direction)
         while True:
             if by_reference_line:
                 s, remaining = _along_reference_line(road, section, s, direction, remaining)
@@ -234,16 +232,6 @@ def _default_branch(branches: Sequence[Branch], road: Road) -> Branch:
     if not is_far_side:
         return chosen
     return next((branch for branch in branches if abs(branch.turn + chosen.turn) < EQUAL_TURN), chosen)
-
-
-def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, direction: int) -> tuple[LaneSection, Lane]:
-    """Return the preceding section if the motion is against s and starts exactly at the start of a section."""
-    if direction < 0 and s == section.s and section.index > 0:
-        before = road.sections[section.index - 1]
-        for number in lane.predecessors or (lane.id,):
-            if number in before.lanes:
-                return before, before.lanes[number]
-    return section, lane
 
 
 def _along_reference_line(

@@ -86,6 +86,10 @@ def section(s: float, number: int, link: str = "") -> str:
     return section_xml(right=lane, s=s) if number < 0 else section_xml(lane, s=s)
 
 
+NARROWED = section_xml(lane_xml(2, 4, link=lane_links_xml(1)) + lane_xml(1, 4, kind="none"), s=100)
+"""Section whose lane 2 continues lane 1 of the section before, beside a lane 1 without a link."""
+
+
 @pytest.mark.parametrize(
     ("sections", "lane", "start", "speed", "end"),
     [
@@ -93,12 +97,13 @@ def section(s: float, number: int, link: str = "") -> str:
         (section(0, -1) + section(100, 1), 1, 101.0, 30.0, 100.0),
         (section(0, 1) + section(100, -1), -1, 101.0, -30.0, 100.0),
         (section(0, -2, lane_links_xml(after=-1)) + section(199, -1, lane_links_xml(-2)), -2, 198.0, 30.0, 200.0),
+        (section(0, 1) + NARROWED, 1, 101.0, 30.0, 100.0),
     ],
 )
 def test_step_beyond_the_end_of_a_lane_stops_there(
     sections: str, lane: int, start: float, speed: float, end: float
 ) -> None:
-    """Lanes that end inside their road, and a lane with another id in the last section."""
+    """Lanes that end inside their road, lanes with another id in the last section, and one linked to none of its id."""
     motion = on_lane(RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=sections))), lane, start)
     motion.set_speed(speed)
     assert motion.step(0.1).x == pytest.approx(end)
