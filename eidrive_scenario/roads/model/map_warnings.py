@@ -26,6 +26,7 @@ GEOMETRY_GAP = MapRule("geometry-gap", "a road whose geometries do not join")
 HEADING_DISCONTINUITY = MapRule("heading-discontinuity", "a road whose heading changes abruptly")
 LANE_WIDTH = MapRule("lane-width", "a lane with a missing, negative or implausible width")
 LANE_SIDE = MapRule("lane-side", "a lane on the wrong side of the center lane")
+EMPTY_LANE_SECTION = MapRule("empty-lane-section", "a lane section with only the center lane")
 LANE_LAYER = MapRule("lane-layer", "a temporary layer of lanes, which is not read")
 ROAD_LINK = MapRule("road-link", "a link to a missing junction, or to a point within a road")
 ROAD_SURFACE = MapRule("road-surface", "a cross section that is not read, or a superelevation that is too steep")
@@ -39,6 +40,7 @@ MAP_RULES = (
     HEADING_DISCONTINUITY,
     LANE_WIDTH,
     LANE_SIDE,
+    EMPTY_LANE_SECTION,
     LANE_LAYER,
     ROAD_LINK,
     ROAD_SURFACE,

@@ -13,7 +13,7 @@ from eidrive_scenario.base.arrays import Array, Integers
 Piece = tuple[float, float, float, float, float]
 """Start s of a piece and its coefficients a, b, c, d; ds counts from that start."""
 ROUNDING = 1e-6
-"""Maximum start of a first piece that is extended to 0 [m]."""
+"""Maximum difference of two starts that is attributed to rounding [m]."""
 
 
 class Polynomials:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Literal, overload
 
 from lxml import etree
@@ -10,6 +11,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
 from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.roads.model.map_warnings import ROAD_MARK, MapRule, MapWarning
+from eidrive_scenario.roads.model.polynomials import ROUNDING, Piece
 
 MAX_ERRORS = 100
 """Maximum number of errors of a file. Reading ends when it is reached."""
@@ -91,15 +93,19 @@ class AttributeReader:
         message, hint = f"{what}, and is drawn without it", "correct it or remove the element"
         self.report_warning(element, ROAD_MARK, "incomplete road marks", message, hint)
 
-    def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
-        """Return a piece of a cubic polynomial: its start and a, b, c, d."""
-        return (
-            self.number(element, start),
-            self.number(element, "a"),
-            self.number(element, "b"),
-            self.number(element, "c"),
-            self.number(element, "d"),
-        )
+    def pieces(self, elements: Iterable[etree._Element], start: str) -> list[Piece]:
+        """Return the pieces of a function, in the order of their starts.
+
+        A piece that the next one replaces within ROUNDING is omitted. RoadRunner writes such pieces with lengths of
+        1e-14 m and coefficients of 1e25.
+        """
+        ordered = sorted(((self.number(element, start), element) for element in elements), key=lambda pair: pair[0])
+        pieces: list[Piece] = []
+        for i, (s, element) in enumerate(ordered):
+            if i + 1 == len(ordered) or ordered[i + 1][0] - s > ROUNDING:
+                a, b, c, d = (self.number(element, name) for name in ("a", "b", "c", "d"))
+                pieces.append((s, a, b, c, d))
+        return pieces
 
     def text(self, element: etree._Element, name: str, default: str | None = None) -> str:
         """Return a text. A missing attribute without a default is reported and gives ''."""

@@ -139,8 +139,9 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
         sections = read_sections(lanes, length, lane_offset, collector)
     junction = element.get("junction", "-1")
     for profile in element.iterfind("lateralProfile/*"):
-        level = [collector.number(profile, name, 0.0) == 0.0 for name in "abcd"]
-        if profile.tag == "crossSectionSurface" or (profile.tag in ("shape", "crossfall") and not all(level)):
+        if profile.tag == "crossSectionSurface" or (
+            profile.tag in ("shape", "crossfall") and any([collector.number(profile, name, 0.0) for name in "abcd"])
+        ):
             message = f"road {number!r} has <{profile.tag}>, which is ignored: its cross section is straight"
             hint = "specify the slope by <superelevation>"
             collector.report_warning(profile, ROAD_SURFACE, "ignored cross sections", message, hint)
@@ -176,7 +177,7 @@ def _permanent_lanes(number: str, road: etree._Element, collector: AttributeRead
 
 
 def _profile(road: etree._Element, path: str, collector: AttributeReader) -> Polynomials:
-    return Polynomials(collector.polynomial(element, "s") for element in road.iterfind(path))
+    return Polynomials(collector.pieces(road.iterfind(path), "s"))
 
 
 def _read_types(road: etree._Element, collector: AttributeReader) -> list[RoadType]:

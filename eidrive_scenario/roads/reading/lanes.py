@@ -12,7 +12,7 @@ import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.roads.model.map_warnings import LANE_SIDE
+from eidrive_scenario.roads.model.map_warnings import EMPTY_LANE_SECTION, LANE_SIDE
 from eidrive_scenario.roads.model.polynomials import Polynomials, combine
 from eidrive_scenario.roads.model.road_map import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
@@ -38,7 +38,7 @@ def read_speed(element: etree._Element, collector: AttributeReader) -> float | N
 
 def read_lane_offset(lanes: etree._Element, collector: AttributeReader) -> Polynomials:
     """Return the distance of lane 0 from the reference line."""
-    return Polynomials(collector.polynomial(element, "s") for element in lanes.iterfind("laneOffset"))
+    return Polynomials(collector.pieces(lanes.iterfind("laneOffset"), "s"))
 
 
 def read_sections(
@@ -164,8 +164,13 @@ def _read_section(
             lanes[number] = lane
             edge = lane.outer
     if not any(lanes):
-        collector.report_error(
-            section, "<laneSection> has no lane except the center lane", "add a lane under <left> or <right>"
+        # RoadRunner exports the georeference as such a road. OpenDRIVE requires a lane on a side since 1.6.
+        collector.report_warning(
+            section,
+            EMPTY_LANE_SECTION,
+            "lane sections with only the center lane",
+            "<laneSection> has no lane except the center lane, so vehicles cannot drive there",
+            "add a lane under <left> or <right>",
         )
     return {number: lanes[number] for number in sorted(lanes, reverse=True)}
 
@@ -213,8 +218,8 @@ def _read_width(
     A <border> counts from the reference line. <width> has priority if both are given (clause 11.7).
     """
     begin = float(element.get(ORIGIN, "0"))
-    widths = [collector.polynomial(e, "sOffset") for e in element.iterfind("width")]
-    borders = [collector.polynomial(e, "sOffset") for e in element.iterfind("border")]
+    widths = collector.pieces(element.iterfind("width"), "sOffset")
+    borders = collector.pieces(element.iterfind("border"), "sOffset")
     given = Polynomials(widths or borders)
     width_from = min((start for start, *_ in widths or borders), default=math.inf) + begin
     if begin:

@@ -232,10 +232,9 @@ def lane_position(frame: model.LanePosition, context: ConditionContext, actor: s
     lane = lane_id(frame, frame.lane_id)
     lanes = roads.lane_ids(frame.road_id, s)
     if lane not in lanes and lane != 0:
-        names = ", ".join(str(number) for number in lanes)
-        raise position_error(
-            frame, f"unknown lane {lane} of road {frame.road_id!r} at s = {s:g}", f"expected one of {names}"
-        )
+        names = ", ".join(map(str, lanes))
+        expected = f"expected one of {names}" if names else "the road has no lanes there"
+        raise position_error(frame, f"unknown lane {lane} of road {frame.road_id!r} at s = {s:g}", expected)
     return in_lane(roads, frame.road_id, lane, s, frame.offset or 0.0, frame.orientation)
 
 

@@ -88,6 +88,41 @@ def test_implausible_number_is_an_error() -> None:
     ]
 
 
+PIECES = (
+    '<{0} {1}="0" a="{2}" b="0.01" c="0" d="0"/><{0} {1}="40" a="{3}" b="0.01" c="-3e11" d="2e25"/>'
+    '<{0} {1}="40.00000000000001" a="{3}" b="0" c="0" d="0"/>'
+)
+"""Pieces of a function that ascends by 0.4 to s = 40 m and is constant after it; the second one has no extent."""
+
+
+def test_piece_without_extent_may_have_any_coefficients() -> None:
+    """RoadRunner exports have pieces of 1e-14 m that are fitted to a few values."""
+    profiles = (
+        f"<elevationProfile>{PIECES.format('elevation', 's', 5.0, 5.4)}</elevationProfile>"
+        f"<lateralProfile>{PIECES.format('superelevation', 's', 0.0, 0.4)}</lateralProfile>"
+    )
+    wide, bordered = PIECES.format("width", "sOffset", 3.0, 3.4), PIECES.format("border", "sOffset", 2.0, 2.4)
+    lanes = PIECES.format("laneOffset", "s", 1.0, 1.4) + section_xml(
+        f'<lane id="1" type="driving">{bordered}</lane>', f'<lane id="-1" type="driving">{wide}</lane>'
+    )
+    network = RoadNetwork.parse(map_xml(road_xml(profiles=profiles, lanes=lanes)))
+    road = network.roads["1"]
+    left, right = road.sections[0].lanes[1], road.sections[0].lanes[-1]
+    # The left lane extends from the lane offset to its border.
+    functions = (road.elevation, road.superelevation, road.lane_offset, right.width, left.width)
+    for s, expected in ((20.0, (5.2, 0.2, 1.2, 3.2, 1.0)), (60.0, (5.4, 0.4, 1.4, 3.4, 1.0))):
+        assert [function.value(s) for function in functions] == pytest.approx(expected)
+
+
+def test_first_piece_without_extent_is_replaced_from_the_start() -> None:
+    widths = "".join(f'<width sOffset="{s}" a="{a}" b="0" c="0" d="0"/>' for s, a in ((0, 9), (1e-14, 3)))
+    network = RoadNetwork.parse(
+        map_xml(road_xml(lanes=section_xml("", f'<lane id="-1" type="driving">{widths}</lane>')))
+    )
+    assert network.map_warnings == ()
+    assert network.lane_pose_at("1", -1, 0.0).y == pytest.approx(-1.5)
+
+
 def test_route_over_a_geometry_gap_adds_no_points() -> None:
     far = geometry(0.0, 0.0, 50.0) + geometry(50.0, 9e8, 50.0)
     network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), geometry=far)))

@@ -211,6 +211,20 @@ def test_links_bypass_a_section_of_zero_length() -> None:
         assert network.roads["1"].sections[0].lanes[number].successors == (number,)
 
 
+def test_section_without_lanes_ends_the_lanes_beside_it() -> None:
+    """RoadRunner exports its georeference as a road with the center lane only."""
+    reference = road_xml("reference", y=50.0, lanes=section(0))
+    text = map_xml(reference, road_xml("1", lanes=section(0, lane(-1)) + section(60)))
+    message = "<laneSection> has no lane except the center lane, so vehicles cannot drive there"
+    first, *others = map_warnings(text)
+    assert first == ("empty-lane-section", f"{message}; 1 more of lane sections with only the center lane: line 1")
+    assert {rule for rule, _ in others} == {"lane-link"}
+    network = RoadNetwork.parse(text)
+    assert list(network.lane_ids("1", 80.0)) == list(network.lane_ids("reference", 50.0)) == []
+    assert network.advance(network.location("1", -1, 50.0), 9.0) is not None
+    assert network.advance(network.location("1", -1, 50.0), 11.0) is None
+
+
 @pytest.mark.exhaustive
 def test_corpus_maps_have_only_known_warnings(corpora: Path) -> None:
     """Each map has at most one warning per kind. The expected ones were verified in the files."""

@@ -176,6 +176,21 @@ def test_unresolvable_position_is_rejected(on_street: Any, frame: Any, text: Any
         resolve_position(model.Position(**frame), on_street)
 
 
+def test_positions_in_a_lane_section_without_lanes(context: Any) -> None:
+    lanes = section_xml(right=lane_xml(-1, 4.0)) + section_xml(s=60.0)
+    roads = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    here = roads.location("1", -1, 50.0)
+    made.add_actor("A", ResolvedPosition(roads.pose(here), here))
+    with pytest.raises(ScenarioError, match="unknown lane -1 of road '1' at s = 70; the road has no lanes there"):
+        resolve_position(model.Position(lane_position=model.LanePosition(road_id="1", lane_id="-1", s=70)), made)
+    road = model.RoadPosition(road_id="1", s=70, t=-3)
+    relative_road = model.RelativeRoadPosition(entity_ref="A", ds=20, dt=-1)
+    for position in (model.Position(road_position=road), model.Position(relative_road_position=relative_road)):
+        pose = resolve_position(position, made).pose
+        assert (pose.x, pose.y) == pytest.approx((70.0, -3.0))
+
+
 def test_position_beyond_road_end_is_limited_with_warning(on_street: Any) -> None:
     frame = model.LanePosition(road_id="1", lane_id="-1", s=300)
     location = resolve_position(model.Position(lane_position=frame), on_street).location
