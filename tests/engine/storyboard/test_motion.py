@@ -130,9 +130,7 @@ def roads_with_opposed_lanes() -> RoadNetwork:
 @pytest.mark.parametrize(
     ("heading", "speed", "x"), [(0.0, 10.0, 101.0), (0.0, -10.0, 79.0), (math.pi, -10.0, 101.0), (math.pi, 10.0, 79.0)]
 )
-def test_actor_keeps_its_yaw_in_a_lane_that_it_enters_against_the_traffic(
-    heading: float, speed: float, x: float
-) -> None:
+def test_actor_that_enters_a_lane_against_the_traffic_keeps_its_yaw(heading: float, speed: float, x: float) -> None:
     motion = on_lane(roads_with_opposed_lanes(), -1, 90.0, heading=heading)
     motion.set_speed(speed)
     for _ in range(11):
@@ -146,7 +144,7 @@ def test_actor_keeps_its_yaw_in_a_lane_that_it_enters_against_the_traffic(
     assert math.cos(placement.yaw - heading) == pytest.approx(1.0)
 
 
-def test_lateral_step_into_a_lane_against_the_traffic_turns_the_actor_to_the_same_side() -> None:
+def test_lateral_step_into_a_lane_against_the_traffic_keeps_its_side() -> None:
     motion = on_lane(roads_with_opposed_lanes(), -1, 99.5)
     motion.set_speed(10.0)
     motion.set_lateral_step(LateralStep(0.6))
