@@ -18,6 +18,7 @@ from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.recording.text.run_log import describe_kind
 from eidrive_scenario.simulation import RunResult
+from eidrive_scenario.simulation.result import quantity_text
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -129,14 +130,10 @@ def _row(verdict: Verdict) -> tuple[Text, ...]:
     return (
         Text(verdict.name),
         mark,
-        Text(_quantity(verdict.value, verdict.unit)),
-        Text(_quantity(verdict.limit, verdict.unit)),
+        Text(quantity_text(verdict.value, verdict.unit)),
+        Text(quantity_text(verdict.limit, verdict.unit)),
         Text(verdict.reason),
     )
-
-
-def _quantity(value: float | None, unit: str) -> str:
-    return "" if value is None else f"{value:.3f} {unit}" if unit else f"{value:g}"
 
 
 def storyboard_tree(storyboard: Storyboard) -> Tree:

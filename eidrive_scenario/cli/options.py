@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping
-from enum import StrEnum
 from functools import partial, wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,6 +13,7 @@ import typer
 from typer.core import TyperCommand
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import RunOption, RunSettings, options_of
 
 RARE = "Further options"
@@ -110,18 +110,10 @@ def _parameter(option: RunOption) -> inspect.Parameter:
     )
 
 
-class Keep(StrEnum):
-    """Values of --record."""
-
-    always = "always"
-    on_failure = "on-failure"
-    never = "never"
+Record = Annotated[RecordMode | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")]
 
 
-Record = Annotated[Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")]
-
-
-def check_record(record: Keep | None, out: Path | None) -> None:
+def check_record(record: RecordMode | None, out: Path | None) -> None:
     """Raise SettingError for `--record` without `--out`."""
     if record is not None and out is None:
         raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))

@@ -126,15 +126,12 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
     if isinstance(error, EidriveError):
         subject = f"{what} " if isinstance(error, SimulationError) or file is not None else ""
         echo(f"{prefix}{subject}aborted: {error}", err=True)
-        print_notes(error)
-        return
-    if isinstance(error, OSError) and error.strerror:
+    elif isinstance(error, OSError) and error.strerror:
         filename = f": {error.filename}" if error.filename is not None else ""
         echo(f"{prefix}aborted: {error.strerror}{filename}", err=True)
-        print_notes(error)
-        return
-    echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)
-    echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) prints the traceback; please report it", err=True)
+    else:
+        echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)
+        echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) prints the traceback; please report it", err=True)
     print_notes(error)
 
 

@@ -9,7 +9,9 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.errors import Diagnostic, SettingError
 
 
 def judge(
@@ -29,7 +31,7 @@ def judge(
 
     Exit codes as for eidrive run; 3 also for an incomplete or damaged recording.
     """
-    from eidrive_scenario.cli.output import echo, has_all_characters
+    from eidrive_scenario.cli.output import has_all_characters
     from eidrive_scenario.experiments.judgement import judge_recording
     from eidrive_scenario.experiments.single_run import as_json_text
 
@@ -79,8 +81,6 @@ def export(
     """
     from functools import partial
 
-    from eidrive_scenario.cli.options import check_output_paths
-    from eidrive_scenario.errors import Diagnostic, SettingError
     from eidrive_scenario.export.foxglove.writer import write_foxglove
     from eidrive_scenario.export.osi.trace import write_osi
     from eidrive_scenario.export.recorded_run import open_run
@@ -102,5 +102,4 @@ def export(
     for path, write in given.values():
         write(run, path)
         echo(str(path))
-    for warning in dict.fromkeys(run.warnings):
-        echo(f"warning: {warning}", color="yellow", err=True)
+    print_warnings(dict.fromkeys(run.warnings))

@@ -6,7 +6,7 @@ import json as json_text
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from eidrive_scenario.cli.output import echo
+from eidrive_scenario.cli.output import echo, print_warnings
 from eidrive_scenario.errors import (
     FAILED,
     INVALID_INPUT,
@@ -45,8 +45,7 @@ def run_distribution(
     expansion = load_distribution(path, seed=seed)
     _check_not_varied(expansion, parameters)
     numbers = range(len(expansion)) if max_runs is None else expansion.spread(max_runs)
-    for warning in expansion.warnings:
-        echo(f"warning: {warning}", color="yellow", err=True)
+    print_warnings(map(str, expansion.warnings))
     counts = {"passed": 0, "not passed": 0, "not judged": 0, "excluded by constraints": 0}
     code = 0
     last: ConstraintError | None = None

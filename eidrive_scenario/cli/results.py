@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.options import (
-    check_output_paths,
-)
+from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.cli.output import echo, print_warnings
 from eidrive_scenario.errors import FAILED, PASSED, Diagnostic, SettingError
 

@@ -13,7 +13,6 @@ import typer
 
 from eidrive_scenario.cli.options import (
     HelpAll,
-    Keep,
     Record,
     check_output_paths,
     check_record,
@@ -31,6 +30,7 @@ from eidrive_scenario.errors import (
     InputError,
     SettingError,
 )
+from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import RunSettings, check_seconds
 
 if TYPE_CHECKING:
@@ -131,12 +131,12 @@ def run(
 
     if json and log == STANDARD_OUTPUT:
         raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))
-    if no_record and record not in (None, Keep.never):
+    if no_record and record not in (None, RecordMode.NEVER):
         message = f"--no-record and --record {record} contradict each other"
         raise SettingError(Diagnostic(message, "remove one of them"))
     check_record(record, out)
-    kept = Keep.never.value if no_record else (record or Keep.always).value
-    tools = _tools(topics, is_recorded=out is not None and kept != Keep.never.value)
+    kept = RecordMode.NEVER if no_record else record or RecordMode.ALWAYS
+    tools = _tools(topics, is_recorded=out is not None and kept is not RecordMode.NEVER)
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
     if wall_limit is not None:
         check_seconds("--wall-limit", wall_limit)
@@ -224,7 +224,7 @@ class _Runs:
     failures: RunFailures
     view: LiveView | None
     out: Path | None
-    kept: str
+    kept: RecordMode
     tools: tuple[str, ...]
     csv: Path | None
     log: str | None

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.cli.output import echo, print_warnings
 from eidrive_scenario.errors import Diagnostic, SettingError
-
-if TYPE_CHECKING:
-    pass
-
 
 PictureSize = Annotated[
     str | None, typer.Option(metavar="WxH", help="Width and height of the picture in mm.", show_default="160x90")
@@ -54,10 +50,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     from eidrive_scenario.extensions.registry import registry
 
     if what is Names.scenarios:
-        # One line per scenario: name, family and description
-        from eidrive_scenario.extensions.library import describe_scenarios
-
-        lines = _columns([(entry.name, entry.family, entry.description) for entry in describe_scenarios()])
+        lines = _columns([(entry.name, entry.family, entry.description) for entry in library.describe_scenarios()])
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
     elif what is Names.weather:
@@ -256,10 +249,9 @@ def view(
         from eidrive_scenario.reporting.replay.page import make_replay
 
         damage = make_replay(opened, page, other=None if second is None else open_recording(second)).damage
-    for line in damage:
-        echo(f"warning: {path} is damaged: {line}", color="yellow", err=True)
-    for partial in filter(is_partial, [path, *([second] if second else [])]):
-        echo(f"warning: {partial}: the run did not end, the recording is incomplete", color="yellow", err=True)
+    print_warnings(f"{path} is damaged: {line}" for line in damage)
+    partials = filter(is_partial, [path, *([second] if second else [])])
+    print_warnings(f"{partial}: the run did not end, the recording is incomplete" for partial in partials)
     for written in (*stills.values(), gif, mp4, page):
         if written is not None:
             echo(str(written))
@@ -302,7 +294,12 @@ def report(
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
 
-    def warn(text: str) -> None:
-        echo(f"warning: {text}", color="yellow", err=True)
-
-    echo(str(report_files(runs, out, replays=replays, warn=warn, figures=figures, size=parse_size(size))))
+    page = report_files(
+        runs,
+        out,
+        replays=replays,
+        warn=lambda text: print_warnings([text]),
+        figures=figures,
+        size=parse_size(size),
+    )
+    echo(str(page))

@@ -10,7 +10,6 @@ import typer
 
 from eidrive_scenario.cli.options import (
     HelpAll,
-    Keep,
     Record,
     check_record,
     parse_seeds,
@@ -21,6 +20,7 @@ from eidrive_scenario.cli.options import (
 from eidrive_scenario.cli.output import echo, print_warnings
 from eidrive_scenario.cli.supervision import interrupt_once
 from eidrive_scenario.errors import ABORTED, NOT_JUDGED, PASSED, Diagnostic, SettingError
+from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import RunSettings, check_seconds
 
 if TYPE_CHECKING:
@@ -105,12 +105,13 @@ def sweep(
     if scheduler is None and not dry_run:
         start_server()  # First, as it imports for as long as the imports below
 
+    from eidrive_scenario.base.content_digest import package_versions
     from eidrive_scenario.cli.sweep_search import ProgressDisplay, Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
     from eidrive_scenario.experiments.run_folder import check_writable
     from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis, points_of, with_types
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
-    from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
+    from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of
     from eidrive_scenario.experiments.sweeps.searches import BATCH
     from eidrive_scenario.experiments.sweeps.store import ResultStore
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
@@ -119,7 +120,7 @@ def sweep(
 
     check_seconds("--wall-limit", wall_limit)
     check_record(record, out)
-    files = None if out is None else KeptFiles(out.absolute(), (record or Keep.always).value, store.absolute())
+    files = None if out is None else KeptFiles(out.absolute(), record or RecordMode.ALWAYS, store.absolute())
     path = resolve_scenario(scenario)
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
     kind = definition(path)
@@ -156,7 +157,7 @@ def sweep(
         raise typer.Exit
     if out is not None:
         check_writable(out)
-    with interrupt_once(), ResultStore.open(store, versions()) as opened:
+    with interrupt_once(), ResultStore.open(store, package_versions()) as opened:
         crew: Workers
         if scheduler is None:
             crew = LocalWorkers(min(workers or cores(), len(jobs) if search is None else BATCH))

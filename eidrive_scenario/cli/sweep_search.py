@@ -16,7 +16,7 @@ from eidrive_scenario.cli.output import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, check_different
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
-from eidrive_scenario.experiments.sweeps.searches import Boundary, Execute, falsify, find_boundary
+from eidrive_scenario.experiments.sweeps.searches import Execute, falsify, find_boundary
 from eidrive_scenario.experiments.sweeps.store import PASSED, ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, Workers
@@ -132,7 +132,7 @@ class Search:
             bound=self.bound,
             tolerance=self.tolerance,
             runs=self.runs,
-            shown=lambda boundary: echo(_estimate(boundary), err=True),
+            shown=lambda estimate: echo(f"{estimate.runs} runs: {estimate.low:.4g} to {estimate.high:.4g}", err=True),
         )
         name = self.boundary.name
         if math.isnan(boundary.value) or boundary.inside < 0.5:
@@ -158,10 +158,6 @@ class Search:
             echo(run.command)
         if not falsification.failures and falsification.least is not None:
             echo(f"nearest to a failure: {falsification.least.command}")
-
-
-def _estimate(boundary: Boundary) -> str:
-    return f"{boundary.runs} runs: {boundary.low:.4g} to {boundary.high:.4g}"
 
 
 INTERVAL = 30.0

@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.extensions.registry import third_party_files
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
-from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
+from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE, RecordMode
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_seed
@@ -28,14 +27,6 @@ from eidrive_scenario.simulation import Observer, RunResult, Simulation
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
     from eidrive_scenario.recording import Explanation
-
-
-class RecordMode(StrEnum):
-    """Runs whose recording and camera images are kept."""
-
-    ALWAYS = "always"
-    ON_FAILURE = "on-failure"
-    NEVER = "never"
 
 
 def record_mode(value: bool | str) -> RecordMode:
@@ -144,14 +135,7 @@ def _record(
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
     from eidrive_scenario.recording import CameraImageWriter
-    from eidrive_scenario.simulation.recorded_outcome import (
-        CONTEXT,
-        RunRecorder,
-        axle_metadata,
-        body_metadata,
-        criteria_context_text,
-        trailer_metadata,
-    )
+    from eidrive_scenario.simulation.recorded_outcome import RunRecorder, scenario_metadata
 
     images = CameraImageWriter(folder.images)
     images.watch(simulation.stack)
@@ -162,10 +146,7 @@ def _record(
         **given,
         "settings": resolved.canonical,
         "command": command,
-        CONTEXT: criteria_context_text(scenario),
-        **trailer_metadata(scenario),
-        **axle_metadata(scenario),
-        **body_metadata(scenario),
+        **scenario_metadata(scenario),
     }
     text = scenario.text if scenario.text is not None else _text(source)
     # The text of the scenario and its road, so that a replay needs no other files

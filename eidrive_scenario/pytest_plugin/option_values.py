@@ -15,8 +15,6 @@ from eidrive_scenario.run_options import NO_COOPERATION, Seconds, option_of
 
 NO_LIMIT = "none"
 """Value of the wall limit for no limit."""
-RECORD = ("always", "on-failure", "never")
-"""Runs whose recording is kept."""
 WITHOUT_CRITERIA = ("error", "warn", "pass")
 """Outcomes of a test whose run no criterion judges."""
 TOPICS = ("foxglove", "osi")

@@ -13,7 +13,6 @@ import pytest
 
 from eidrive_scenario.pytest_plugin.option_values import (
     NO_LIMIT,
-    RECORD,
     WITHOUT_CRITERIA,
     check_values,
     parse_choice,
@@ -24,6 +23,7 @@ from eidrive_scenario.pytest_plugin.option_values import (
     parse_seconds_or_none,
     parse_topics,
 )
+from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import OPTIONS as RUN_OPTIONS
 from eidrive_scenario.run_options import Form, PytestForm, RunOption
 
@@ -121,7 +121,7 @@ OPTIONS = (
         "record",
         "always|on-failure|never",
         "runs whose recording and camera images --eidrive-out keeps (default: always)",
-        parse_choice(RECORD),
+        parse_choice(tuple(RecordMode)),
     ),
     Option(
         "topics",

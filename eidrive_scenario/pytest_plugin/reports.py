@@ -75,7 +75,7 @@ def _folders(terminalreporter: Any) -> list[Path]:
     folders: dict[Path, None] = {}
     for reports in terminalreporter.stats.values():
         for report in reports:
-            facts = getattr(report, "eidrive", {})
+            facts = _facts(report)
             folders.update(dict.fromkeys(Path(folder) for folder in facts.get("folders", ())))
             folders.update(dict.fromkeys(Path(path).parent for path in facts.get("attachments", ())))
     return list(folders)
@@ -92,16 +92,16 @@ def register_attachments(config: pytest.Config) -> None:
 
 def attachment_lines(report: Any) -> list[str]:
     """Return a line for each attachment of a report whose test did not pass."""
-    facts: Mapping[str, Any] = getattr(report, "eidrive", {})
-    return [f"[[ATTACHMENT|{_ci_path(path)}]]" for path in facts.get("attachments", ())]
+    facts = _facts(report)
+    project = os.environ.get("CI_PROJECT_DIR")  # of a GitLab job; Jenkins requires absolute paths
+    return [f"[[ATTACHMENT|{_path_below(path, project)}]]" for path in facts.get("attachments", ())]
 
 
-def _ci_path(path: str) -> str:
-    """Return a path relative to the project of a GitLab job; an absolute path elsewhere, as Jenkins requires."""
-    project = os.environ.get("CI_PROJECT_DIR")
+def _path_below(path: str, folder: str | None) -> str:
+    """Return a path relative to a folder that contains it, else the absolute path."""
     full = Path(os.path.abspath(path))
-    if project and full.is_relative_to(os.path.abspath(project)):
-        return full.relative_to(os.path.abspath(project)).as_posix()
+    if folder and full.is_relative_to(os.path.abspath(folder)):
+        return full.relative_to(os.path.abspath(folder)).as_posix()
     return str(full)
 
 
@@ -180,7 +180,8 @@ def annotation(report: Any, root: Path) -> str:
     """Return the workflow command of one failed test: its place in the scenario file and its reasons."""
     facts = _facts(report)
     file = facts.get("file") or str(root / report.nodeid.split("::")[0])
-    position = f"file={_property(_below_workspace(file))},line={facts.get('line') or 1}"
+    workspace = os.environ.get("GITHUB_WORKSPACE") or os.getcwd()  # paths that GitHub maps to the repository
+    position = f"file={_property(_path_below(file, workspace))},line={facts.get('line') or 1}"
     return f"::error {position},title={_property(report.nodeid)}::{_data(_text(facts, report))}"
 
 
@@ -228,14 +229,6 @@ def _facts(report: Any) -> Mapping[str, Any]:
 
 def _text(facts: Mapping[str, Any], report: Any) -> str:
     return "\n".join(facts.get("reasons") or [str(getattr(report, "longrepr", "")).strip() or "failed"])
-
-
-def _below_workspace(file: str) -> str:
-    """Return a path as GitHub maps it to the repository: relative to the workspace."""
-    full = Path(os.path.abspath(file))
-    workspace = os.environ.get("GITHUB_WORKSPACE")
-    base = os.path.abspath(workspace) if workspace else os.getcwd()
-    return full.relative_to(base).as_posix() if full.is_relative_to(base) else str(full)
 
 
 def _data(text: str) -> str:

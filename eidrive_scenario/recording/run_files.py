@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,14 @@ _LARGEST = 256 * 2**20
 """Maximum size of a result [bytes]."""
 _MAX_DEPTH = 40
 """Maximum nesting depth of a result."""
+
+
+class RecordMode(StrEnum):
+    """Runs whose recording and camera images are kept."""
+
+    ALWAYS = "always"
+    ON_FAILURE = "on-failure"
+    NEVER = "never"
 
 
 def recording_in(location: Path) -> Path:

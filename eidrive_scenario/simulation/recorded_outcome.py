@@ -15,7 +15,7 @@ from eidrive_scenario.evaluation.criteria_parser import CriteriaContext
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import Axle, MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.openscenario.model import Axles, MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
@@ -164,30 +164,23 @@ def plain_verdict(verdict: Verdict) -> Verdict:
     return replace(verdict, passed=bool(verdict.passed), fatal=bool(verdict.fatal), **plain)
 
 
-def criteria_context_text(scenario: Scenario) -> str:
-    """Return the entry `CONTEXT` of the metadata of a run."""
-    return canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))
+def scenario_metadata(scenario: Scenario) -> dict[str, str]:
+    """Return the entries of the metadata of a run about its scenario.
 
-
-def trailer_metadata(scenario: Scenario) -> dict[str, str]:
-    """Return the entry `TRAILERS` of the metadata of a run; empty without trailers."""
+    They are `CONTEXT`, `TRAILERS` if there are trailers, `AXLES` if there are vehicles, and `BODIES`.
+    """
+    metadata = {CONTEXT: canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))}
+    vehicles = {name: entity for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
     towed = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)
     trailers = {
-        name: entity.vehicle_category.value
-        for name, entity in scenario.entities.items()
-        if isinstance(entity, Vehicle) and entity.vehicle_category in towed
+        name: vehicle.vehicle_category.value for name, vehicle in vehicles.items() if vehicle.vehicle_category in towed
     }
-    return {TRAILERS: canonical_json(trailers)} if trailers else {}
-
-
-def axle_metadata(scenario: Scenario) -> dict[str, str]:
-    """Return the entry `AXLES` of the metadata of a run; empty without vehicles."""
-    vehicles = {name: entity.axles for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
-    centers = {
-        name: AxleCenters(_center(axles.rear_axle), None if axles.front_axle is None else _center(axles.front_axle))
-        for name, axles in vehicles.items()
-    }
-    return {AXLES: canonical_json(codec(Mapping[str, AxleCenters]).encode(centers))} if centers else {}
+    if trailers:
+        metadata[TRAILERS] = canonical_json(trailers)
+    if vehicles:
+        centers = {name: _axle_centers(vehicle.axles) for name, vehicle in vehicles.items()}
+        metadata[AXLES] = canonical_json(codec(Mapping[str, AxleCenters]).encode(centers))
+    return metadata | {BODIES: canonical_json(codec(Mapping[str, Body]).encode(bodies(scenario)))}
 
 
 def bodies(scenario: Scenario) -> dict[str, Body]:
@@ -203,13 +196,11 @@ def bodies(scenario: Scenario) -> dict[str, Body]:
     }
 
 
-def body_metadata(scenario: Scenario) -> dict[str, str]:
-    """Return the entry `BODIES` of the metadata of a run."""
-    return {BODIES: canonical_json(codec(Mapping[str, Body]).encode(bodies(scenario)))}
-
-
-def _center(axle: Axle) -> tuple[float, float]:
-    return axle.position_x, axle.position_z
+def _axle_centers(axles: Axles) -> AxleCenters:
+    rear, front = axles.rear_axle, axles.front_axle
+    return AxleCenters(
+        (rear.position_x, rear.position_z), None if front is None else (front.position_x, front.position_z)
+    )
 
 
 def recorded_axles(recording: Recording) -> Mapping[str, AxleCenters]:

@@ -168,7 +168,8 @@ def result_html(result: RunResult) -> str:
     title = f"{escape(result.scenario)}, seed {result.seed}, channel {escape(result.channel)}"
     rows = "".join(
         f"<tr><td>{escape(verdict.name)}</td><td>{'passed' if verdict.passed else 'failed'}</td>"
-        f"<td>{_quantity(verdict.value, verdict.unit)}</td><td>{_quantity(verdict.limit, verdict.unit)}</td>"
+        f"<td>{escape(quantity_text(verdict.value, verdict.unit))}</td>"
+        f"<td>{escape(quantity_text(verdict.limit, verdict.unit))}</td>"
         f'<td style="text-align:left">{"<br>".join(map(escape, (verdict.reason, *verdict.violation_state)))}</td></tr>'
         for verdict in result.criteria
     )
@@ -193,5 +194,6 @@ def outcome_word(result: RunResult) -> str:
     return "passed" if result.passed else "not passed"
 
 
-def _quantity(value: float | None, unit: str) -> str:
-    return "" if value is None else escape(f"{value:.3f} {unit}" if unit else f"{value:g}")
+def quantity_text(value: float | None, unit: str) -> str:
+    """Return the value or limit of a criterion as text; empty for None."""
+    return "" if value is None else f"{value:.3f} {unit}" if unit else f"{value:g}"

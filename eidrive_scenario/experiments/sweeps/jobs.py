@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.base.content_digest import canonical_json, package_versions, sha256_of
+from eidrive_scenario.base.content_digest import canonical_json, sha256_of
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, SettingError, suggestion
 from eidrive_scenario.experiments.sweeps.axes import (
     CHANNEL,
@@ -353,11 +353,6 @@ def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:
         if not is_setting(name) and parameter not in declared:
             text = f"--vary: unknown parameter or setting {parameter!r}"
             raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *sorted(SETTINGS)])))
-
-
-def versions() -> Mapping[str, str]:
-    """Return the versions of the packages that affect results."""
-    return package_versions()
 
 
 def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[int]:

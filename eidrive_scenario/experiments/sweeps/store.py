@@ -148,7 +148,7 @@ class ResultStore:
             connection.close()
 
     def _create(self) -> None:
-        if _is_empty(self._connection):
+        if not self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             with self._connection:
                 self._connection.execute("BEGIN IMMEDIATE")  # without it, each statement is a transaction
                 self._connection.execute(f"PRAGMA application_id={APPLICATION}")
@@ -301,10 +301,6 @@ def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
 
     connection.set_progress_handler(is_exceeded, _STEPS)
     return connection
-
-
-def _is_empty(connection: sqlite3.Connection) -> bool:
-    return not connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
 
 
 def _check_format(path: Path, connection: sqlite3.Connection) -> None:

@@ -13,6 +13,8 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.hung_runs import HungRunError, describe_report
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import (
+    ABORTED,
+    CRASHED,
     EXCLUDED,
     FAILED,
     NOT_JUDGED,
@@ -22,7 +24,7 @@ from eidrive_scenario.experiments.sweeps.store import (
     RunWriter,
     StoredRun,
 )
-from eidrive_scenario.experiments.sweeps.workers import KeptFiles, Workers, crashed, execute, hung
+from eidrive_scenario.experiments.sweeps.workers import KeptFiles, Workers, execute, without_result
 
 JUDGED = frozenset({PASSED, FAILED, EXCLUDED})
 """Outcomes with a verdict, and those of runs that constraints exclude."""
@@ -153,13 +155,14 @@ def run_sweep(
         if error is None:
             writer.add(future.result())
         elif isinstance(error, HungRunError):
-            writer.add(hung(job, describe_report(str(error), wall_limit), wall_limit))
+            writer.add(without_result(job, ABORTED, describe_report(str(error), wall_limit), wall_limit or 0.0))
         elif not workers.is_crash(error):
             raise error
         elif tries < TRIES:
             again.append((job, tries + 1))
         else:
-            writer.add(crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}"))
+            text = f"the worker process ended in {tries} of {tries} tries: {error}"
+            writer.add(without_result(job, CRASHED, text, 0.0))
 
     waiting = left()
     again: deque[tuple[SweepJob, int]] = deque()

@@ -29,7 +29,6 @@ from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
 from eidrive_scenario.experiments.sweeps.store import (
     ABORTED,
-    CRASHED,
     EXCLUDED,
     FAILED,
     FOLDER,
@@ -101,15 +100,16 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             settings=result.settings.canonical,
         )
     except ConstraintError as error:
-        return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
+        status, message = EXCLUDED, str(error)
     except OutputError as error:  # not of the inputs, so that --retry repeats the run
-        return _without_result(job, ABORTED, str(error), time.perf_counter() - start)
+        status, message = ABORTED, str(error)
     except InputError as error:
-        return _without_result(job, INVALID, str(error), time.perf_counter() - start)
+        status, message = INVALID, str(error)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) and not _is_worker:
             raise
-        return _without_result(job, ABORTED, _message(error), time.perf_counter() - start)
+        status, message = ABORTED, _message(error)
+    return without_result(job, status, message, time.perf_counter() - start)
 
 
 def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
@@ -119,17 +119,8 @@ def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
     return {FOLDER: os.path.relpath(folder.resolve(), files.store.resolve().parent)}
 
 
-def crashed(job: SweepJob, message: str) -> StoredRun:
-    """Return the row of a job whose worker process ended."""
-    return _without_result(job, CRASHED, message, 0.0)
-
-
-def hung(job: SweepJob, message: str, wall_limit: float | None) -> StoredRun:
-    """Return the row of a job whose code did not return at the limit of its wall time [s]."""
-    return _without_result(job, ABORTED, message, wall_limit or 0.0)
-
-
-def _without_result(job: SweepJob, status: str, message: str, wall_s: float) -> StoredRun:
+def without_result(job: SweepJob, status: str, message: str, wall_s: float) -> StoredRun:
+    """Return the row of a job without a result."""
     source: Path | ConcreteRun = job.scenario
     with suppress(InputError):  # of a distribution that has changed since the plan
         source = source_of(job)

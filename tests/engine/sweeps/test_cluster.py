@@ -17,11 +17,12 @@ from typing import Any
 import pytest
 from sweep_workers import InProcess
 
+from eidrive_scenario.base.content_digest import package_versions
 from eidrive_scenario.base.wall_limit import limit_wall_time
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
-from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepJob, plan_of, versions
+from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepJob, plan_of
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, execute
@@ -47,7 +48,7 @@ def test_sweep_on_cluster_equals_local_one_with_killed_worker(cluster: object, s
     victim = min(worker.pid for worker in cluster.workers.values())  # type: ignore[attr-defined]
     killed = threading.Event()
     try:
-        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
 
             def kill_once(progress: object, run: object) -> None:
                 if run is not None and not killed.is_set():
@@ -82,7 +83,7 @@ def test_workers_use_project_of_command(
     scenario.write_text(scenario.read_text().replace("{max_speed:", "{gap_of_cluster:"))
     workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
     try:
-        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
             run_sweep(Shard(plan_of(scenario, [{}], RunSettings(), seeds=[1, 2])), store, workers)
             assert [(run.status, run.error) for run in store.runs()] == [("passed", ""), ("passed", "")]
     finally:
@@ -114,7 +115,7 @@ def test_hung_run_on_cluster_is_one_row_and_waiting_runs_have_results(
     monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", hung_at_30)
     workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
     try:
-        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
             run_sweep(Shard(plan), store, workers, wall_limit=0.2)
             rows = {run.point["Speed"]: (run.status, run.error) for run in store.runs()}
     finally:
@@ -170,7 +171,7 @@ def test_later_sweep_on_same_workers_uses_changed_extension(
         use_project(str(tmp_path))
         workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
         try:
-            with ResultStore.open(tmp_path / f"{len(found)}.db", versions()) as store:
+            with ResultStore.open(tmp_path / f"{len(found)}.db", package_versions()) as store:
                 run_sweep(Shard(plan_of(scenario, [{}], RunSettings(), seeds=[1, 2, 3, 4])), store, workers)
                 found.append([run.result.keys() & {"one", "other"} for run in store.runs()])
         finally:
@@ -193,7 +194,7 @@ def test_end_of_scheduler_keeps_earlier_runs(scenario: Path, tmp_path: Path) -> 
             return future
 
     plan = plan_of(scenario, points_of(parse_axes(["Speed=10,12"]), "grid", None, 1), RunSettings())
-    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+    with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
         with pytest.raises(SimulationError, match="scheduler of the workers has ended"):
             run_sweep(Shard(plan), store, EndingWorkers())
         assert [run.status for run in store.runs()] == ["passed"]

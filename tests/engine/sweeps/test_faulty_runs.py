@@ -14,9 +14,10 @@ import pytest
 from command_fixtures import Eidrive, eidrive
 from sweep_workers import InProcess
 
+from eidrive_scenario.base.content_digest import package_versions
 from eidrive_scenario.cli.supervision import interrupt_once
 from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
-from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
+from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, LocalWorkers, execute
@@ -39,7 +40,7 @@ def run_with(
     plan = plan_of(scenario, points_of(parse_axes([f"Speed={values}"]), "grid", None, 1), RunSettings())
     workers = LocalWorkers(2)
     try:
-        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
             run_sweep(Shard(plan), store, workers, **options)
             return {run.point["Speed"]: run for run in store.runs()}
     finally:
@@ -78,7 +79,7 @@ def test_interrupt_of_user_keeps_ended_runs(scenario: Path, tmp_path: Path) -> N
             return super().submit(function, *arguments)
 
     plan = plan_of(scenario, points_of(parse_axes(["Speed=10,12"]), "grid", None, 1), RunSettings())
-    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+    with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
         with pytest.raises(KeyboardInterrupt):
             run_sweep(Shard(plan), store, InterruptedWorkers())
         assert [(run.point["Speed"], run.status) for run in store.runs()] == [(10, "passed")]
@@ -121,7 +122,7 @@ def test_unwritable_folder_of_a_run_is_aborted_and_repeatable(scenario: Path, tm
         "aborted",
         "cannot write: Not a directory; choose another folder",
     )
-    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+    with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
         store.add(row)
         below.unlink()
         workers = LocalWorkers(1)

@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 from sweep_workers import InProcess
 
+from eidrive_scenario.base.content_digest import package_versions
 from eidrive_scenario.errors import ConstraintError, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes, points_of
-from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, versions
+from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of
 from eidrive_scenario.experiments.sweeps.results import summaries
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
@@ -28,7 +29,7 @@ SPEEDS: list[Point] = points_of(parse_axes(["Speed=10,30,50"]), "grid", None, 1)
 
 
 def swept(plan: SweepPlan, store: Path, **options: Any) -> tuple[SweepProgress, list[StoredRun]]:
-    with ResultStore.open(store, versions()) as opened:
+    with ResultStore.open(store, package_versions()) as opened:
         progress = run_sweep(Shard(plan), opened, InProcess(), **options)
         return progress, list(opened.runs())
 
@@ -239,7 +240,7 @@ def test_killed_worker_is_a_row_and_others_are_unharmed(
     plan = plan_of(scenario, points_of(parse_axes(["Speed=8,10,12,30,14,16"]), "grid", None, 1), RunSettings())
     workers = LocalWorkers(2)
     try:
-        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with ResultStore.open(tmp_path / "s.db", package_versions()) as store:
             progress = run_sweep(Shard(plan), store, workers)
             statuses = {run.point["Speed"]: run.status for run in store.runs()}
     finally:
