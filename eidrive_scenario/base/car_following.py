@@ -47,11 +47,6 @@ class IntelligentDriver:
         """
         return Drivers.of([self]).response(speed, desired_speed, gap, approach)
 
-    def equilibrium_gap(self, speed: float, desired_speed: float) -> float:
-        """Return the gap at which a string of cars has constant speed (equation 5 of the paper) [m]."""
-        free: float = 1.0 - (speed / desired_speed) ** self.exponent
-        return (self.standstill_gap + speed * self.time_gap) / float(np.sqrt(free))
-
 
 COLUMNS = tuple(entry.name for entry in fields(IntelligentDriver))
 

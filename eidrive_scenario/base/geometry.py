@@ -245,3 +245,12 @@ def _intersection_area(polygon: Array, boxes: Array) -> Array:
     clamped = np.clip(x[..., None] + cuts * run[..., None], -half_length[..., None], half_length[..., None])
     area: Array = np.sum(rise[..., None] * np.diff(cuts) * (clamped[..., 1:] + clamped[..., :-1]) / 2, axis=(-1, -2))
     return np.maximum(area, 0.0)
+
+
+def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Return the distance of a point from a segment [m]."""
+    dx, dy = x1 - x0, y1 - y0
+    square = dx * dx + dy * dy
+    share = ((x - x0) * dx + (y - y0) * dy) / square if square > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(x - x0 - share * dx, y - y0 - share * dy)

@@ -55,15 +55,6 @@ def run_rules(
     yield from _run(rules, RoadLintContext(scenario, roads, tuple(added)), ignored)
 
 
-def run_road_file_rules(roads: RoadNetwork, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:
-    """Yield the diagnostics of the rules about road files, except `ignored`.
-
-    Raise SettingError if `ignored` has an unknown name.
-    """
-    check_rule_names(ignored)
-    yield from _run(ROAD_FILE_RULES, RoadFileContext(roads), ignored)
-
-
 def check_rule_names(ignored: Collection[str]) -> None:
     """Raise SettingError if `ignored` has an unknown name."""
     names = {rule.name for rule in ALL_RULES}
@@ -134,7 +125,7 @@ def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
 
 def _road_file_diagnostics(path: Path, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
     try:
-        yield from run_road_file_rules(RoadNetwork.load(path), ignored)
+        yield from _run(ROAD_FILE_RULES, RoadFileContext(RoadNetwork.load(path)), ignored)
     except InputError as error:
         yield from _errors(error)
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.base.geometry import segment_distance
 from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, Kind, StopLine, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 
@@ -79,7 +80,7 @@ class StopLineCrossings:
         for pending in self._pending:
             assert pending.line.beyond is not None
             left = pending.left - math.dist(before, now)
-            if _distance(before, now, pending.line.beyond) <= ON_PATH:
+            if segment_distance(*pending.line.beyond, *before, *now) <= ON_PATH:
                 crossings.append(Crossing(pending.line.signal, pending.time))
             elif left > 0.0:
                 kept.append(pending._replace(left=left))
@@ -106,12 +107,3 @@ def along(line: StopLine, point: Point) -> float:
 def beside(line: StopLine, point: Point) -> float:
     """Return the lateral distance of a point from the center of the lane at a stop line [m]."""
     return abs((point[1] - line.y) * math.cos(line.heading) - (point[0] - line.x) * math.sin(line.heading))
-
-
-def _distance(a: Point, b: Point, point: Point) -> float:
-    """Return the distance of a point from the segment between two others [m]."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    square = dx * dx + dy * dy
-    share = ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / square if square > 0.0 else 0.0
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(a[0] + share * dx - point[0], a[1] + share * dy - point[1])

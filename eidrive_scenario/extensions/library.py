@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.files.bounded import MIB, absolute, is_folder, is_regular_file, read_regular_file
+from eidrive_scenario.files.bounded import MIB, absolute, is_regular_file, read_regular_file
 from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.untrusted_xml import first_elements
 
@@ -98,7 +98,7 @@ def resolve_scenario(name: str | Path) -> Path:
     inside = _inside(path)
     if inside is not None:
         return inside
-    if str(name) and is_folder(path):
+    if str(name) and os.path.isdir(path):
         raise SettingError(Diagnostic(f"{quoted(str(name))} is a folder", "give one .xosc file"))
     if str(name) and os.path.exists(path):
         return path  # a pipe or a device: the reader refuses it and states what it is

@@ -46,11 +46,6 @@ def is_regular_file(path: str | os.PathLike[str]) -> bool:
     return os.path.isfile(path)
 
 
-def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Whether a path refers to a folder; False for an invalid path."""
-    return os.path.isdir(path)
-
-
 def read_regular_file(path: str | os.PathLike[str], limit: int) -> bytes:
     """Return the content of a regular file of at most `limit` bytes.
 

@@ -12,7 +12,7 @@ from lxml import etree
 from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
-from eidrive_scenario.files.bounded import is_folder, is_regular_file, read_regular_file
+from eidrive_scenario.files.bounded import is_regular_file, read_regular_file
 from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.diagnostics import MAX_NESTED_REFERENCES, BudgetError, DiagnosticCollector, Location
@@ -237,9 +237,9 @@ class CatalogLibrary:
         folders = {
             folder
             for location in self._locations.values()
-            if is_folder(location)
+            if os.path.isdir(location)
             for folder in _listing(location.parent)
-            if is_folder(folder) and folder not in self._locations.values()
+            if os.path.isdir(folder) and folder not in self._locations.values()
         }
         for folder in sorted(folders):
             path = folder / f"{name}.xosc"
@@ -337,6 +337,6 @@ def _candidates(places: Iterable[Path], name: str) -> Iterator[Path]:
     for location in places:
         if is_regular_file(location):
             yield location
-        elif is_folder(location):
+        elif os.path.isdir(location):
             files = sorted(location.glob("*.xosc"))
             yield from sorted(files, key=lambda file: file.stem != name)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened, suggestion
 from eidrive_scenario.extensions.library import ROADS_SUFFIX, from_library, resolve_path
-from eidrive_scenario.files.bounded import is_folder, is_regular_file
+from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.catalogs import CatalogFiles, CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
@@ -65,7 +65,9 @@ def _map_folders() -> list[Path]:
 def _hint(logic: model.File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
-    maps = {file.stem for directory in places if is_folder(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")}
+    maps = {
+        file.stem for directory in places if os.path.isdir(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")
+    }
     if maps:
         return suggestion(named.name.removesuffix(ROADS_SUFFIX), maps)
     return f"check LogicFile, or set {MAPS} to the folders of the maps"

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import segment_distance, wrap_angle
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
@@ -120,15 +120,6 @@ class PlannedPath:
         for index in range(len(limits) - 2, -1, -1):
             limits[index] = min(limits[index], math.sqrt(limits[index + 1] ** 2 + gains[index]))
         return np.array(limits)
-
-
-def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Return the distance of a point from a segment [m]."""
-    dx, dy = x1 - x0, y1 - y0
-    square = dx * dx + dy * dy
-    share = ((x - x0) * dx + (y - y0) * dy) / square if square > 0.0 else 0.0
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(x - x0 - share * dx, y - y0 - share * dy)
 
 
 def _resample(line: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -202,9 +202,5 @@ def _add_line(foxglove: Foxglove, entity: Any, points: Line, color: Color, *, da
     line = entity.lines.add(type=kind, thickness=_THICKNESS)
     set_rotation(line.pose.orientation, 0.0)
     set_color(line.color, color)
-    for x, y, z in _dashes(points) if dashed else points:
+    for x, y, z in points[: len(points) // 2 * 2] if dashed else points:
         line.points.add(x=x, y=y, z=z)
-
-
-def _dashes(points: Sequence[Sequence[float]]) -> list[Sequence[float]]:
-    return [point for start in range(0, len(points) - 1, 2) for point in (points[start], points[start + 1])]

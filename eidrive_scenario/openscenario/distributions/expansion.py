@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import overload
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
 from eidrive_scenario.extensions.library import from_library, resolve_path
-from eidrive_scenario.files.bounded import is_folder, is_regular_file
+from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
@@ -116,7 +117,7 @@ def _varied(
 def _scenario_file(file: File, folder: Path, report: Callable[..., None]) -> Path:
     path = resolve_path(file.filepath, folder)
     if not is_regular_file(path):
-        siblings = path.parent.glob("*.xosc") if is_folder(path.parent) else ()
+        siblings = path.parent.glob("*.xosc") if os.path.isdir(path.parent) else ()
         report(
             f"ScenarioFile: scenario {quoted(file.filepath)} does not exist",
             suggestion(path.stem, {sibling.stem for sibling in siblings}),

@@ -96,8 +96,10 @@ class LegendEntries(Canvas):
         return 0.0, 0.0
 
 
-class VectorCanvas(LegendEntries):
+class VectorCanvas(Canvas):
     """Axes of a figure that show a section of the world; units are points."""
+
+    smallest = 4.0
 
     def __init__(self, figure: Figure, axes: Axes, window: Window) -> None:
         width, height = (72.0 * figure.get_size_inches() * axes.get_position().size).tolist()
@@ -110,7 +112,6 @@ class VectorCanvas(LegendEntries):
         self.reserved = (*self._draw_scale(), *self._draw_axes())
 
     def fill(self, polygon: Points, color: str, opacity: float = 1.0, *, legend: str = "") -> None:
-        super().fill(polygon, color, opacity, legend=legend)
         plan = np.asarray(polygon, dtype=float)[:, :2]
         # An edge of the same color closes the gaps that viewers show between neighbors
         edge = {"edgecolor": color, "linewidth": THINNEST} if opacity >= 1.0 else {"linewidth": 0.0}
@@ -126,7 +127,6 @@ class VectorCanvas(LegendEntries):
         stroke: float = 0.0,
         legend: str = "",
     ) -> None:
-        super().line(points, color, width, closed=closed, stroke=stroke, legend=legend)
         plan = np.asarray(points, dtype=float)[:, :2]
         outline = Outline(np.vstack([plan, plan[:1]]), closed=True) if closed else Outline(plan)
         thickness = max(width * self.scale, THINNEST)

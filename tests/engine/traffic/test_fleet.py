@@ -46,7 +46,12 @@ def test_ring_of_cars_converges_to_equilibrium_gap(loop: RoadNetwork) -> None:
     speeds = np.array(list(fleet.speeds.values()))
     assert np.ptp(speeds) < 0.2
     mean_gap = 2 * math.pi * (RADIUS + 2.0) / count - LENGTH
-    assert driver.equilibrium_gap(float(speeds.mean()), 15.0) == pytest.approx(mean_gap, rel=0.02)
+    speed = float(speeds.mean())
+    # Equation 5 of the paper on the intelligent driver model
+    equilibrium_gap = (driver.standstill_gap + speed * driver.time_gap) / math.sqrt(
+        1.0 - (speed / 15.0) ** driver.exponent
+    )
+    assert equilibrium_gap == pytest.approx(mean_gap, rel=0.02)
 
 
 def test_shorter_time_steps_give_the_same_positions(loop: RoadNetwork) -> None:
