@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.output import echo, has_all_characters, print_warnings
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 
@@ -31,7 +31,6 @@ def judge(
 
     Exit codes as for eidrive run; 3 also for an incomplete or damaged recording.
     """
-    from eidrive_scenario.cli.output import has_all_characters
     from eidrive_scenario.experiments.judgement import judge_recording
     from eidrive_scenario.experiments.single_run import as_json_text
 

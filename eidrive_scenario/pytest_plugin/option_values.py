@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import InputError, SettingError, quoted
 from eidrive_scenario.run_options import NO_COOPERATION, Seconds, option_of
 
 NO_LIMIT = "none"
@@ -140,7 +140,6 @@ def _check_channels(option: str, value: list[str], folder: Path) -> None:
 
 def _check_extension(group: str) -> Callable[[str, str, Path], None]:
     def check(option: str, value: str, folder: Path) -> None:
-        from eidrive_scenario.errors import SettingError
         from eidrive_scenario.extensions.registry import registry
 
         if value not in registry(group):
@@ -158,7 +157,6 @@ def _check_drive(option: str, value: list[str], folder: Path) -> None:
 
 
 def _check_criteria(option: str, value: list[str], folder: Path) -> None:
-    from eidrive_scenario.errors import quoted
     from eidrive_scenario.evaluation.criteria_parser import declare_criteria
     from eidrive_scenario.files.yaml_text import read_yaml_source
 

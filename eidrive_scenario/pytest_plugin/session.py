@@ -19,7 +19,7 @@ from typing import IO, Any
 import pytest
 
 from eidrive_scenario.base.wall_limit import LastResort, Limit, set_last_resort
-from eidrive_scenario.errors import WallLimitError
+from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.hung_runs import describe_report, last_resort
 from eidrive_scenario.pytest_plugin import markers
 from eidrive_scenario.pytest_plugin.failures import RunRecord, add_notes
@@ -44,7 +44,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     """Select the project of the root, as `eidrive` does, before a `conftest.py` registers further extensions."""
-    from eidrive_scenario.errors import InputError
     from eidrive_scenario.extensions.project import VARIABLE, select_project
 
     if VARIABLE in os.environ:

@@ -13,7 +13,7 @@ from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size,
 from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.rates import rate_figures
 from eidrive_scenario.reporting.run_report.report import write_run_report
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, read_runs
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, read_runs, read_sweeps
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 LONGEST_NAME = 200
@@ -44,8 +44,6 @@ def report_files(
     omitted = [f"{path}: the run did not end" for path in unfinished_runs(locations)]
     unjudged: list[str] = []
     if stores:
-        from eidrive_scenario.reporting.run_report.reported_runs import read_sweeps
-
         swept, unjudged = read_sweeps(stores)
         results += swept
     given = {str(path) for path in locations}

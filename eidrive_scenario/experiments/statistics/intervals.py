@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import betaln, stdtrit
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,6 @@ def anytime_interval(successes: int, trials: int, confidence: float = 0.95) -> P
     """
 
     from scipy.optimize import brentq
-    from scipy.special import betaln
 
     if trials == 0 and successes == 0:
         _check(0, 1, confidence)
