@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -36,10 +37,11 @@ def test_documented_method_is_the_mean_of_present_features() -> None:
     np.testing.assert_allclose(fused[:, 0], np.tile([6.0, 4.5], (96, 1)))
 
 
-def test_documented_sizes() -> None:
-    rows = re.findall(r"^\| .*? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| [\d.]+ ms \|$", PAGE, re.MULTILINE)
+def test_documented_sizes_and_airtimes() -> None:
+    """Airtime of IEEE 802.11-2012: 40 µs, and symbols of 8 µs with 48 bits each; a frame has 22 bits more."""
+    rows = re.findall(r"^\| .*? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| ([\d.]+) ms \|$", PAGE, re.MULTILINE)
     assert len(rows) == 4
-    for row, encoding in zip(rows, ["codes", "int8", "int8", "int8"], strict=True):
+    for (*row, milliseconds), encoding in zip(rows, ["codes", "int8", "int8", "int8"], strict=True):
         cells, size, count = (int(number.replace(",", "")) for number in row)
         codes = np.zeros((8, cells), np.int8) if encoding == "int8" else np.zeros(cells, np.uint8)
         whole = FeatureFrame(
@@ -47,4 +49,7 @@ def test_documented_sizes() -> None:
             to_cells(np.arange(cells), codes),
         )  # fmt: skip
         frames = split(whole, 1400)
-        assert (sum(len(frame.encode()) for frame in frames), len(frames)) == (size, count)
+        sizes = [len(frame.encode()) for frame in frames]
+        assert (sum(sizes), len(sizes)) == (size, count)
+        airtime = sum(0.040 + 0.008 * math.ceil((8 * size + 22) / 48) for size in sizes)
+        assert f"{airtime:.{1 if airtime < 10.0 else 0}f}" == milliseconds
