@@ -48,9 +48,12 @@ def scenario_folders(folder: Path) -> list[Path]:
 
 
 def _stations(folder: Path) -> list[Path]:
-    """Return the folders of the stations of a scenario, ordered by id."""
-    stations = [path for path in folder.iterdir() if path.is_dir() and _STATION.fullmatch(path.name) and _frames(path)]
-    return sorted(stations, key=lambda path: int(path.name))
+    """Return the folders of the stations of a scenario with frames, ordered by id."""
+    return sorted(filter(_frames, _numbered_folders(folder)), key=lambda path: int(path.name))
+
+
+def _numbered_folders(folder: Path) -> list[Path]:
+    return [path for path in folder.iterdir() if path.is_dir() and _STATION.fullmatch(path.name)]
 
 
 def _frames(station: Path) -> dict[int, Path]:
@@ -98,7 +101,8 @@ class _FrameFile:
         """Return length, width and height from half of them."""
         length, width, height = (2.0 * half for half in self.numbers(owner, key, 3, within))
         if min(length, width, height) <= 0.0:
-            self.fail(f"{within}.{key}", f"{within}.{key} is not positive".lstrip("."))
+            path = f"{within}.{key}" if within else key
+            self.fail(path, f"{path} is not positive")
         return length, width, height
 
     def objects(self, key: str) -> Iterator[tuple[int, Mapping[Any, Any], str]]:
@@ -160,6 +164,8 @@ def read_scene(folder: Path) -> TrafficScene:
             for key in ("vehicles", "pedestrians"):
                 _read_objects(file, key, number, objects)
     warnings = _add_stations(objects, lidars, own, extents)
+    empty = sorted(path.name for path in _numbered_folders(folder) if int(path.name) not in stations)
+    warnings += [f"folder {name} has no frame NUMBER.yaml, so that its station is missing" for name in empty]
 
     def seconds(number: int) -> float:
         return (number - first) * FRAME_STEP

@@ -256,8 +256,8 @@ def _labels(folder: Path, frame: _Frame) -> list[_Label]:
         if category is None:
             continue
         corners = file.array(entry, "world_8_points", (8, 3), at)
-        identity = entry.get("track_id", "")
-        labels.append(_label(file, at, category, str(identity), corners))
+        identity = entry.get("track_id")
+        labels.append(_label(file, at, category, "" if identity is None else str(identity), corners))
     return labels
 
 

@@ -220,6 +220,7 @@ def test_heights_of_a_recording_are_those_above_its_lowest_road_user(tmp_path: P
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n- 1\n", r"yaml:2: vehicles is \[1\] \(expected a mapping"),
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  a: {}\n", r"yaml:3: vehicles\.a is no object with an integer"),
         ("lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  1:\n    angle: 3\n", r"yaml:3: vehicles\.1\.extent is missing"),
+        ("lidar_pose: [0, 0, 0, 0, 0, 0]\nego_extent: [1, 0, 1]\nvehicles: {}\n", r"yaml:2: ego_extent is not posit"),
         (
             "lidar_pose: [0, 0, 0, 0, 0, 0]\nvehicles:\n  1:\n    extent: [1, 0, 1]\n",
             r"yaml:4: vehicles\.1\.extent is not positive",
@@ -244,6 +245,15 @@ def test_frame_that_is_no_regular_file_is_an_error(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "scene" / "1" / "000000.yaml")
     with pytest.raises(SettingError, match="leads to a pipe"):
         list(import_recordings(tmp_path, tmp_path / "out"))
+
+
+def test_station_folder_without_frames_is_a_warning(tmp_path: Path) -> None:
+    """A folder whose frames are compressed, for example, is no station of the scenario."""
+    write_frame(tmp_path / "in" / "scene", 1, 0, frame(0.0))
+    compressed = write_frame(tmp_path / "in" / "scene", 2, 0, frame(5.0))
+    compressed.rename(compressed.with_suffix(".yaml.gz"))
+    _, warnings = imported(tmp_path / "in", tmp_path / "out")
+    assert "folder 2 has no frame NUMBER.yaml, so that its station is missing" in warnings
 
 
 def test_folder_without_recording_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
@@ -364,6 +374,16 @@ def test_repeated_track_id_in_frame_is_another_road_user(tmp_path: Path) -> None
     (scene,) = read_scenes(folder)
     for track in scene.tracks:
         assert np.all(np.diff(track.times) > 0.0)
+
+
+def test_labels_with_null_as_track_id_are_associated_by_position(tmp_path: Path) -> None:
+    folder = dair(tmp_path / "in")
+    expected = {track.name: track.poses for track in next(read_scenes(folder)).tracks}
+    for path in (folder / "cooperative/label_world").iterdir():
+        write_json(path, [{**label, "track_id": None} for label in json.loads(path.read_text())])
+    tracks = {track.name: track.poses for track in next(read_scenes(folder)).tracks}
+    assert tracks.keys() == expected.keys()
+    assert all(np.array_equal(tracks[name], poses) for name, poses in expected.items())
 
 
 @pytest.mark.parametrize(
