@@ -31,10 +31,11 @@ from eidrive_scenario.driving.station_warnings import (
     short_views,
 )
 from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, StationPerception
-from eidrive_scenario.errors import Diagnostic, ErrorSubject
+from eidrive_scenario.errors import Diagnostic, ErrorSubject, InvalidResult
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.detector import Detector, ImageDetections
+from eidrive_scenario.perception.result_checks import describe
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
@@ -107,7 +108,10 @@ def fuse_reports(
             perceived[name] = agent.fuse(sensed[name])
     for kind, names in batches.items():
         methods, reports = [agents[name].fusion for name in names], [agents[name].reports for name in names]
-        fused = _all_of(names).call(kind.fuse_batch, methods, reports, now)
+        fused: object = _all_of(names).call(kind.fuse_batch, methods, reports, now)
+        if not isinstance(fused, Sequence) or len(fused) != len(names):
+            expected = f"a sequence with one Detections for each of {len(names)} stations"
+            raise InvalidResult(methods[0], "fuse_batch", f"returned {describe(fused)} (expected {expected})")
         for name, objects in zip(names, fused, strict=True):
             perceived[name] = agents[name].with_fused(sensed[name], objects)
     return perceived

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 from msgspec.structs import replace
@@ -16,8 +17,10 @@ from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.result_checks import describe
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, pose_covariance_at
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
@@ -184,7 +187,10 @@ class SensorDataSharing:
             return alone
         if pose is not None:
             self._joint.set_pose(pose)
-        return self._joint.perceive(self._fusion.merge_readings(readings, alone))
+        merged: object = self._fusion.merge_readings(readings, alone)
+        if not isinstance(merged, Readings):
+            raise InvalidResult(self._fusion, "merge_readings", f"returned {describe(merged)} (expected Readings)")
+        return self._joint.perceive(merged)
 
 
 SENDER_REPORT_SUFFIX = " itself"
@@ -217,7 +223,10 @@ class ReportStore:
         self._sharing = sharing
         self._reports: dict[str, Report] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
-        self._lifetime = min(settings.report_lifetime, fusion.max_report_age)
+        longest: object = fusion.max_report_age
+        if not isinstance(longest, Real) or not float(longest) >= 0.0:
+            raise InvalidResult(fusion, "max_report_age", f"is {longest!r} (expected a number of at least 0 s)")
+        self._lifetime = min(settings.report_lifetime, float(longest))
         """Maximum age of a report that is used [s]."""
         self._next_deletion = math.inf
         """Time up to which no report exceeds its lifetime [s]."""

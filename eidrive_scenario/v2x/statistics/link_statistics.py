@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from numbers import Real
 from typing import Any
 
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
@@ -162,11 +163,9 @@ class Links:
 
         Raise ValueError unless the delay is a finite number of at least 0 s.
         """
-        try:
-            valid = 0.0 <= delay < math.inf
-        except TypeError:
-            valid = False
-        if not valid:
+        # A truth value, of a model that returns whether a message arrives, would be a delay of 0 or 1 s
+        given: object = delay
+        if isinstance(given, bool) or not isinstance(given, Real) or not 0.0 <= float(given) < math.inf:
             raise ValueError(
                 f"delay of a message to {receiver!r} is invalid (got {delay}; expected at least 0 s, finite)"
             )

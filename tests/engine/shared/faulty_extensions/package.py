@@ -66,6 +66,9 @@ POINTS = {
     "fusion": {
         "fusion_nan": "FusionNaN",
         "fusion_none": "FusionNone",
+        "fusion_no_age": "FusionNoAge",
+        "fusion_short_batch": "FusionShortBatch",
+        "fusion_merges_none": "FusionMergesNone",
         "fusion_hear_raises": "FusionHearRaises",
     },
     "planners": {

@@ -37,6 +37,23 @@ class FusionNone(FusionMethod):
         pass
 
 
+class FusionNoAge(FusionNone):
+    max_report_age = None
+
+
+class FusionShortBatch(FusionNone):
+    @classmethod
+    def fuse_batch(cls, methods, reports, now):
+        return []
+
+
+class FusionMergesNone(FusionNone):
+    shares = "points"
+
+    def merge_readings(self, readings, alone=None):
+        return None
+
+
 class FusionHearRaises(FusionMethod):
     def add_report(self, report):
         raise ZeroDivisionError("division by zero")
@@ -119,6 +136,10 @@ class FaultyChannel(LinkChannel):
                 return math.inf
             case "none":
                 return None
+            case "arrives":
+                return True
+            case "array":
+                return np.array([0.1])
             case "raises":
                 raise OSError("no radio")
         return 0.1
