@@ -52,7 +52,7 @@ class ActionDecoder:
         for action in self._actions:
             decision = given
             if len(self._actions) > 1:
-                if not isinstance(given, Mapping) or action.kind not in given:
+                if not isinstance(given, Mapping) or given.keys() != {each.kind for each in self._actions}:
                     raise _outside(given, "a mapping with the keys " + ", ".join(each.kind for each in self._actions))
                 decision = given[action.kind]
             decided = self._decode(action, decision, perceived, decided)

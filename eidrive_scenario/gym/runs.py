@@ -121,9 +121,11 @@ def _stations(
         raise SettingError(Diagnostic(message, "give an entity a driving stack: RunSettings(drive='Ego')"))
     if chosen is not None:
         unknown = next((name for name in chosen if name not in controllable), None)
-        if unknown is not None or not chosen:
-            message = f"the scenario has no station {quoted(unknown or '')}"
+        if unknown is not None:
+            message = f"the scenario has no station {quoted(unknown)}"
             raise SettingError(Diagnostic(message, suggestion(str(unknown), controllable)))
+        if not chosen:
+            raise SettingError(Diagnostic("no station is selected", f"give stations of {', '.join(controllable)}"))
         return tuple(dict.fromkeys(chosen))
     candidates = drivers or (controllable if single else ())
     if not candidates:

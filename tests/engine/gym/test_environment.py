@@ -195,6 +195,7 @@ def test_scenario_without_station_is_an_error() -> None:
         ("meta_speed", 3, "give an integer from 0 to 2"),
         ("meta_speed", 0.5, "give an integer from 0 to 2"),
         (["pedals", "send"], {"pedals": [0, 0]}, "give a mapping with the keys pedals, send"),
+        (["pedals", "send"], {"pedals": [0, 0], "send": 1, "share": 1}, "give a mapping with the keys pedals, send"),
         ({"kind": "share", "count": 2}, [0, 1, 1], "give 2 numbers out of 0 and 1"),
     ],
 )
