@@ -181,6 +181,9 @@ def read_options(config: pytest.Config) -> None:
             check_values(option.name, option.flag, command_line_value(config, option.name), Path())
             listed = config.stash[_INI].get(option.name)
             check_values(option.name, f"ini option {option.key}", listed, config.rootpath)
+        for folder in config.getini("eidrive_paths") or ():
+            if not folder.exists():
+                raise pytest.UsageError(f"ini option eidrive_paths: no folder '{folder}'; quote a path with spaces")
 
 
 def send_paths(node: Any) -> None:

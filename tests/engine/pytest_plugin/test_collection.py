@@ -66,6 +66,13 @@ def test_eidrive_paths_option_selects_folders(project: pytest.Pytester) -> None:
     assert collected(project, "data/first.xosc") == [FIRST]
 
 
+def test_eidrive_paths_option_with_missing_folder_is_usage_error(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\neidrive_paths = no such")
+    result = project.runpytest("--collect-only")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["ERROR: ini option eidrive_paths: no folder '*no'; quote a path with spaces"])
+
+
 def test_collection_yields_one_item_per_channel_and_seed(project: pytest.Pytester) -> None:
     items = collected(project, "data/first.xosc", "--eidrive-channel", "ideal,one/bad.yaml", "--eidrive-seeds", "2")
     assert [item.split("::")[1] for item in items] == [
