@@ -32,6 +32,8 @@ MOST_VALUES = 100_000
 PARAMETER = "param."
 """Optional prefix of parameters, for those that have the name of a setting."""
 CHANNEL = "channel"
+RUN = "run"
+"""Name of the axis of the runs of a distribution file."""
 SETTINGS = {option.name: option for option in OPTIONS if option.form.has_axis}
 """Settings of a run that may vary; all other names are parameters of the scenario."""
 _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
@@ -125,6 +127,11 @@ def check_different(axes: Sequence[Axis]) -> None:
     for index, axis in enumerate(axes):
         if axis_identity(axis.name) in [axis_identity(other.name) for other in axes[:index]]:
             raise _error(axis.name, "the axis is given twice")
+
+
+def without_run(point: Point) -> Point:
+    """Return a point without the number of a run of a distribution."""
+    return {name: value for name, value in point.items() if name != RUN}
 
 
 def axis_identity(name: str) -> str:

@@ -132,8 +132,8 @@ def compare_values(
     axis    axis, or a parameter that a distribution varies
     values  values of the axis, the reference first; () for all, numbers in ascending order
 
-    Raise SettingError if a file is not a store, without such an axis or value, with a single value, if no runs are
-    equal, or for an unknown metric.
+    Raise SettingError if a file is not a store, without such an axis or value, with a single or a repeated value, if no
+    runs are equal, or for an unknown metric.
     """
     runs = list(stored_runs(paths))
     axes = values_of(runs)
@@ -145,6 +145,8 @@ def compare_values(
         if value not in axes[name]:
             hint = f"the runs have {', '.join(map(text_of_value, axes[name]))}"
             raise SettingError(Diagnostic(f"--between: no run has {name}={text_of_value(value)}", hint))
+    if len(set(values)) < len(values):
+        raise SettingError(Diagnostic(f"--between: a value of {name} is given twice", "give each value once"))
     reference, *others = values or axes[name]
     if not others:
         message = f"--between: a single value of {name} cannot be compared (got {text_of_value(reference)})"

@@ -15,6 +15,7 @@ from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, Set
 from eidrive_scenario.experiments.sweeps.axes import (
     CHANNEL,
     PARAMETER,
+    RUN,
     SETTINGS,
     Axis,
     Point,
@@ -22,6 +23,7 @@ from eidrive_scenario.experiments.sweeps.axes import (
     is_number,
     is_setting,
     settings_at,
+    without_run,
 )
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
@@ -29,8 +31,6 @@ from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 from eidrive_scenario.v2x.profile import load_profile
 
-RUN = "run"
-"""Name of the axis of the runs of a distribution file."""
 MOST_TRIED = 100
 """Maximum number of points that are tried to find a valid run with a value."""
 _INPUTS = (
@@ -160,11 +160,6 @@ def _first_valid(scenario: Path, runs: Sequence[int], settings: RunSettings) -> 
         with suppress(InputError):
             return digest_of(scenario, _resolved(scenario, number, settings))
     return ""
-
-
-def without_run(point: Point) -> Point:
-    """Return a point without the number of a run of a distribution."""
-    return {name: value for name, value in point.items() if name != RUN}
 
 
 def _run_of(point: Point) -> Point:

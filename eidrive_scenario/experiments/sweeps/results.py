@@ -15,6 +15,7 @@ import msgspec
 from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
+from eidrive_scenario.experiments.sweeps.axes import without_run
 from eidrive_scenario.experiments.sweeps.result_folders import folder_runs, varying, with_axes
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
@@ -108,7 +109,7 @@ def partner_identity(run: StoredRun, axis: str) -> Identity:
     The numbers of the runs of a distribution depend on its parameters: all other parameters replace them.
     """
     varied = _varied_parameters(run)
-    others = {name: value for name, value in {**run.point, **varied}.items() if name != axis}
+    others = {name: value for name, value in {**without_run(run.point), **varied}.items() if name != axis}
     return run.scenario, None if axis in varied else run.run, run.seed, tuple(sorted(others.items()))
 
 

@@ -78,6 +78,7 @@ def test_value_without_a_partner_has_no_comparison(tmp_path: Path) -> None:
     [
         ("gap", [], "no axis 'gap'; did you mean 'Gap'?"),
         ("Gap", [1, 4], "no run has Gap=4; the runs have 1, 2"),
+        ("Gap", [1, 1], "a value of Gap is given twice"),
         ("Gap", [2], "a single value of Gap cannot be compared .got 2.; the runs have 1, 2"),
         ("Other", [], "a single value of Other cannot be compared .got 0.; the runs have 0"),
         ("Gap", [1, 2], "no runs with a verdict are equal but for Gap"),
@@ -106,7 +107,7 @@ def test_parameter_of_a_distribution_pairs_runs_with_equal_other_parameters(tmp_
     settings = json.dumps({"varied": ["Speed", "Gap"]})
     runs = [
         StoredRun(
-            str(number), number, "s", number, 1, "passed" if passed[number] else "failed", {},
+            str(number), number, "s", number, 1, "passed" if passed[number] else "failed", {"run": number},
             {"parameter.Speed": speed, "parameter.Gap": gap, "trace_hash": ""}, "", "", 1.0, settings,
         )
         for number, (speed, gap) in enumerate(parameters)
