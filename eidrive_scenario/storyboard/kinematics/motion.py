@@ -204,7 +204,7 @@ class Motion(MotionState):
         if distance != 0.0:
             direction = self.direction
             here, lane_pose = self._advance(here, distance * direction)
-            if self.direction != direction:
+            if left and self.direction != direction:
                 left = -left
         if steering is not None:
             self._heading = wrap_angle(
