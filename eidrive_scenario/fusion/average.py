@@ -162,8 +162,8 @@ def _mean_yaw(yaws: Sequence[float]) -> float:
 
 def _mean_of_known(vectors: Sequence[list[float]]) -> list[float]:
     """Return the mean of the vectors without NaN; NaN if there is none."""
-    known = [vector for vector in vectors if not math.isnan(sum(vector))]
-    return _mean(known) if known else [math.nan] * len(vectors[0])
+    complete = [vector for vector in vectors if not math.isnan(sum(vector))]
+    return _mean(complete) if complete else [math.nan] * len(vectors[0])
 
 
 def _mean(vectors: Sequence[list[float]]) -> list[float]:
