@@ -32,6 +32,8 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
     covariance  (N, 2, 2) of the position x y [m²], NaN where unknown
     tracks      (N,) track numbers, constant over time for one object; empty without a tracker
     existence   (N,) probability of existence in [0, 1]; empty (0,) if it is not estimated
+    velocity_deviation  standard deviation in each axis [m/s] of velocities that are measurements of this instant alone;
+                        None for exact ones, and for states of a filter, which contain earlier measurements
     """
 
     time: float
@@ -42,6 +44,7 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
     covariance: Array = msgspec.field(default_factory=lambda: np.empty((0, 2, 2)))
     tracks: tuple[int, ...] = ()
     existence: Array = msgspec.field(default_factory=lambda: NOT_ESTIMATED)
+    velocity_deviation: float | None = None
 
     def __post_init__(self) -> None:
         count = len(self.boxes)
@@ -59,6 +62,8 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
             raise ValueError(f"{len(self.tracks)} tracks for {count} boxes")
         if self.existence is not NOT_ESTIMATED and self.existence.shape not in ((count,), (0,)):
             raise ValueError(f"existence has shape {self.existence.shape}, expected {(count,)} or (0,)")
+        if self.velocity_deviation is not None and not 0.0 < self.velocity_deviation < math.inf:
+            raise ValueError(f"velocity_deviation is {self.velocity_deviation}, expected a positive number or None")
 
     @property
     def confidence(self) -> Array:
@@ -95,4 +100,5 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
             self.covariance.take(picked, axis=0),
             tuple([self.tracks[row] for row in rows]) if self.tracks else (),
             self.existence.take(picked) if len(self.existence) else NOT_ESTIMATED,
+            self.velocity_deviation,
         )

@@ -88,8 +88,8 @@ class CovarianceIntersectionFusion(FusionMethod):
         for places in batches.values():
             for start in range(0, len(places), _BATCH):
                 part = places[start : start + _BATCH]
-                found = _fuse_batch([methods[place] for place in part], [reports[place] for place in part], now)
-                fused.update(zip(part, found, strict=True))
+                results = _fuse_batch([methods[index] for index in part], [reports[index] for index in part], now)
+                fused.update(zip(part, results, strict=True))
         return [fused[place] for place in range(len(methods))]
 
     def _select(self, reports: Sequence[Report]) -> tuple[Integers, Integers]:

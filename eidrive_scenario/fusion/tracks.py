@@ -21,7 +21,7 @@ from eidrive_scenario.fusion.prediction import (
 )
 from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, make_plausible, survived
 from eidrive_scenario.perception.tracking.association import missed as after_miss
-from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, MEASURED_SPEED, UNKNOWN_SPEED
+from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
 
 TRACK = np.dtype(
@@ -95,34 +95,34 @@ def initiate_tracks(receivers: Sequence[int], reports: Sequence[Report]) -> Tabl
 def _converted(reports: Sequence[Report]) -> Table:
     """Return one row for each usable object of these reports."""
     lists = [report.detections for report in reports]
-    boxes = np.concatenate([found.boxes for found in lists])
-    scores = np.concatenate([found.scores for found in lists])
-    velocity = np.concatenate([found.velocity for found in lists])
+    boxes = np.concatenate([detections.boxes for detections in lists])
+    scores = np.concatenate([detections.scores for detections in lists])
+    velocity = np.concatenate([detections.velocity for detections in lists])
     table = np.zeros(len(boxes), TRACK)
-    counts = [len(found) for found in lists]
+    counts = [len(detections) for detections in lists]
     covariance = table["covariance"]
-    covariance[:, :2, :2] = np.concatenate([found.covariance for found in lists])
-    is_exact = covariance[:, 0, 0] + covariance[:, 1, 1] == 0.0
+    covariance[:, :2, :2] = np.concatenate([detections.covariance for detections in lists])
     table["vague"] = make_plausible(covariance)
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
     table["score"] = table["weight"] = table["existence"] = np.minimum(np.maximum(scores, 0.0), 1.0)
-    if any([found.existence is not NOT_ESTIMATED or found.tracks for found in lists]):
-        existence = np.concatenate([found.confidence for found in lists])
+    if any([detections.existence is not NOT_ESTIMATED or detections.tracks for detections in lists]):
+        existence = np.concatenate([detections.confidence for detections in lists])
         table["existence"] = np.minimum(np.maximum(existence, 0.0), 1.0)
-        table["judged"] = np.repeat([len(found.existence) > 0 or len(found.tracks) > 0 for found in lists], counts)
+        judged = [len(detections.existence) > 0 or len(detections.tracks) > 0 for detections in lists]
+        table["judged"] = np.repeat(judged, counts)
     moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
-    measured = table["measured"] = moving & ~table["judged"] & ~table["vague"] & ~is_exact
-    deviation = np.where(moving, np.where(measured, MEASURED_SPEED, KNOWN_SPEED), UNKNOWN_SPEED)
-    covariance[:, 2, 2] = covariance[:, 3, 3] = deviation**2
+    table["measured"] = moving & np.repeat([detections.velocity_deviation is not None for detections in lists], counts)
+    deviation = np.repeat([detections.velocity_deviation or KNOWN_SPEED for detections in lists], counts)
+    covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, deviation, UNKNOWN_SPEED) ** 2
     table["heading"], table["heading_covariance"] = initiate_heading(boxes[:, 6])
     table["facing"] = 1.0
     table["station"] = np.repeat(np.arange(len(reports)), counts)
-    table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
-    table["number"] = [number for found in lists for number in found.tracks or (-1,) * len(found)]
-    words = [_ROW_OF_CLASS.get(name, _MISC) for found in lists for name in found.classes]
+    table["time"] = table["seen"] = np.repeat([detections.time for detections in lists], counts)
+    table["number"] = [number for detections in lists for number in detections.tracks or (-1,) * len(detections)]
+    words = [_ROW_OF_CLASS.get(name, _MISC) for detections in lists for name in detections.classes]
     table["votes"][np.arange(len(table)), words] = table["score"]
     start = 0
     for report, count in zip(reports, counts, strict=True):
@@ -175,9 +175,9 @@ def _of_receivers_with(marked: NDArray[np.bool_], receivers: Integers) -> NDArra
     count = np.count_nonzero(marked)
     if count in (0, len(marked)):
         return marked
-    found = np.zeros(int(receivers.max()) + 1, dtype=bool)
-    found[receivers[marked]] = True
-    return found[receivers]
+    has_marked = np.zeros(int(receivers.max()) + 1, dtype=bool)
+    has_marked[receivers[marked]] = True
+    return has_marked[receivers]
 
 
 def update_tracks(
@@ -185,9 +185,9 @@ def update_tracks(
 ) -> Table:
     """Return the tracks of several stations after one report of each, sorted by station; `tracks` is changed.
 
-    Tracks that the station did not detect for `max_age` seconds are deleted. Velocities of a station with a tracker,
-    and exact ones, replace the state: filtering it again would count its past twice. Other positions and velocities are
-    measurements of a Kalman filter.
+    Tracks that the station did not detect for `max_age` seconds are deleted. Velocities of a filter, and exact ones,
+    replace the state: filtering it again would count its past twice. Positions without velocities, and velocities with
+    a `velocity_deviation`, are measurements of a Kalman filter.
 
     tracks     with the index of the report of its station as station
     receivers  index of the receiving station of each report

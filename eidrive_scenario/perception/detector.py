@@ -15,7 +15,6 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import FeatureMap, LatentCodec
 from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.extensions.settings import Settings
-from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
@@ -77,8 +76,9 @@ class Detector(ABC):
     provides_velocity: ClassVar[bool] = False
     """Whether the boxes have velocities that need no tracker; otherwise a tracker estimates them, unless the station
     disables it."""
-    velocity_deviation: float = KNOWN_SPEED
-    """Standard deviation of the velocities of moving objects in each axis [m/s], with which a tracker begins tracks."""
+    velocity_deviation: float | None = None
+    """Standard deviation of the velocities of moving objects in each axis [m/s], with which trackers begin tracks, and
+    fusion filters the velocities of a station without a tracker; None for exact velocities."""
     detectable_signals: frozenset[str] = frozenset()
     """Kinds of signals that the detector reads, out of `light` and `stop sign`. The station takes the others from the
     map and the line of sight."""

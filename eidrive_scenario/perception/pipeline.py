@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
@@ -18,6 +19,7 @@ from eidrive_scenario.perception.faults import FalseObject, PoseError, with_fals
 from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess
 from eidrive_scenario.perception.result_checks import check_array, check_detections, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 
@@ -92,7 +94,7 @@ class Perception:
         self._checked = is_checked(detector)
         self._tracker = tracker
         if tracker is not None:
-            tracker.setup(detector.velocity_deviation)
+            tracker.setup(detector.velocity_deviation or KNOWN_SPEED)
         self._localizer = localizer
         self._latency = latency
         self._pose_error = pose_error
@@ -190,7 +192,9 @@ class Perception:
 
     def _track(self, detections: Detections, readings: Readings) -> Detections:
         if self._tracker is None:
-            return detections
+            if self.detector.velocity_deviation is None:
+                return detections
+            return replace(detections, velocity_deviation=self.detector.velocity_deviation)
 
         def in_view(boxes: Array) -> Array:
             shares = self.detector.in_view(boxes, readings, detections)

@@ -22,12 +22,6 @@ UNKNOWN_SPEED = 12.0
 KNOWN_SPEED = 0.5
 """Standard deviation of a detected or reported velocity in each axis [m/s]; a detector may state another one for moving
 objects."""
-MEASURED_SPEED = 1.5
-"""Standard deviation of a velocity that a detector measures in two lidar scans, in each axis [m/s].
-
-Root mean square of 19,220 errors of `pillars` for moving objects in 65 scenarios of the library (seed 1, 12 s, overlap
-of at least 0.3): 1.4; 0.4 across the motion and 2.0 along it. The 9,255 errors of standing objects have 0.51.
-"""
 HEADING_DEVIATION = math.radians(6.0)
 """Standard deviation between the axes of a box and of its object [rad]."""
 WANDERING_DENSITY = 0.01

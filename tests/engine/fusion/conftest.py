@@ -27,18 +27,14 @@ def make_report(
     kind: str = "car",
     score: float = 0.9,
     size: tuple[float, float, float] = (4.5, 1.8, 1.5),
-    tracks: tuple[int, ...] | None = None,
+    tracks: tuple[int, ...] = (),
     complete: bool = True,
     arrived: float | None = None,
     state: StationState | None = None,
+    velocity_deviation: float | None = None,
 ) -> Report:
-    """Return a report of objects at these positions; `covariance` is a variance or one or more matrices.
-
-    tracks  None: objects with velocities are tracked
-    """
+    """Return a report of objects at these positions; `covariance` is a variance or one or more matrices."""
     count = len(places)
-    if tracks is None:
-        tracks = tuple(range(count)) if np.isfinite(velocity).all() else ()
     boxes = np.zeros((count, 7))
     boxes[:, :2] = np.array(places, dtype=float).reshape(count, 2)
     boxes[:, 2], boxes[:, 3:6], boxes[:, 6] = size[2] / 2, size, yaw
@@ -52,6 +48,7 @@ def make_report(
         np.broadcast_to(np.array(velocity, dtype=float), (count, 2)).copy(),
         np.broadcast_to(spread, (count, 2, 2)).copy(),
         tracks,
+        velocity_deviation=velocity_deviation,
     )
     return Report(station, detections, time if arrived is None else arrived, state, complete)
 

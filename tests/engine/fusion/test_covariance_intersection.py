@@ -157,7 +157,7 @@ def test_fuse_covariance_grows_with_the_age_of_the_report(report: Make, fuse: Fu
     np.testing.assert_allclose(fused.covariance[0], (0.04 + 0.09 * 0.25 + 6.0 * 0.009) * np.eye(2), rtol=1e-9)
 
 
-def test_velocities_without_a_tracker_are_measurements_of_the_filter(report: Make, fuse: Fuse) -> None:
+def test_velocities_with_a_deviation_are_measurements_of_the_filter(report: Make, fuse: Fuse) -> None:
     """Two scans with errors of 0.2 m and 1.5 m/s, in the information form of the filter along one axis."""
     step, measured = 0.1, [np.array([0.0, 11.0]), np.array([1.2, 8.0])]
     noise, forward = np.diag([0.04, 1.5**2]), np.array([[1.0, step], [0.0, 1.0]])
@@ -167,15 +167,14 @@ def test_velocities_without_a_tracker_are_measurements_of_the_filter(report: Mak
     state = covariance @ (information @ forward @ measured[0] + np.linalg.inv(noise) @ measured[1])
 
     scans = [
-        report("A", number * step, [(x, 0.0)], velocity=(vx, 0.0), tracks=()) for number, (x, vx) in enumerate(measured)
+        report("A", number * step, [(x, 0.0)], velocity=(vx, 0.0), velocity_deviation=1.5)
+        for number, (x, vx) in enumerate(measured)
     ]
     fused = fuse(scans, step)
     np.testing.assert_allclose([fused.boxes[0, 0], fused.velocity[0, 0]], state, rtol=1e-9)
     assert fused.covariance[0, 0, 0] == pytest.approx(covariance[0, 0])
-    for spread, tracks in ((0.04, (1,)), (0.0, ())):
-        x, vx = measured[1]
-        last = report("A", step, [(x, 0.0)], velocity=(vx, 0.0), covariance=spread, tracks=tracks)
-        assert fuse([scans[0], last], step).velocity[0].tolist() == [vx, 0.0]
+    filtered = report("A", step, [(1.2, 0.0)], velocity=(8.0, 0.0))
+    assert fuse([scans[0], filtered], step).velocity[0].tolist() == [8.0, 0.0]
 
 
 def test_fuse_weights_the_newer_report_more(report: Make, fuse: Fuse) -> None:

@@ -31,7 +31,6 @@ from eidrive_scenario.perception.learned.runtimes import (
 )
 from eidrive_scenario.perception.learned.weights import OWN_SUFFIX, Precision, check_weights_exist
 from eidrive_scenario.perception.lidar.station import StationLidars
-from eidrive_scenario.perception.tracking.motion_models import MEASURED_SPEED
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 
@@ -72,7 +71,10 @@ class PillarDetector(Detector):
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
     provides_features: ClassVar[bool] = True
-    velocity_deviation = MEASURED_SPEED
+    velocity_deviation = 1.5
+    """Root mean square of 19,220 errors for moving objects in 65 scenarios of the library (seed 1, 12 s, overlap of at
+    least 0.3): 1.4; 0.4 across the motion and 2.0 along it. The 9,255 errors of standing objects have 0.51.
+    """
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {"lidar": LidarSettings(rate=10.0, rotation=10.0)}
     settings_type: ClassVar[type[Settings] | None] = PillarSettings
 
