@@ -96,5 +96,5 @@ def _line(roads: RoadNetwork, road: Road, stations: list[float], aside: list[flo
 
 def _height(lane: Lane, along: float) -> float:
     """Return the height of the middle of a lane above the road [m], for example of a sidewalk."""
-    index = bisect_right(lane.heights, along, key=lambda entry: entry.s_offset) - 1
+    index = bisect_right(lane.heights, along, key=lambda height: height.s_offset) - 1
     return 0.5 * (lane.heights[index].inner + lane.heights[index].outer) if index >= 0 else 0.0

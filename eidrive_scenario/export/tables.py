@@ -72,7 +72,7 @@ def _messages(run: RecordedRun) -> Iterator[Row]:
     # Frames are read twice: whether a message is too old is known after its outcome
     expired = {message for frame in run.frames() for message in _expired(frame)}
     for frame in run.frames():
-        yield from run.converted(frame, lambda one: _outcomes(one.links, expired))
+        yield from run.converted(frame, lambda frame: _outcomes(frame.links, expired))
     outcome = run.outcome()
     yield from () if outcome is None else _outcomes(outcome.final_links, expired)
 
@@ -103,9 +103,9 @@ def _verdicts(run: RecordedRun) -> Iterator[Row]:
     if outcome is None:
         run.warnings.append("the recording contains no verdicts: the run did not end, or an older version recorded it")
         return
-    for one in outcome.criteria:
-        state = "; ".join(one.violation_state)
-        yield (one.name, one.passed, one.value, one.limit, one.unit, one.first_violation, one.reason, state)
+    for verdict in outcome.criteria:
+        measured = (verdict.value, verdict.limit, verdict.unit, verdict.first_violation)
+        yield (verdict.name, verdict.passed, *measured, verdict.reason, "; ".join(verdict.violation_state))
 
 
 _TIME = _floats("time")
@@ -183,10 +183,9 @@ def write_csv(run: RecordedRun, path: Path, table: str) -> None:
     Texts that a spreadsheet would evaluate as formulas have a prefix, as in `csv_text`. Raise SettingError if the file
     cannot be written.
     """
-    found = TABLES[table]
     with atomic_output(path) as partial, io.TextIOWrapper(create(partial), encoding="utf-8", newline="") as stream:
-        stream.write(",".join(found.columns) + "\n")
-        for row in found.rows(run):
+        stream.write(",".join(TABLES[table].columns) + "\n")
+        for row in TABLES[table].rows(run):
             stream.write(",".join([_field(value) for value in row]) + "\n")
 
 
@@ -196,9 +195,8 @@ def write_parquet(run: RecordedRun, path: Path, table: str) -> None:
     Raise SettingError if pyarrow is missing, or if the file cannot be written.
     """
     arrow, parquet = optional_import("pyarrow", "tables"), optional_import("pyarrow.parquet", "tables")
-    found = TABLES[table]
-    schema = _schema(arrow, found.columns)
-    rows = found.rows(run)
+    schema = _schema(arrow, TABLES[table].columns)
+    rows = TABLES[table].rows(run)
     with (
         atomic_output(path) as partial,
         create(partial) as stream,

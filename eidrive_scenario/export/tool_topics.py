@@ -75,9 +75,9 @@ def write_with_topics(run: RecordedRun, path: Path, topics: Iterable[str] = ALL_
             written = [_TOPICS[name][1](recorder.writer, run) for name in chosen]
             for frame in run.frames():
                 recorder.observe(frame)
-                for one in written:
-                    one.add(frame)
-            for one in written:
-                one.finish()
+                for tool_topics in written:
+                    tool_topics.add(frame)
+            for tool_topics in written:
+                tool_topics.finish()
         finally:
             recorder.close(sealed=not source.damage)

@@ -57,9 +57,9 @@ class CameraImages:
         folder = recording.parent / IMAGES
         if not folder.is_dir():
             folder = partial_path(folder)
-        for place in sorted(folder.iterdir()) if folder.is_dir() else ():
-            if place.is_dir():
-                self._read(unquote(place.name), place, warnings)
+        for station_folder in sorted(folder.iterdir()) if folder.is_dir() else ():
+            if station_folder.is_dir():
+                self._read(unquote(station_folder.name), station_folder, warnings)
 
     def at(self, tick: int) -> list[Picture]:
         """Return the images of a tick."""
@@ -84,7 +84,9 @@ def _camera(station: str, name: str, path: Path) -> Camera:
     """Read the description of a camera. Raise OSError, LookupError, TypeError or ValueError if it is invalid."""
     data = load_json(read_regular_file(path, _LARGEST_DESCRIPTION), max_depth=5)
     arrays = [np.array(data[key], dtype=float) for key in ("intrinsics", "distortion", "pose")]
-    if [array.shape for array in arrays] != [(3, 3), (5,), (4, 4)] or not all(np.isfinite(one).all() for one in arrays):
+    if [array.shape for array in arrays] != [(3, 3), (5,), (4, 4)] or not all(
+        np.isfinite(array).all() for array in arrays
+    ):
         raise ValueError("matrices have other shapes or non-finite values")
     return Camera(station, name, int(data["width"]), int(data["height"]), *arrays)
 
@@ -120,13 +122,13 @@ def add_camera_transforms(transforms: Any, cameras: list[Camera], present: Itera
     here = set(present)
     for camera in cameras:
         if camera.station in here:
-            found = transforms.transforms.add()
-            set_stamp(found.timestamp, time)
-            found.parent_frame_id = frame_of(camera.station)
-            found.child_frame_id = frame_of(camera.station, camera.name)
-            found.translation.x, found.translation.y, found.translation.z = camera.pose[:3, 3].tolist()
+            transform = transforms.transforms.add()
+            set_stamp(transform.timestamp, time)
+            transform.parent_frame_id = frame_of(camera.station)
+            transform.child_frame_id = frame_of(camera.station, camera.name)
+            transform.translation.x, transform.translation.y, transform.translation.z = camera.pose[:3, 3].tolist()
             x, y, z, w = _quaternion(camera.pose[:3, :3])
-            found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w = x, y, z, w
+            transform.rotation.x, transform.rotation.y, transform.rotation.z, transform.rotation.w = x, y, z, w
 
 
 def _quaternion(turn: Array) -> tuple[float, float, float, float]:

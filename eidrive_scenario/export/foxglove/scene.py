@@ -81,10 +81,10 @@ def add_entity(update: Any, name: str, time: float) -> Any:
 
 def add_text(entity: Any, text: str, position: tuple[float, float, float], size: float = 0.8) -> None:
     """Add a text that faces the viewer; size in the world [m]."""
-    found = entity.texts.add(billboard=True, font_size=size, scale_invariant=False, text=text)
-    set_vector(found.pose.position, position)
-    set_rotation(found.pose.orientation, 0.0)
-    set_color(found.color, _TEXT)
+    label = entity.texts.add(billboard=True, font_size=size, scale_invariant=False, text=text)
+    set_vector(label.pose.position, position)
+    set_rotation(label.pose.orientation, 0.0)
+    set_color(label.color, _TEXT)
 
 
 def box_scene(foxglove: Foxglove, lists: Iterable[tuple[str, Detections]], color: Color, time: float) -> Any:
@@ -171,12 +171,12 @@ def _surface_heights(roads: RoadNetwork | None, points: Array, height: float) ->
     heights = np.full(len(points), height)
     if roads is None or roads.is_level:
         return heights
-    found = roads.locate(points[:, 0], points[:, 1], heights)
-    for road in np.unique(found.road[found.found]):
-        rows = (found.found & (found.road == road)).nonzero()[0]
-        place = found.location(int(rows[0]))
-        if place is not None:
-            heights[rows] = roads.road_pose(place.road, found.s[rows], found.t[rows]).z
+    locations = roads.locate(points[:, 0], points[:, 1], heights)
+    for road in np.unique(locations.road[locations.found]):
+        rows = (locations.found & (locations.road == road)).nonzero()[0]
+        location = locations.location(int(rows[0]))
+        if location is not None:
+            heights[rows] = roads.road_pose(location.road, locations.s[rows], locations.t[rows]).z
     return heights
 
 

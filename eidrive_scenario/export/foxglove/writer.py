@@ -109,7 +109,7 @@ class Topics:
         for name, builder in self._snapshots.items():
             snapshot = builder.observe(frame)
             if name in frame.steps:
-                lists = [(one.message.sender, one.message.detections) for one in snapshot.received]
+                lists = [(received.message.sender, received.message.detections) for received in snapshot.received]
                 for entry in self._of_station(frame, name, frame.steps[name], lists):
                     if isinstance(entry.message, self._foxglove.scene):
                         self._shown[entry.topic] = None
@@ -158,10 +158,10 @@ class Topics:
         view = frame.view
         message = self._foxglove.transforms()
         for name, state in zip(view.names, view.states, strict=True):
-            found = message.transforms.add(parent_frame_id=WORLD, child_frame_id=frame_of(name))
-            set_stamp(found.timestamp, view.time)
-            set_vector(found.translation, (state.x, state.y, state.z))
-            set_rotation(found.rotation, state.yaw, state.pitch, state.roll)
+            transform = message.transforms.add(parent_frame_id=WORLD, child_frame_id=frame_of(name))
+            set_stamp(transform.timestamp, view.time)
+            set_vector(transform.translation, (state.x, state.y, state.z))
+            set_rotation(transform.rotation, state.yaw, state.pitch, state.roll)
         add_camera_transforms(message, self._images.cameras, iter(view.names), view.time)
         return message
 

@@ -67,60 +67,62 @@ class LaneMap:
         if self._roads is None or not view.names or not self._roads.roads:
             return {}
         centers = view.centers
-        found = self._roads.locate(centers[:, 0], centers[:, 1], view.position[:, 2])
+        locations = self._roads.locate(centers[:, 0], centers[:, 1], view.position[:, 2])
         assigned = {}
-        for row in np.flatnonzero(found.found & (found.outside <= 0.0)).tolist():
-            place = found.location(row)
-            if place is not None and place.lane:
-                section = self._roads.roads[place.road].section_at(place.s)
-                assigned[row] = self._ids.of("lane", place.road, section.index, place.lane)
+        for row in np.flatnonzero(locations.found & (locations.outside <= 0.0)).tolist():
+            location = locations.location(row)
+            if location is not None and location.lane:
+                section = self._roads.roads[location.road].section_at(location.s)
+                assigned[row] = self._ids.of("lane", location.road, section.index, location.lane)
         return assigned
 
     def _add_lane(self, message: Any, road: Road, section: LaneSection, lane: Lane, line: Line, ways: _Ways) -> None:
         kinds = self._osi.lane.Classification
-        found = message.lane.add()
-        found.id.value = self._lane(road, section, lane.id)
-        data = found.classification
+        lane_message = message.lane.add()
+        lane_message.id.value = self._lane(road, section, lane.id)
+        classification = lane_message.classification
         drivable = lane.type in DRIVABLE
-        data.type = kinds.Type.Value("TYPE_DRIVING" if drivable else "TYPE_NONDRIVING")
+        classification.type = kinds.Type.Value("TYPE_DRIVING" if drivable else "TYPE_NONDRIVING")
         subtype = _SUBTYPES.get(lane.type, "NORMAL" if drivable else "OTHER")
-        data.subtype = kinds.Subtype.Value(f"SUBTYPE_{subtype}")
+        classification.subtype = kinds.Subtype.Value(f"SUBTYPE_{subtype}")
         for x, y, z in line:
-            data.centerline.add(x=x, y=y, z=z)
+            classification.centerline.add(x=x, y=y, z=z)
         ahead = road.directions.get(lane.id, 1) == 1
-        data.centerline_is_driving_direction = ahead
-        left, right = _neighbor(lane.id, 1), _neighbor(lane.id, -1)
-        for number, target in ((left, data.left_adjacent_lane_id), (right, data.right_adjacent_lane_id)):
+        classification.centerline_is_driving_direction = ahead
+        for number, target in (
+            (_neighbor(lane.id, 1), classification.left_adjacent_lane_id),
+            (_neighbor(lane.id, -1), classification.right_adjacent_lane_id),
+        ):
             if number in section.lanes:
                 target.add().value = self._lane(road, section, number)
         # In the direction of s, the left edge of a right lane is the outer edge of the lane left of it
         inner, outer = lane.id - lane.side, lane.id
         for number, target in (
-            (inner if lane.id < 0 else outer, data.left_lane_boundary_id),
-            (outer if lane.id < 0 else inner, data.right_lane_boundary_id),
+            (inner if lane.id < 0 else outer, classification.left_lane_boundary_id),
+            (outer if lane.id < 0 else inner, classification.right_lane_boundary_id),
         ):
             for index, _ in enumerate(lane_edges(section, section.lanes.get(number))):
                 target.add().value = self._ids.of("boundary", road.id, section.index, number, index)
         key = LaneKey(road.id, section.index, lane.id)
         after, before = ways.after.get(key, ()), ways.before.get(key, ())
-        for other in after if ahead else before:
-            data.lane_pairing.add().successor_lane_id.value = self._ids.of("lane", *other)
-        for other in before if ahead else after:
-            data.lane_pairing.add().antecessor_lane_id.value = self._ids.of("lane", *other)
-        found.source_reference.add(
+        for successor in after if ahead else before:
+            classification.lane_pairing.add().successor_lane_id.value = self._ids.of("lane", *successor)
+        for antecessor in before if ahead else after:
+            classification.lane_pairing.add().antecessor_lane_id.value = self._ids.of("lane", *antecessor)
+        lane_message.source_reference.add(
             type="net.asam.opendrive", identifier=[f"road_id:{road.id}", f"lane_id:{lane.id}", f"s:{section.s:g}"]
         )
 
     def _add_boundary(self, message: Any, edge: LaneEdge, line: Line, number: int) -> None:
         kinds = self._osi.lane_boundary.Classification
-        found = message.lane_boundary.add()
-        found.id.value = number
+        boundary = message.lane_boundary.add()
+        boundary.id.value = number
         for x, y, z in line:
-            position = found.boundary_line.add().position
+            position = boundary.boundary_line.add().position
             position.x, position.y, position.z = x, y, z
-        found.classification.type = kinds.Type.Value(f"TYPE_{edge.type}")
+        boundary.classification.type = kinds.Type.Value(f"TYPE_{edge.type}")
         color = "NONE" if edge.type == "NO_LINE" else edge.color.upper()
-        found.classification.color = kinds.Color.Value(f"COLOR_{color}")
+        boundary.classification.color = kinds.Color.Value(f"COLOR_{color}")
 
     def _lane(self, road: Road, section: LaneSection, number: int) -> int:
         return self._ids.of("lane", road.id, section.index, number)
@@ -137,10 +139,10 @@ class _Ways:
 def _successors(roads: RoadNetwork) -> _Ways:
     after: dict[LaneKey, list[LaneKey]] = {}
     before: dict[LaneKey, list[LaneKey]] = {}
-    for one, other, data in roads.graph.edges(data=True):
+    for lane, successor, data in roads.graph.edges(data=True):
         if data["kind"] == "successor":
-            after.setdefault(one, []).append(other)
-            before.setdefault(other, []).append(one)
+            after.setdefault(lane, []).append(successor)
+            before.setdefault(successor, []).append(lane)
     return _Ways(after, before)
 
 

@@ -70,29 +70,29 @@ def add_moving_objects(
     centers = view.position + arms
     velocity, acceleration = center_motion(view, arms)
     for row, (name, category) in enumerate(zip(view.names, view.categories, strict=True)):
-        found = message.moving_object.add()
-        found.id.value = ids.of(ACTOR, name)
-        found.type = osi.moving_object.Type.Value(object_type(category))
-        base = found.base
+        moving_object = message.moving_object.add()
+        moving_object.id.value = ids.of(ACTOR, name)
+        moving_object.type = osi.moving_object.Type.Value(object_type(category))
+        base = moving_object.base
         base.dimension.length, base.dimension.width, base.dimension.height = view.size[row].tolist()
         set_vector(base.position, centers[row])
         set_orientation(base.orientation, view.yaw[row], view.pitch[row], view.roll[row])
         set_vector(base.velocity, velocity[row])
         set_vector(base.acceleration, acceleration[row])
         base.orientation_rate.yaw = float(view.yaw_rate[row])
-        found.source_reference.add(type="net.asam.openscenario", identifier=[name])
+        moving_object.source_reference.add(type="net.asam.openscenario", identifier=[name])
         if row in lanes:
-            found.assigned_lane_id.add().value = lanes[row]
-            found.moving_object_classification.assigned_lane_id.add().value = lanes[row]
+            moving_object.assigned_lane_id.add().value = lanes[row]
+            moving_object.moving_object_classification.assigned_lane_id.add().value = lanes[row]
         if category in VEHICLES:
             kind = osi.moving_object.VehicleClassification.Type
-            data = found.vehicle_classification
-            data.type = kind.Value(_TOWED.get(towed.get(name, ""), VEHICLES[category]))
-            data.has_trailer = name in frame.trailers
-            if data.has_trailer:
-                data.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
-            _set_axles(found.vehicle_attributes, view.offset[row], axles.get(name))
-            _set_lights(osi, data.light_state, frame.appearances.get(name))
+            classification = moving_object.vehicle_classification
+            classification.type = kind.Value(_TOWED.get(towed.get(name, ""), VEHICLES[category]))
+            classification.has_trailer = name in frame.trailers
+            if classification.has_trailer:
+                classification.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
+            _set_axles(moving_object.vehicle_attributes, view.offset[row], axles.get(name))
+            _set_lights(osi, classification.light_state, frame.appearances.get(name))
 
 
 def _set_axles(attributes: Any, offset: Array, axles: AxleCenters | None) -> None:

@@ -77,15 +77,15 @@ class SensorDataBuilder:
 
     def _add(self, message: Any, objects: Detections, row: int, origin: _Origin) -> None:
         box = objects.boxes[row]
-        found = message.moving_object.add()
-        header = found.header
+        detected = message.moving_object.add()
+        header = detected.header
         if objects.tracks:
             header.tracking_id.value = max(objects.tracks[row], 0)
         header.existence_probability = float(objects.confidence[row])
         header.sensor_id.add().value = self._sensor
         state = type(header).MeasurementState
         header.measurement_state = state.Value("MEASUREMENT_STATE_MEASURED")
-        base = found.base
+        base = detected.base
         base.dimension.length, base.dimension.width, base.dimension.height = box[3:6].tolist()
         position = origin.turn.T @ (box[:3] - origin.position)
         set_vector(base.position, position)
@@ -99,13 +99,13 @@ class SensorDataBuilder:
         if np.isfinite(covariance).all():
             plane = (origin.turn.T @ origin.along_ground)[:2]
             spread = np.sqrt(np.maximum(np.diag(plane @ covariance @ plane.T), 0.0))
-            found.base_rmse.position.x, found.base_rmse.position.y = spread.tolist()
+            detected.base_rmse.position.x, detected.base_rmse.position.y = spread.tolist()
         reference = self._osi.detected.DetectedMovingObject.ReferencePoint
-        found.reference_point = reference.Value("REFERENCE_POINT_CENTER")
-        self._add_candidate(found, objects.classes[row], float(objects.scores[row]))
+        detected.reference_point = reference.Value("REFERENCE_POINT_CENTER")
+        self._add_candidate(detected, objects.classes[row], float(objects.scores[row]))
 
-    def _add_candidate(self, found: Any, category: str, score: float) -> None:
-        candidate = found.candidate.add()
+    def _add_candidate(self, detected: Any, category: str, score: float) -> None:
+        candidate = detected.candidate.add()
         candidate.probability = min(max(score, 0.0), 1.0)
         candidate.type = self._osi.moving_object.Type.Value(object_type(category))
         if category in VEHICLES:

@@ -60,7 +60,7 @@ def check_osi() -> None:
 def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
     builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.axles, run.weather)
     for frame in run.frames():
-        for data in run.converted(frame, lambda one: [builder.build(one).SerializeToString()]):
+        for data in run.converted(frame, lambda frame: [builder.build(frame).SerializeToString()]):
             stream.write(struct.pack("<I", len(data)) + data)
 
 
