@@ -68,10 +68,10 @@ class LinkRandom:
 
     def uniform(self, purpose: str, sender: str, receiver: str, number: int) -> float:
         """Return the number in (0, 1) of this purpose, link and message."""
-        block, place = divmod(number, BLOCK)
+        block, index = divmod(number, BLOCK)
         link = (purpose, sender, receiver)
         held = self._blocks.get(link)
         if held is None or held[0] != block:
             numbers = generator(self._seed, *link, block).random(BLOCK)
             held = self._blocks[link] = (block, array("d", np.clip(numbers, 1e-16, 1.0 - 1e-16).tobytes()))
-        return held[1][place]
+        return held[1][index]

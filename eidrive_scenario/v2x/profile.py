@@ -70,7 +70,7 @@ def load_profile(
         source = Path(text)
     path = _find(source, Path(origin).parent, folders)
     if path is None:
-        names = {found.stem for folder in folders for suffix in SUFFIXES for found in folder.glob(f"*{suffix}")} | {
+        names = {path.stem for folder in folders for suffix in SUFFIXES for path in folder.glob(f"*{suffix}")} | {
             NO_COOPERATION
         }
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
@@ -141,8 +141,8 @@ def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
-        found = type(data).__name__ if data is not None else "an empty file"
-        message = f"channel profile is not a mapping (got {found})"
+        given = type(data).__name__ if data is not None else "an empty file"
+        message = f"channel profile is not a mapping (got {given})"
         raise SettingError(Diagnostic(message, "expected settings such as `model: composed`", source, line))
     return data
 

@@ -74,10 +74,10 @@ class TraceDelay(Settings):
     def quantile(self, u: float) -> float:
         """Return the quantile of the delay at probability `u` [s]."""
         ascending = self._ascending
-        place = u * (len(ascending) - 1)
-        below = min(int(place), len(ascending) - 1)
+        rank = u * (len(ascending) - 1)
+        below = min(int(rank), len(ascending) - 1)
         above = min(below + 1, len(ascending) - 1)
-        return ascending[below] + (place - below) * (ascending[above] - ascending[below])
+        return ascending[below] + (rank - below) * (ascending[above] - ascending[below])
 
     def at(self, number: int) -> float:
         """Return the delay of message `number` of a link in a replayed trace [s]."""
@@ -104,22 +104,22 @@ def _column(path: Path, column: object) -> list[float]:
     if isinstance(column, str):
         if column not in header:
             raise ValueError(f"{_format_path(path)} has no column {quoted(column)} in its first row")
-        place = header.index(column)
+        index = header.index(column)
     else:
-        place = column
-    if not 0 <= place < len(header):
-        raise ValueError(f"{_format_path(path)} has no column {quoted(place)} (expected 0 to {len(header) - 1})")
-    body = rows[1:] if isinstance(column, str) or not _is_number(header[place]) else rows
+        index = column
+    if not 0 <= index < len(header):
+        raise ValueError(f"{_format_path(path)} has no column {quoted(index)} (expected 0 to {len(header) - 1})")
+    body = rows[1:] if isinstance(column, str) or not _is_number(header[index]) else rows
     if not body:
         raise ValueError(f"{_format_path(path)} has no delays")
     values = []
     for number, row in body:
         # The row is not quoted: the path may refer to a file with other, confidential content.
-        if place >= len(row) or not _is_number(row[place]):
-            raise ValueError(f"{_format_path(path)}:{number}: column {place} is not a delay")
-        if float(row[place]) < 0.0:
+        if index >= len(row) or not _is_number(row[index]):
+            raise ValueError(f"{_format_path(path)}:{number}: column {index} is not a delay")
+        if float(row[index]) < 0.0:
             raise ValueError(f"{_format_path(path)}:{number}: delay is negative")
-        values.append(float(row[place]))
+        values.append(float(row[index]))
     return values
 
 

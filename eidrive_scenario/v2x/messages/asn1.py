@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -72,8 +73,8 @@ class Asn1Encoder:
         except Exception as error:  # asn1tools raises errors of many types for invalid modules
             names = ", ".join(str(file) for file in files)
             # The message of asn1tools quotes the line, which may be confidential.
-            place = re.search(r"line (\d+)", str(error))
-            message = f"{names}: not a valid ASN.1 module" + (f" in line {place[1]}" if place else "")
+            location = re.search(r"line (\d+)", str(error))
+            message = f"{names}: not a valid ASN.1 module" + (f" in line {location[1]}" if location else "")
             raise SettingError(Diagnostic(message, "correct the module", source, line)) from error
         for kind in kinds:
             if TYPES[kind] not in self._modules.types:
@@ -123,15 +124,13 @@ def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
     """Return a CAM (EN 302 637-2, annex A); that of a roadside unit contains only its position."""
     state = message.state
-    if message.detections.classes[0] == ROADSIDE:
-        place = {"stationType": _STATION_TYPES[ROADSIDE], "referencePosition": _position(state)}
-        return _cam(message, {"basicContainer": place, "highFrequencyContainer": ("rsuContainerHighFrequency", {})})
+    station = message.detections.classes[0]
+    basic = {"stationType": _STATION_TYPES[station], "referencePosition": _position(state)}
+    if station == ROADSIDE:
+        return _cam(message, {"basicContainer": basic, "highFrequencyContainer": ("rsuContainerHighFrequency", {})})
     *_, length, width, _, _ = message.detections.boxes[0].tolist()
     parameters: dict[str, Any] = {
-        "basicContainer": {
-            "stationType": _STATION_TYPES[message.detections.classes[0]],
-            "referencePosition": _position(state),
-        },
+        "basicContainer": basic,
         "highFrequencyContainer": (
             "basicVehicleContainerHighFrequency",
             {
@@ -189,8 +188,9 @@ def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
         )
     if sensors:
         sectors = (message.sensors or ())[:sensors]
-        known = [_sensor(number, sector) for number, sector in enumerate(sectors)]
-        parameters["sensorInformationContainer"] = known + [_sensor(n) for n in range(len(known), sensors)]
+        parameters["sensorInformationContainer"] = [
+            _sensor(number, sector) for number, sector in zip_longest(range(sensors), sectors)
+        ]
     if len(detections):
         delay = _within((state.time - detections.time) * 1e3, -1500, 1500)
         parameters["perceivedObjectContainer"] = [
@@ -236,7 +236,7 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
     }
 
 
-def _sensor(number: int, sector: ViewSector | None = None) -> dict[str, Any]:
+def _sensor(number: int, sector: ViewSector | None) -> dict[str, Any]:
     """Return a sensor with its sector in the frame of the station; without one with unknown properties."""
     properties = {"range": 0, "horizontalOpeningAngleStart": 3601, "horizontalOpeningAngleEnd": 3601}
     area: dict[str, Any] = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0}

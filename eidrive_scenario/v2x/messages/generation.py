@@ -202,8 +202,8 @@ def _report(detections: Detections, row: int, now: float) -> _ReportedObject:
     x, y, *_, yaw = detections.boxes[row].tolist()
     vx, vy = detections.velocity[row].tolist()
     speed = math.hypot(vx, vy)
-    known = not math.isnan(speed)
-    return _ReportedObject(now, x, y, speed if known else 0.0, math.atan2(vy, vx) if known and speed > MOVING else yaw)
+    direction = math.atan2(vy, vx) if speed > MOVING else yaw  # an unknown speed (NaN) compares as False
+    return _ReportedObject(now, x, y, 0.0 if math.isnan(speed) else speed, direction)
 
 
 GATE = 3.0
@@ -219,30 +219,30 @@ class ObjectIdAssigner:
 
     def __init__(self) -> None:
         self._next = 0
-        self._known: dict[int, tuple[float, float, float, float, float]] = {}
+        self._earlier: dict[int, tuple[float, float, float, float, float]] = {}
 
     def assign_ids(self, detections: Detections) -> Sequence[int]:
         """Return one object id per row."""
         if detections.tracks or not len(detections):
             return detections.tracks
         now = detections.time
-        self._known = {number: last for number, last in self._known.items() if now - last[0] <= RETENTION}
-        places = detections.boxes[:, :2]
+        self._earlier = {number: last for number, last in self._earlier.items() if now - last[0] <= RETENTION}
+        positions = detections.boxes[:, :2]
         assigned: list[int | None] = [None] * len(detections)
-        known = list(self._known)
-        if known:
+        ids = list(self._earlier)
+        if ids:
             expected = np.array(
-                [(x + vx * (now - time), y + vy * (now - time)) for time, x, y, vx, vy in self._known.values()]
+                [(x + vx * (now - time), y + vy * (now - time)) for time, x, y, vx, vy in self._earlier.values()]
             )
-            for row, column in associate(places, expected, GATE):
-                assigned[row] = known[column]
+            for row, column in associate(positions, expected, GATE):
+                assigned[row] = ids[column]
         numbers = []
         for row, number in enumerate(assigned):
             if number is None:
                 number, self._next = self._next, self._next + 1
-            x, y = places[row].tolist()
+            x, y = positions[row].tolist()
             vx, vy = (0.0 if math.isnan(v) else v for v in detections.velocity[row].tolist())
-            self._known[number] = (now, x, y, vx, vy)
+            self._earlier[number] = (now, x, y, vx, vy)
             numbers.append(number)
         return tuple(numbers)
 

@@ -177,17 +177,17 @@ class MediumAccess(ABC):
         row = self._rows[transmission.message.sender]
         queue = self._waiting[row]
         dropped: list[Transmission] = []
-        place = len(queue)
+        index = len(queue)
         if self.queue.discipline == "lcfs" and queue:
             if any(_is_outdated(transmission, by=entry) for entry in queue):
                 return [transmission]
             dropped = [entry for entry in queue if _is_outdated(entry, by=transmission)]
-            place = queue.index(dropped[0]) if dropped else place
+            index = queue.index(dropped[0]) if dropped else index
             for entry in dropped:
                 queue.remove(entry)
         if len(queue) >= self.queue.length:
             return [*dropped, transmission]
-        queue.insert(place, transmission)
+        queue.insert(index, transmission)
         if queue[0] is not self._head[row]:
             self._next(row)
         return dropped

@@ -78,7 +78,7 @@ class LinkBudget:
         self._names: tuple[str, ...] = ()
         self._rows: dict[str, int] = {}
         self._first = self._second = np.zeros(0, dtype=np.int64)
-        self._normals, self._updates, self._places = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        self._normals, self._updates, self._positions = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         self._pairs: list[tuple[str, str]] | None = None
         """Names of the stations of each pair; None until line of sight is determined by rays."""
         self._set_stations(())
@@ -86,7 +86,7 @@ class LinkBudget:
     def continue_from(self, previous: LinkBudget) -> None:
         """Take the stations and the shadowing of another link budget."""
         self._set_stations(previous._names)
-        self._normals, self._updates, self._places = previous._normals, previous._updates, previous._places
+        self._normals, self._updates, self._positions = previous._normals, previous._updates, previous._positions
 
     def at(self, surroundings: RadioEnvironment) -> Budget:
         """Return the link budget at the current antenna positions."""
@@ -124,20 +124,21 @@ class LinkBudget:
         count, former = len(names), len(self._names)
         first, second = np.triu_indices(count, 1)
         normals, updates = np.zeros((2, len(first))), np.full(len(first), -1)
-        places = np.full((count, 3), np.inf)  # a new station has moved from an infinite distance
+        positions = np.full((count, 3), np.inf)  # a new station has moved from an infinite distance
         old = np.array([self._rows.get(name, -1) for name in names], dtype=np.int64)
         pair_at = np.full((former + 1, former + 1), -1)
         pair_at[self._first, self._second] = pair_at[self._second, self._first] = np.arange(len(self._first))
         former_pair = pair_at[old[first], old[second]] if count else updates
-        known = former_pair >= 0
-        normals[:, known], updates[known] = self._normals[:, former_pair[known]], self._updates[former_pair[known]]
-        places[old >= 0] = self._places[old[old >= 0]]
+        remaining = former_pair >= 0
+        normals[:, remaining] = self._normals[:, former_pair[remaining]]
+        updates[remaining] = self._updates[former_pair[remaining]]
+        positions[old >= 0] = self._positions[old[old >= 0]]
         self._names, self._rows = names, {name: row for row, name in enumerate(names)}
         self._first, self._second = first, second
         self._pair_at = np.full((count, count), len(first))
         """Index of the pair of two rows; the number of pairs on the diagonal."""
         self._pair_at[first, second] = self._pair_at[second, first] = np.arange(len(first))
-        self._normals, self._updates, self._places = normals, updates, places
+        self._normals, self._updates, self._positions = normals, updates, positions
         self._pairs = None
 
         def keys(purpose: str) -> Keys:
@@ -179,11 +180,11 @@ class LinkBudget:
         x <- k x + sqrt(1 - k²) n with k = e^(-s / d) and a standard normal number n keeps the variance of 1. A pair at
         rest has k = 1 and keeps its numbers; a new pair has covered an infinite distance, so k = 0.
         """
-        step = positions - self._places
+        step = positions - self._positions
         moved = np.sqrt(np.einsum("ni,ni->n", step, step))
         covered = moved.take(self._first) + moved.take(self._second)
         moving = covered > 0.0
-        self._places = positions.copy()
+        self._positions = positions.copy()
         if moving.any():
             self._updates += moving
             kept = np.exp(-covered / self._reaches.take(states))

@@ -240,10 +240,10 @@ class RadioChannel(QueuedChannel):
         receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys, self._jamming.power)
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
-        for place, entry in enumerate(ended):
+        for index, entry in enumerate(ended):
             present = self._rows_of(entry.message.sender, entry.receivers)
             self._record_absent(entry, present)
-            receivers.append(present if plain else self._apply_loss(entry, present, receptions.causes[place], budget))
+            receivers.append(present if plain else self._apply_loss(entry, present, receptions.causes[index], budget))
         block = ReceptionBlock(ended, receptions, budget, receivers)
         self._enqueue_deliveries(block)
         self._counters.decide(
@@ -259,12 +259,12 @@ class RadioChannel(QueuedChannel):
         delivered = np.flatnonzero(block.causes == DELIVERED)
         receivers: list[list[str]] = [[] for _ in block.ended]
         names, delay = block.budget.names, self.profile.delay
-        places = block.places[delivered]
-        for place, row in zip(places.tolist(), block.reached_receivers[delivered].tolist(), strict=True):
-            receivers[place].append(names[row])
+        indices = block.indices[delivered]
+        for index, row in zip(indices.tolist(), block.reached_receivers[delivered].tolist(), strict=True):
+            receivers[index].append(names[row])
         if isinstance(delay, ConstantDelay):
             ends = np.array([entry.end + delay.seconds for entry in block.ended])
-            block.arrives[delivered] = ends[places]
+            block.arrives[delivered] = ends[indices]
             for entry, arrives, reached in zip(block.ended, ends.tolist(), receivers, strict=True):
                 self._links.enqueue(queue_entry(entry.message, entry.sent, arrives), *reached)
             return

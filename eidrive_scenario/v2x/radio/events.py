@@ -23,7 +23,7 @@ class ReceptionBlock(OutcomeBlock):
     """Outcomes of T ended transmissions at their receivers, E in total, sorted by transmission.
 
     receivers  rows of the receivers, by message
-    places     (E,) indices into `ended`;  senders, reached_receivers  (E,) rows;  causes  (E,) codes
+    indices    (E,) indices into `ended`;  senders, reached_receivers  (E,) rows;  causes  (E,) codes
     arrives    (E,) times of arrival [s]; infinity for lost messages
     """
 
@@ -34,29 +34,29 @@ class ReceptionBlock(OutcomeBlock):
         self.receptions = receptions
         self.budget = budget
         self.receivers = receivers
-        self.places = np.repeat(np.arange(len(ended)), [len(rows) for rows in receivers])
+        self.indices = np.repeat(np.arange(len(ended)), [len(rows) for rows in receivers])
         self.reached_receivers = np.concatenate(receivers)
-        self.senders = receptions.senders[self.places]
-        self.causes = receptions.causes[self.places, self.reached_receivers].astype(np.int64)
-        self.arrives = np.full(len(self.places), np.inf)
+        self.senders = receptions.senders[self.indices]
+        self.causes = receptions.causes[self.indices, self.reached_receivers].astype(np.int64)
+        self.arrives = np.full(len(self.indices), np.inf)
 
     def __len__(self) -> int:
-        return len(self.places)
+        return len(self.indices)
 
     def __iter__(self) -> Iterator[LinkEvent]:
         budget, senders, reached = self.budget, self.senders, self.reached_receivers
-        for place, sender, row, cause, arrives, loss, snr, state in zip(
-            self.places.tolist(),
+        for index, sender, row, cause, arrives, loss, snr, state in zip(
+            self.indices.tolist(),
             senders.tolist(),
             reached.tolist(),
             self.causes.tolist(),
             self.arrives.tolist(),
             budget.loss[senders, reached].tolist(),
-            self.receptions.snr[self.places, reached].tolist(),
+            self.receptions.snr[self.indices, reached].tolist(),
             budget.states[senders, reached].tolist(),
             strict=True,
         ):
-            entry = self.ended[place]
+            entry = self.ended[index]
             message, (outcome, reason) = entry.message, OUTCOMES[cause]
             yield LinkEvent(
                 sender=message.sender,
@@ -81,10 +81,10 @@ class ReceptionBlock(OutcomeBlock):
             self.reached_receivers,
             OUTCOMES,
             self.causes,
-            number[self.places],
-            sent[self.places],
+            number[self.indices],
+            sent[self.indices],
             self.arrives,
-            size[self.places],
+            size[self.indices],
         )
 
 
@@ -162,8 +162,8 @@ class LinkCounterTable:
         links = len(self.names) ** 2
         link = senders * len(self.names) + receivers  # flat indices: np.add.at is ten times as fast
         np.add.at(self._causes.reshape(-1), causes.astype(np.int64) * links + link, 1)
-        place = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
-        np.add.at(self._outcomes.reshape(-1), ((causes == DELIVERED) * _CLASSES + place) * links + link, 1)
+        distance_class = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
+        np.add.at(self._outcomes.reshape(-1), ((causes == DELIVERED) * _CLASSES + distance_class) * links + link, 1)
 
     def flush_into(self, links: Links) -> None:
         """Add the counts to the counters of the links and reset them."""
@@ -179,13 +179,13 @@ class LinkCounterTable:
         causes = self._causes[:, senders, receivers].T
         causes[:, DELIVERED] = 0
         lost = np.nonzero(causes)
-        for place, code, number in zip(*(column.tolist() for column in (*lost, causes[lost])), strict=True):
-            counters[place].count_loss(CAUSES[code], number)
+        for link, code, number in zip(*(column.tolist() for column in (*lost, causes[lost])), strict=True):
+            counters[link].count_loss(CAUSES[code], number)
         outcomes = self._outcomes[:, :, senders, receivers].T
-        known = np.nonzero(outcomes.any(axis=2))
-        for place, bin_index, (losses, deliveries) in zip(
-            *(column.tolist() for column in (*known, outcomes[known])), strict=True
+        counted = np.nonzero(outcomes.any(axis=2))
+        for link, distance_class, (losses, deliveries) in zip(
+            *(column.tolist() for column in (*counted, outcomes[counted])), strict=True
         ):
-            counters[place].count_outcomes(bin_index, losses + deliveries, deliveries)
+            counters[link].count_outcomes(distance_class, losses + deliveries, deliveries)
         for counts in (self._sent, self._bytes, self._causes, self._outcomes):
             counts[...] = 0

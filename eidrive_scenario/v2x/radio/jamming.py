@@ -38,8 +38,8 @@ def jamming_power(
     """Return the power (N,) [mW] that antennas at `positions` (N, 3) receive from all jammers, in line of sight."""
     total = np.zeros(len(positions))
     for jammer in jammers:
-        place = np.array([jammer.x, jammer.y, jammer.z])
-        heights, distance = positions[:, 2], np.linalg.norm(positions - place, axis=1)
+        antenna = np.array([jammer.x, jammer.y, jammer.z])
+        heights, distance = positions[:, 2], np.linalg.norm(positions - antenna, axis=1)
         between = LinkGeometry.in_sight(distance, np.minimum(heights, jammer.z), np.maximum(heights, jammer.z))
         loss = path_loss.loss(between, frequency_ghz, np.full(len(positions), 0.5))
         total += 10.0 ** ((jammer.power_dbm + gain_dbi - loss) / 10.0)

@@ -56,7 +56,7 @@ _FREE_DISTANCE = 10
 _BIT_ERROR_WEIGHTS = (36, 211, 1404, 11633, 77433, 502690, 3322763, 21292910, 134365911)
 """Weights of the convolutional code (133, 171) of rate 1/2 at Hamming distances 10 to 26 (P. Frenger et al., 1999)."""
 _NIST_SIZE = 100
-_NIST_RATIOS = tuple(round(3.0 + 0.05 * place, 2) for place in range(181))
+_NIST_RATIOS = tuple(round(3.0 + 0.05 * step, 2) for step in range(181))
 
 
 def nist_qpsk_errors(ratio_db: float, size: int) -> float:
@@ -68,7 +68,7 @@ def nist_qpsk_errors(ratio_db: float, size: int) -> float:
     ratio = 10.0 ** (ratio_db / 10.0)
     raw = 0.5 * math.erfc(math.sqrt(ratio / 2.0))
     bound = math.sqrt(4.0 * raw * (1.0 - raw))
-    weighted = sum(weight * bound ** (_FREE_DISTANCE + 2 * place) for place, weight in enumerate(_BIT_ERROR_WEIGHTS))
+    weighted = sum(weight * bound ** (_FREE_DISTANCE + 2 * index) for index, weight in enumerate(_BIT_ERROR_WEIGHTS))
     return 1.0 - (1.0 - min(1.0, weighted / 2.0)) ** (8 * size)
 
 
@@ -114,7 +114,7 @@ CURVES = {
         *cv2x_mode4.CODINGS[4][1:], cv2x_mode4.MESSAGE, "3GPP R1-160284, QPSK r = 0.7, 280 km/h, 190 bytes", floor=1e-4
     ),
     "pscch": ErrorCurve(
-        tuple(round(-6.2 + 0.2 * place, 1) for place in range(len(_PSCCH_ERRORS))),
+        tuple(round(-6.2 + 0.2 * step, 1) for step in range(len(_PSCCH_ERRORS))),
         _PSCCH_ERRORS,
         None,
         "NIST, LTE D2D model of ns-3 (public domain): PSCCH, SCI in additive white Gaussian noise, one antenna",

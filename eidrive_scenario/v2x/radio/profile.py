@@ -54,7 +54,7 @@ class PacketErrors(Settings):
     nlos: str
 
     @model_validator(mode="after")
-    def _known(self) -> PacketErrors:
+    def _check_names(self) -> PacketErrors:
         for name in (self.los, self.nlosv, self.nlos):
             if name not in CURVES:
                 raise ValueError(f"unknown packet error curve {name!r}; {suggestion(name, CURVES)}")

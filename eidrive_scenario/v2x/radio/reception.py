@@ -72,8 +72,8 @@ class Receiver:
         for index, entry in enumerate(active):
             if entry.gain is not None:
                 received[index] += entry.gain
-        place = {id(entry): index for index, entry in enumerate(active)}
-        own = np.array([place[id(entry)] for entry in ended], dtype=np.int64)
+        index_of = {id(entry): index for index, entry in enumerate(active)}
+        own = np.array([index_of[id(entry)] for entry in ended], dtype=np.int64)
         senders, signal = rows.take(own), received.take(own, axis=0)
         links, states = keys.take(senders, axis=0), budget.states.take(senders, axis=0)
         numbers = np.array([[entry.message.number] for entry in ended])
@@ -117,7 +117,7 @@ class Receiver:
     ) -> list[tuple[int, Bools]]:
         """Return the losses by background traffic, at the distances where its model has these path losses.
 
-        Each cause has a separate random number: the key of the link is shifted by the place of the cause.
+        Each cause has a separate random number: the key of the link is shifted by the index of the cause.
         """
         table, loss_at = background
         distance = np.interp(mean_loss, loss_at, table.distance)
@@ -157,7 +157,7 @@ def _interference(
 
     Sums follow the order of the stations, which makes them independent of the BLAS library.
 
-    own       (T,) places of the ended transmissions in `active`
+    own       (T,) indices of the ended transmissions in `active`
     rows      (A,) rows of the senders of `active`
     received  (A, N) received power of each transmission at each station [dBm]
     """
@@ -174,13 +174,13 @@ def _interference(
     half_duplex = np.zeros((len(own), received.shape[1]), dtype=bool)
     interference = np.zeros(half_duplex.shape) if same_band.any() else None
     milliwatts = 10.0 ** (received / 10.0)
-    for place in np.flatnonzero(overlapping.any(axis=1)).tolist():
-        half_duplex[place, rows[overlapping[place]]] = True
-        others = np.flatnonzero(same_band[place])
+    for index in np.flatnonzero(overlapping.any(axis=1)).tolist():
+        half_duplex[index, rows[overlapping[index]]] = True
+        others = np.flatnonzero(same_band[index])
         if interference is not None and len(others):
             others = others[np.argsort(rows[others], kind="stable")]
             disturbing = milliwatts[others]
             if shares is not None:
-                disturbing = disturbing * shares[place, others][:, None]
-            interference[place] = disturbing.sum(axis=0)
+                disturbing = disturbing * shares[index, others][:, None]
+            interference[index] = disturbing.sum(axis=0)
     return interference, half_duplex

@@ -62,11 +62,11 @@ class LinkEvents(Sequence[LinkEvent]):
         return iter(self._events())
 
     @overload
-    def __getitem__(self, place: int) -> LinkEvent: ...
+    def __getitem__(self, index: int) -> LinkEvent: ...
     @overload
-    def __getitem__(self, place: slice) -> Sequence[LinkEvent]: ...
-    def __getitem__(self, place: int | slice) -> LinkEvent | Sequence[LinkEvent]:
-        return self._events()[place]
+    def __getitem__(self, index: slice) -> Sequence[LinkEvent]: ...
+    def __getitem__(self, index: int | slice) -> LinkEvent | Sequence[LinkEvent]:
+        return self._events()[index]
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, tuple | list | LinkEvents):

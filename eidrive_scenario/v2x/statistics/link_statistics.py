@@ -77,10 +77,10 @@ class LinkCounters:
         """Count the outcome of a message over this distance [m]."""
         self.count_outcomes(int(distance // DISTANCE_BIN), 1, int(delivered))
 
-    def count_outcomes(self, place: int, known: int, delivered: int) -> None:
+    def count_outcomes(self, distance_class: int, outcomes: int, deliveries: int) -> None:
         """Count known outcomes and deliveries in a distance class."""
-        self.outcomes_by_distance[place] = self.outcomes_by_distance.get(place, 0) + known
-        self.deliveries_by_distance[place] = self.deliveries_by_distance.get(place, 0) + delivered
+        self.outcomes_by_distance[distance_class] = self.outcomes_by_distance.get(distance_class, 0) + outcomes
+        self.deliveries_by_distance[distance_class] = self.deliveries_by_distance.get(distance_class, 0) + deliveries
 
     def statistics(
         self, now: float, receptions: ReceptionStatistics | None, channel_busy_ratio: float | None = None
@@ -101,8 +101,8 @@ class LinkCounters:
             p95_age=None if receptions is None else receptions.p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
             reception=tuple(
-                (DISTANCE_BIN * place, known, self.deliveries_by_distance[place])
-                for place, known in sorted(self.outcomes_by_distance.items())
+                (DISTANCE_BIN * distance_class, outcomes, self.deliveries_by_distance[distance_class])
+                for distance_class, outcomes in sorted(self.outcomes_by_distance.items())
             ),
             channel_busy_ratio=channel_busy_ratio,
         )

@@ -107,25 +107,25 @@ class AgeOfInformation:
     def _percentile(self, share: float, low: Array, high: Array, defined: NDArray[np.bool_], order: Integers) -> Array:
         """Return the age below which each link spent this share of the time (L,) [s]."""
         selected = order[defined[order]]
-        place_of = np.full(len(low), -1)
-        place_of[selected] = np.arange(len(selected))
+        index_of = np.full(len(low), -1)
+        index_of[selected] = np.arange(len(selected))
         links, levels, weights = self._all_breakpoints(_breakpoints(np.arange(len(low)), low, high))
-        places = place_of[links]
-        wanted = places >= 0
-        places, levels, weights = places[wanted], levels[wanted], weights[wanted]
-        rising = np.lexsort((levels, places))
-        places, levels, above = places[rising], levels[rising], np.cumsum(weights[rising])
+        indices = index_of[links]
+        wanted = indices >= 0
+        indices, levels, weights = indices[wanted], levels[wanted], weights[wanted]
+        rising = np.lexsort((levels, indices))
+        indices, levels, above = indices[rising], levels[rising], np.cumsum(weights[rising])
         percentile = np.full(len(order), np.nan)
         if not len(selected):
             return percentile
         # Integer arithmetic makes the result of a link independent of other links; no age exceeds the last level.
         exact = np.round(levels / RESOLUTION).astype(np.int64)
         spent = np.cumsum(np.concatenate([[0], above[:-1] * np.diff(exact)]))
-        first = np.searchsorted(places, np.arange(len(selected)))
-        last = np.append(first[1:], len(places)) - 1
-        spent -= spent[first][places]
+        first = np.searchsorted(indices, np.arange(len(selected)))
+        last = np.append(first[1:], len(indices)) - 1
+        spent -= spent[first][indices]
         target = share * spent[last]
-        after = np.clip(first + np.add.reduceat(spent < target[places], first, dtype=np.int64), first + 1, last)
+        after = np.clip(first + np.add.reduceat(spent < target[indices], first, dtype=np.int64), first + 1, last)
         before = after - 1
         within = (target - spent[before]) / np.maximum(spent[after] - spent[before], 1)
         percentile[defined[order]] = levels[before] + within * (levels[after] - levels[before])
@@ -232,11 +232,11 @@ class ReceptionLog:
             return
         link_codes: list[int] = []
         for receiver, entries in self._pending:
-            known = self._codes.setdefault(receiver, {})
-            for sender in sorted({entry[1] for entry in entries} - known.keys()):
-                known[sender] = self._count
+            code_of = self._codes.setdefault(receiver, {})
+            for sender in sorted({entry[1] for entry in entries} - code_of.keys()):
+                code_of[sender] = self._count
                 self._count += 1
-            link_codes += [known[entry[1]] for entry in entries]
+            link_codes += [code_of[entry[1]] for entry in entries]
         received = [entry for _, entries in self._pending for entry in entries]
         codes = np.array(link_codes, dtype=np.int64)
         generated = np.array([entry[4].message.generated for entry in received], dtype=float)

@@ -217,11 +217,11 @@ class Sidelink(MediumAccess):
             threshold=settings.pssch_rsrp_threshold_dbm,
         )
         own = [subframe for spell in sent for subframe in range(max(spell.start, oldest), min(spell.stop, now))]
-        places = settings.subchannels - width + 1
-        order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * places))
+        first_bands = settings.subchannels - width + 1
+        order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * first_bands))
         reported = candidates(request, self._history.of(row, now, np.array(own, dtype=np.int64)), order)
         chosen = int(reported[math.floor(self._draw("choice", row) * len(reported))])
-        start, band = divmod(chosen, places)
+        start, band = divmod(chosen, first_bands)
         return Grant(earliest + start, band, width, length, counter)
 
     def _new_counter(self, row: int) -> int:
@@ -254,9 +254,9 @@ class Sidelink(MediumAccess):
         widths = np.array([pdu.transmission.bands for pdu in due])
         blocks = np.array([self._settings.pssch_blocks(width) for width in widths.tolist()])[:, None]
         power = self._power[rows]
-        for place, pdu in enumerate(due):
+        for index, pdu in enumerate(due):
             if pdu.transmission.gain is not None:
-                power[place] += pdu.transmission.gain
+                power[index] += pdu.transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
         self._history.proceed(due[-1].subframe + 1)
         busy, unmeasured = self._history.busy(
@@ -270,9 +270,9 @@ class Sidelink(MediumAccess):
             pdu.transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
         codes[power < self.sensing_dbm] = PROPAGATION
         rsrp = power - 10.0 * np.log10(SUBCARRIERS * blocks)
-        reserving = [place for place, pdu in enumerate(due) if pdu.transmission.reserves]
+        reserving = [index for index, pdu in enumerate(due) if pdu.transmission.reserves]
         if reserving:
-            self._history.reserve([due[place] for place in reserving], codes[reserving], rsrp[reserving])
+            self._history.reserve([due[index] for index in reserving], codes[reserving], rsrp[reserving])
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period

@@ -80,9 +80,9 @@ def candidates(request: Request, sensed: Sensed, order: Array) -> Integers:
     average = _over(_average_rssi(request, sensed, subframes), request).mean(axis=(2, 3)).ravel()
 
     least = math.ceil(CANDIDATE_SHARE * len(highest) - 1e-9)
-    places = np.flatnonzero(highest <= _raise_threshold(highest, request.threshold, least))
-    best = np.lexsort((order[places], average[places]))[:least]
-    return np.sort(places[best])
+    selectable = np.flatnonzero(highest <= _raise_threshold(highest, request.threshold, least))
+    best = np.lexsort((order[selectable], average[selectable]))[:least]
+    return np.sort(selectable[best])
 
 
 def _mark(
@@ -108,8 +108,8 @@ def _mark(
         use = reserved_in + repeat * interval
         counts = recent if repeat > 1 else np.ones_like(recent)
         start = (use - request.first) % interval
-        for place in range(0, len(level), interval):
-            at = start + place
+        for shift in range(0, len(level), interval):
+            at = start + shift
             ahead = use - (request.first + at)
             hit = np.flatnonzero(counts & (at < len(level)) & (ahead >= 0) & (ahead < request.uses * interval))
             for offset in range(int(widths[hit].max(initial=0))):

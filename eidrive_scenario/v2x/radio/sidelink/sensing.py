@@ -59,9 +59,9 @@ class ControlChannel:
         np.fill_diagonal(meets, False)
         met = np.flatnonzero(meets.any(axis=1))
         interference = np.zeros((len(met), per_block.shape[1]))
-        for index, place in enumerate(met.tolist()):
-            others = np.flatnonzero(meets[place])
-            boosted = np.where(first[others] == first[place], BOOST, 1.0)
+        for index, own in enumerate(met.tolist()):
+            others = np.flatnonzero(meets[own])
+            boosted = np.where(first[others] == first[own], BOOST, 1.0)
             interference[index] = (per_block[others] * boosted[:, None]).sum(axis=0)
         if len(met):
             disturbed = _decibels(signal[met] / (self.block_noise + interference))
@@ -216,6 +216,6 @@ class SensingHistory:
 def _columns(values: NDArray[Scalar], rows: Sequence[int | None], fresh: float) -> NDArray[Scalar]:
     """Return an array for reordered stations, which are its last axis."""
     columns = np.full((*values.shape[:-1], len(rows)), fresh, dtype=values.dtype)
-    known = [(place, old) for place, old in enumerate(rows) if old is not None]
-    columns[..., [place for place, _ in known]] = values[..., [old for _, old in known]]
+    kept = [(new, old) for new, old in enumerate(rows) if old is not None]
+    columns[..., [new for new, _ in kept]] = values[..., [old for _, old in kept]]
     return columns

@@ -57,7 +57,7 @@ class SidelinkSettings(Settings):
         if self.interval not in INTERVALS:
             raise ValueError(
                 f"interval is not supported (got {self.interval:g} s; "
-                f"expected one of {', '.join(f'{known:g}' for known in INTERVALS)})"
+                f"expected one of {', '.join(f'{interval:g}' for interval in INTERVALS)})"
             )
         if self.pscch_errors not in CURVES:
             raise ValueError(
