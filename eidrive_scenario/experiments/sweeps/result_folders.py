@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,7 +12,7 @@ import msgspec
 
 from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.experiments.sweeps.axes import PARAMETER, SETTINGS, Scalar, is_setting
+from eidrive_scenario.experiments.sweeps.axes import PARAMETER, SETTINGS, Scalar, axis_identity, is_setting
 from eidrive_scenario.experiments.sweeps.store import ABORTED, FAILED, NOT_JUDGED, PASSED, StoredRun
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import RESULT, read_result, result_paths, unfinished_runs
@@ -40,6 +41,7 @@ class _Settings(msgspec.Struct):
     run: int | None = None
     parameters: dict[str, str] = {}
     drawn: tuple[str, ...] = ()
+    varied: tuple[str, ...] = ()
 
 
 class _Result(msgspec.Struct):
@@ -83,19 +85,26 @@ def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
     return runs
 
 
-def varying(runs: Iterable[StoredRun]) -> set[str]:
+def varying(runs: Iterable[StoredRun]) -> list[str]:
     """Return the names of the settings with several values among runs of folders."""
     values: dict[str, set[Scalar]] = {}
     for run in runs:
         for name, value in run.point.items():
             values.setdefault(name, set()).add(value)
-    return {name for name, several in values.items() if len(several) > 1}
+    return [name for name, several in values.items() if len(several) > 1]
 
 
-def with_axes(runs: Iterable[StoredRun], axes: set[str]) -> Iterator[StoredRun]:
-    """Yield the runs of folders with these axes only."""
+def with_axes(runs: Iterable[StoredRun], axes: Mapping[str, str]) -> Iterator[StoredRun]:
+    """Yield runs with these axes only. The settings of a run have the values of axes that its sweep lacks.
+
+    axes  names of the axes by `axis_identity`
+    """
     for run in runs:
-        point = {name: value for name, value in run.point.items() if name in axes}
+        values = {axis_identity(name): value for name, value in run.point.items()}
+        if run.settings and not axes.keys() <= values.keys():
+            with suppress(ValueError, RecursionError):  # settings of another form
+                values = {**_point(json.loads(run.settings)), **values}
+        point = {name: values[key] for key, name in axes.items() if key in values}
         yield msgspec.structs.replace(run, point=point)
 
 
@@ -166,7 +175,7 @@ def _interrupted(location: Path, number: int) -> Iterator[StoredRun]:
 
 
 def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
-    """Return the settings of a run that a sweep could vary, without those that the seed draws."""
+    """Return the settings of a run that a sweep could vary, without those that its seed or a distribution assigns."""
     resolved = msgspec.convert(settings, _Settings)
     point: dict[str, Scalar] = {SCENARIO: resolved.scenario}
     for name in SETTINGS:
@@ -176,6 +185,6 @@ def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
         if isinstance(value, str | int | float):
             point[name] = value
     for name, text in resolved.parameters.items():
-        if name not in resolved.drawn:
+        if name not in (*resolved.drawn, *resolved.varied):
             point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = cast("Scalar", typed(text))
     return point

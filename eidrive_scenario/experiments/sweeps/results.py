@@ -15,7 +15,7 @@ import msgspec
 from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
-from eidrive_scenario.experiments.sweeps.axes import without_run
+from eidrive_scenario.experiments.sweeps.axes import axis_identity, without_run
 from eidrive_scenario.experiments.sweeps.result_folders import folder_runs, varying, with_axes
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
@@ -58,13 +58,21 @@ def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
 
 
 def stored_sides(*sides: Sequence[Path]) -> list[list[StoredRun]]:
-    """Return the runs of each side as `stored_runs`; settings that vary within any side are axes of all folders."""
-    stores = [[path for path in paths if not _has_results(path)] for paths in sides]
+    """Return the runs of each side as `stored_runs`, all with the same axes.
+
+    They are those of all stores, and the settings that vary within the folders of any side.
+    """
+    stores = [[run for run, _ in _all_runs(path for path in paths if not _has_results(path))] for paths in sides]
     folders = [folder_runs([path for path in paths if _has_results(path)]) for paths in sides]
-    axes = {name for runs in folders for name in varying(runs)}
+    axes: dict[str, str] = {}
+    for name in [
+        *(name for runs in stores for run in runs for name in run.point),
+        *(name for runs in folders for name in varying(runs)),
+    ]:
+        axes.setdefault(axis_identity(name), name)
     joined: list[list[StoredRun]] = []
-    for paths, runs in zip(stores, folders, strict=True):
-        last = _last_verdicts([*_all_runs(paths), *((run, Path()) for run in with_axes(runs, axes))])
+    for swept, runs in zip(stores, folders, strict=True):
+        last = _last_verdicts((run, Path()) for run in with_axes([*swept, *runs], axes))
         joined.append(sorted((run for run, _ in last), key=lambda run: (run.number, run.key)))
     return joined
 
@@ -82,7 +90,7 @@ def runs_with_stores(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
     yield from _last_verdicts(_all_runs(paths))
 
 
-def _all_runs(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
+def _all_runs(paths: Iterable[Path]) -> Iterator[tuple[StoredRun, Path]]:
     for path in paths:
         with ResultStore.read(path) as store:
             for run in store.runs():
@@ -100,7 +108,7 @@ def _last_verdicts(runs: Iterable[tuple[StoredRun, Path]]) -> Iterable[tuple[Sto
 
 def identity(run: StoredRun) -> Identity:
     """Return what distinguishes a run from the others of its sweep."""
-    return run.scenario, run.run, run.seed, tuple(sorted(run.point.items()))
+    return run.scenario, run.run, run.seed, tuple(sorted(without_run(run.point).items()))
 
 
 def partner_identity(run: StoredRun, axis: str) -> Identity:

@@ -56,6 +56,43 @@ def test_values_that_vary_on_one_side_distinguish_runs_of_both(runs: Path) -> No
     assert (comparison.verdicts.both, comparison.unpaired, comparison.identical) == (2, 2, 2)
 
 
+def test_swept_distribution_is_compared_with_the_folder_of_its_runs(
+    eidrive: Eidrive, distribution: Path, tmp_path: Path
+) -> None:
+    """Both commands simulate the same runs, so that each has a partner with an equal trace hash."""
+    store, folder = tmp_path / "s.db", tmp_path / "runs"
+    eidrive("sweep", distribution, "--store", store, "--workers", "1")
+    eidrive("run", distribution, "--out", folder)
+    for sides in ((store, folder), (folder, store)):
+        comparison = compare(*([side] for side in sides))
+        assert (comparison.verdicts.pairs, comparison.identical, comparison.unpaired) == (2, 2, 0)
+
+
+@pytest.mark.parametrize("axis", ["Speed", "param.Speed"])
+def test_axis_of_a_store_distinguishes_runs_of_a_folder(
+    eidrive: Eidrive, scenario: Path, runs: Path, tmp_path: Path, axis: str
+) -> None:
+    store = tmp_path / "s.db"
+    eidrive("sweep", scenario, "--vary", f"{axis}=5,30", "--seeds", "1-2", "--store", store, "--workers", "1")
+    comparison = compare([store], [runs / "5"])
+    assert (comparison.verdicts.both, comparison.identical, comparison.unpaired) == (2, 2, 2)
+    assert {run.point[axis] for run in stored_runs([store, runs])} == {5, 30}
+
+
+def test_settings_of_a_store_have_the_values_of_axes_of_others(
+    eidrive: Eidrive, scenario: Path, tmp_path: Path
+) -> None:
+    """The second store varies the speed only; all its runs have the default channel and time step."""
+    stores = [tmp_path / "a.db", tmp_path / "b.db"]
+    axes = [("channel=none,ideal", "dt=0.05,0.1"), ("Speed=5,30",)]
+    for store, texts in zip(stores, axes, strict=True):
+        varied = [argument for text in texts for argument in ("--vary", text)]
+        eidrive("sweep", scenario, *varied, "--seeds", "1", "--store", store, "--workers", "1")
+    points = {tuple(sorted(run.point.items())) for run in stored_runs(stores)}
+    assert (("Speed", 30), ("channel", "none"), ("dt", 0.05)) in points
+    assert {tuple(name for name, _ in point) for point in points} == {("Speed", "channel", "dt")}
+
+
 def test_interrupted_run_is_aborted(runs: Path) -> None:
     """A recording without a result has the settings of its run; one that has only begun is left out."""
     folders = sorted(path.parent for path in runs.rglob("result.json") if "30.0" in str(path))
