@@ -64,12 +64,8 @@ def stored_sides(*sides: Sequence[Path]) -> list[list[StoredRun]]:
     """
     stores = [[run for run, _ in _all_runs(path for path in paths if not _has_results(path))] for paths in sides]
     folders = [folder_runs([path for path in paths if _has_results(path)]) for paths in sides]
-    axes: dict[str, str] = {}
-    for name in [
-        *(name for runs in stores for run in runs for name in run.point),
-        *(name for runs in folders for name in varying(runs)),
-    ]:
-        axes.setdefault(axis_identity(name), name)
+    varied = [name for runs in folders for name in varying(runs)]
+    axes = _axes([*(name for runs in stores for run in runs for name in run.point), *varied])
     joined: list[list[StoredRun]] = []
     for swept, runs in zip(stores, folders, strict=True):
         last = _last_verdicts((run, Path()) for run in with_axes([*swept, *runs], axes))
@@ -83,11 +79,21 @@ def _has_results(path: Path) -> bool:
 
 
 def runs_with_stores(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
-    """Yield the runs of several stores with their store, in the order of the stores.
+    """Yield the runs of several stores with their store, in the order of the stores, all with the same axes.
 
     Of equal runs, the last one counts that was not aborted or crashed, as another try may have a verdict.
     """
-    yield from _last_verdicts(_all_runs(paths))
+    stored = list(_all_runs(paths))
+    runs = with_axes((run for run, _ in stored), _axes(name for run, _ in stored for name in run.point))
+    yield from _last_verdicts(zip(runs, (path for _, path in stored), strict=True))
+
+
+def _axes(names: Iterable[str]) -> dict[str, str]:
+    """Return the names of different axes by `axis_identity`, in order of appearance."""
+    axes: dict[str, str] = {}
+    for name in names:
+        axes.setdefault(axis_identity(name), name)
+    return axes
 
 
 def _all_runs(paths: Iterable[Path]) -> Iterator[tuple[StoredRun, Path]]:

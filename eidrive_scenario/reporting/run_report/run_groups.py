@@ -17,7 +17,7 @@ _LEFT_OUT = {"seed", "run", "drawn", "varied", "scenario"} | {
 """Settings that differ within a group, and options that the settings of channel and stations contain."""
 _NAMES = ("channel_profile.name", "channel_profile.description", "channel_profile")
 """Settings that the name of the channel states."""
-_EMPTY = ("", "[]", "{}")
+_EMPTY = ("", "[]", "{}", "null")
 """Texts of settings without a value, which headings omit."""
 _OPTIONS = [option.name for option in OPTIONS if option.detail and option.name != "channel"]
 """Options of a run that change many of its settings; the channel is in each heading."""

@@ -51,7 +51,7 @@ def test_group_runs_separates_channel_contents_but_not_seeds() -> None:
         ({"parameters": {"OtherY": "6"}}, {"parameters.OtherY": ("5.0", "6")}),
         ({"dt": 0.1}, {"dt": ("0.05", "0.1")}),
         ({"user_values": {"mood": "3"}}, {"user_values": ("",), "user_values.mood": ("", "3")}),
-        ({"weather": "storm"}, {"weather": ("null", "storm")}),
+        ({"weather": "storm"}, {"weather": ("", "storm")}),
     ],
 )
 def test_group_runs_states_differing_setting(changes: dict[str, Any], differing: dict[str, tuple[str, str]]) -> None:

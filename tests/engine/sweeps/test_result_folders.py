@@ -12,6 +12,7 @@ from command_fixtures import Eidrive, eidrive
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.sweeps.comparison import compare, compare_values
 from eidrive_scenario.experiments.sweeps.results import stored_runs, stored_sides, summaries
+from eidrive_scenario.reporting.run_report.reported_runs import read_sweeps
 
 __all__ = ["eidrive"]
 
@@ -91,6 +92,8 @@ def test_settings_of_a_store_have_the_values_of_axes_of_others(
     points = {tuple(sorted(run.point.items())) for run in stored_runs(stores)}
     assert (("Speed", 30), ("channel", "none"), ("dt", 0.05)) in points
     assert {tuple(name for name, _ in point) for point in points} == {("Speed", "channel", "dt")}
+    reported, _ = read_sweeps(stores)
+    assert {run.value_of("dt") for run in reported if run.sweep == str(stores[1])} == {0.05}
 
 
 def test_interrupted_run_is_aborted(runs: Path) -> None:
