@@ -226,17 +226,16 @@ def view(
     check_output_paths(outputs, [path, *([second] if second else [])])
     opened = open_recording(path)
     if has_pictures:
-        from eidrive_scenario.recording.run_files import RESULT, result_of
+        from eidrive_scenario.recording.integrity import DamageReport
         from eidrive_scenario.reporting.drawing.vector_canvas import check_format, parse_size, write_figure
         from eidrive_scenario.reporting.replay import film
-        from eidrive_scenario.reporting.run_report.reported_runs import parse_run
+        from eidrive_scenario.reporting.run_report.reported_runs import run_of_recording
 
         for option, file in stills.items():
             check_format(option, file, (option.replace("--", "."),))
-        result = result_of(path)
-        outcome = parse_run(result, path.with_name(RESULT)) if result is not None else None
-        recorded = film.RecordedStation(opened, station, result=outcome)
-        damage = recorded.damage
+        of_result = DamageReport()
+        recorded = film.RecordedStation(opened, station, result=run_of_recording(path, of_result))
+        damage = (*recorded.damage, *of_result.lines())
         if has_stills:
             figure = recorded.figure(at, parse_size(size))
             for file in filter(None, stills.values()):
@@ -249,7 +248,7 @@ def view(
         from eidrive_scenario.reporting.replay.page import make_replay
 
         damage = make_replay(opened, page, other=None if second is None else open_recording(second)).damage
-    print_warnings(f"{path} is damaged: {line}" for line in damage)
+    print_warnings(f"{path}: {line}" for line in damage)
     partials = filter(is_partial, [path, *([second] if second else [])])
     print_warnings(f"{partial}: the run did not end, the recording is incomplete" for partial in partials)
     for written in (*stills.values(), gif, mp4, page):

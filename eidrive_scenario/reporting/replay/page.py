@@ -21,7 +21,7 @@ from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
-from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, is_partial, result_of
+from eidrive_scenario.recording.run_files import IMAGES, RECORDING, is_partial
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.reporting.drawing.road_drawing import recorded_network, recorded_roads
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, is_broken
@@ -31,7 +31,7 @@ from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, Data, descr
 from eidrive_scenario.reporting.replay.light import LightChanges, parse_weather
 from eidrive_scenario.reporting.replay.models import ActorModels, street_models, three_library
 from eidrive_scenario.reporting.replay.series import closest_approach
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
+from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, run_of_recording
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.simulation.recorded_outcome import BODIES, CONTEXT, TRAILERS, recorded_bodies, recorded_outcome
@@ -197,8 +197,8 @@ def make_replay(
     other    recording that the page shows over this one, with the verdicts of the result in its folder
     library  address of a file with three.js, see `write_replays`; "" if the page contains it
 
-    The readable part of a damaged recording is shown, and the page lists the damage. Raise InputError if no frame can
-    be read, the result is invalid, or the roads of the recordings differ.
+    The readable part of a damaged recording is shown, without verdicts if the result is invalid, and the page lists the
+    damage. Raise InputError if no frame can be read, or the roads of the recordings differ.
     """
     report, others_report = DamageReport(), DamageReport()
     roads = readable_roads(recording, report)
@@ -245,8 +245,7 @@ def _labels(
 
 
 def _read_run(recording: Recording, report: DamageReport) -> RunOfPage:
-    """Read a recorded run. Raise InputError if no frame can be read, or the result in its folder is invalid."""
-    result = result_of(recording.path)
+    """Read a recorded run. Raise InputError if no frame can be read."""
     for line in recording.damage:
         report.add(line)
     trace = TraceHash()
@@ -260,12 +259,12 @@ def _read_run(recording: Recording, report: DamageReport) -> RunOfPage:
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
         raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
-    if result is not None and result.get("trace_hash") != trace.hexdigest():
+    result = run_of_recording(recording.path, report)
+    if result is not None and result.trace_hash != trace.hexdigest():
         report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
-    verdicts = None if result is None else parse_run(result, recording.path.with_name(RESULT))
-    data["decisive"] = decisive_instant(data, verdicts, data["actors"])
+    data["decisive"] = decisive_instant(data, result, data["actors"])
     title = _title(recording.scenario or recording.path.stem, recording.seed)
-    return RunOfPage(title, _facts(recording, settings), settings, data, verdicts, not is_partial(recording.path))
+    return RunOfPage(title, _facts(recording, settings), settings, data, result, not is_partial(recording.path))
 
 
 def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:

@@ -14,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.results import runs_with_stores
 from eidrive_scenario.experiments.sweeps.store import FAILED, FOLDER, PASSED, StoredRun
-from eidrive_scenario.recording.run_files import RESULT, read_result
+from eidrive_scenario.recording.integrity import DamageReport
+from eidrive_scenario.recording.run_files import RESULT, read_result, result_of
 from eidrive_scenario.simulation.result import typed
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
@@ -139,6 +140,19 @@ def parse_run(result: Mapping[str, Any] | ReportedRun, source: str | Path = "") 
                 str(source),
             )
         ) from error
+
+
+def run_of_recording(recording: Path, report: DamageReport) -> ReportedRun | None:
+    """Return the run whose result is in the folder of its recording.
+
+    Return None without a result, and for an invalid one, which is added to the report.
+    """
+    try:
+        result = result_of(recording)
+        return None if result is None else parse_run(result, recording.with_name(RESULT))
+    except InputError as error:
+        report.add(f"the verdicts are not shown: {error}")
+        return None
 
 
 def run_of_result(result: RunResult, scenario: str) -> ReportedRun:
