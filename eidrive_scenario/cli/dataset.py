@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.options import HelpAll, parse_seeds, takes_run_options
+from eidrive_scenario.cli.options import HelpAll, check_output_paths, parse_seeds, takes_run_options
 from eidrive_scenario.cli.output import echo, print_warnings
 from eidrive_scenario.cli.supervision import interrupt_once
 from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError
@@ -67,6 +67,7 @@ def dataset(
 
     Complete runs are kept, so that the same command continues a killed one.
     """
+    check_output_paths({"--out": out}, [])
     if from_folder is not None:
         given = {
             "scenarios": scenarios,

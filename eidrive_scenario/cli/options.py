@@ -119,6 +119,8 @@ def check_record(record: RecordMode | None, out: Path | None) -> None:
         raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))
 
 
+STANDARD_OUTPUT = "-"
+"""Value of `--log` for standard output. All other options refuse it, as a file of this name is rarely meant."""
 MOST_SEEDS = 1_000_000
 """Maximum number of seeds of an option."""
 
@@ -147,7 +149,7 @@ def parse_shard(text: str) -> tuple[int, int]:
 
 
 def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
-    """Raise SettingError if an output path is an input file, or if two options name the same file.
+    """Raise SettingError if an output path is `-` or an input file, or if two options name the same file.
 
     written  output paths by option; None for an omitted option
     read     input files; other values of options, such as the name of a profile, are ignored
@@ -155,6 +157,10 @@ def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[
     inputs = {os.path.realpath(path) for path in read if path is not None and os.path.isfile(path)}
     taken: dict[str, str] = {}
     for option, path in written.items():
+        if str(path) == STANDARD_OUTPUT:
+            raise SettingError(
+                Diagnostic(f"{option}: - is not a path", "give a path; that of standard output is /dev/stdout")
+            )
         if path is None or (os.path.exists(path) and not os.path.isfile(path)):
             continue
         real = os.path.realpath(path)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.options import (
+    STANDARD_OUTPUT,
     HelpAll,
     Record,
     check_output_paths,
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.95
 """Default confidence of `--success-rate`."""
-STANDARD_OUTPUT = "-"
-"""Value of `--log` for standard output."""
 
 Live = Annotated[bool, typer.Option("--live", help="Show the run in the browser while it is in progress.")]
 LiveSpeed = Annotated[
@@ -146,7 +145,8 @@ def run(
 
     path = resolve_scenario(scenario)
     is_distribution = definition(path) == "distribution"
-    check_output_paths({"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}, (path, *settings.sources))
+    outputs = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log, "--out": out}
+    check_output_paths(outputs, (path, *settings.sources))
     several = "--success-rate" if test is not None else f"--repeat {repeat}" if repeat > 1 else ""
     if is_distribution and max_runs != 1:
         several = several or "a distribution; --max-runs 1 runs one of it"

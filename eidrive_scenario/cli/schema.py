@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.cli.output import echo, print_warnings
 
 
@@ -36,6 +37,7 @@ def schema(
     from eidrive_scenario.export.settings_schemas import settings_schema
     from eidrive_scenario.files.atomic import write_atomically
 
+    check_output_paths({"--out": out}, [])
     warnings: list[str] = []
     text = json.dumps(settings_schema(kind.value, warnings.append), indent=1, allow_nan=False)
     print_warnings(warnings)

@@ -173,8 +173,8 @@ def draw(
 
     path = Path(file) if is_road_file(file) else resolve_scenario(file)
     picture = out or Path(f"{path.stem}.svg")
-    check_format("--out", picture)
     check_output_paths({"--out": picture}, [path])
+    check_format("--out", picture)
     write_figure(source_figure(path, parse_size(size), station), picture)
     echo(str(picture))
 
@@ -292,7 +292,7 @@ def report(
         raise SettingError(Diagnostic("--size without --figures has no effect", "add --figures DIR"))
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
-
+    check_output_paths({"--out": out, "--figures": figures}, runs)
     page = report_files(
         runs,
         out,

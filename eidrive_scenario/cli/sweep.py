@@ -11,6 +11,7 @@ import typer
 from eidrive_scenario.cli.options import (
     HelpAll,
     Record,
+    check_output_paths,
     check_record,
     parse_seeds,
     parse_shard,
@@ -122,6 +123,7 @@ def sweep(
     check_record(record, out)
     files = None if out is None else KeptFiles(out.absolute(), record or RecordMode.ALWAYS, store.absolute())
     path = resolve_scenario(scenario)
+    check_output_paths({"--store": store, "--out": out}, [path, *settings.sources])
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
     kind = definition(path)
 

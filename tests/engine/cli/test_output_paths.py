@@ -37,6 +37,43 @@ def test_output_path_of_input_file_is_invalid_input(
     assert list(own.parent.iterdir()) == [own]
 
 
+@pytest.fixture
+def inputs(eidrive: Eidrive, own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
+    """Return a scenario, its recorded run and a store by name; the current folder is empty."""
+    eidrive("run", own, "--out", tmp_path / "run")
+    eidrive("sweep", own, "--store", tmp_path / "s.db", "--workers", "1")
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    return {"own": own, "run": tmp_path / "run", "store": tmp_path / "s.db"}
+
+
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        ("check {own}", "--sarif"),
+        ("compare {store} {store}", "--html"),
+        ("dataset {own}", "--out"),
+        ("dataset --import {run}", "--out"),
+        ("draw {own}", "--out"),
+        ("export {run}", "--osi --foxglove --mcap --csv --parquet"),
+        ("report {run}", "--out --figures"),
+        ("results {store}", "--csv --parquet"),
+        ("run {own}", "--csv --out"),
+        ("schema stack", "--out"),
+        ("sweep {own}", "--store"),
+        ("sweep {own} --store new.db", "--out"),
+        ("tree {own}", "--svg"),
+        ("view {run}", "--out --png --svg --pdf --gif --mp4"),
+    ],
+)
+def test_hyphen_is_no_path_of_an_output(eidrive: Eidrive, inputs: dict[str, Path], command: str, options: str) -> None:
+    """Only `run --log -` is standard output."""
+    for option in options.split():
+        result = eidrive(*(text.format(**inputs) for text in command.split()), option, "-")
+        assert (result.exit_code, result.stderr.partition(";")[0]) == (2, f"{option}: - is not a path")
+        assert not list(Path().iterdir())
+
+
 @pytest.mark.parametrize("option", ["--csv", "--log"])
 @pytest.mark.parametrize("place", ["/", ".", "..", ""])
 @pytest.mark.parametrize("runs", [1, 2])
