@@ -240,10 +240,16 @@ def fits_type(text: str, scalar: Scalar) -> bool:
 
 
 def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
-    return all(
-        compare(value, constraint.rule, scalar.convert(_without_fraction(constraint.value, scalar)))
-        for constraint in group.value_constraint
-    )
+    """Whether a value satisfies all constraints. Texts are compared as numbers if both are numbers, as in conditions:
+    lane ids are texts.
+    """
+    for constraint in group.value_constraint:
+        sides = value, scalar.convert(_without_fraction(constraint.value, scalar))
+        if scalar is STRING and all(fits_type(side, DOUBLE) for side in sides):
+            sides = DOUBLE.convert(sides[0]), DOUBLE.convert(sides[1])
+        if not compare(sides[0], constraint.rule, sides[1]):
+            return False
+    return True
 
 
 def compare(left: Any, rule: Rule, right: Any) -> bool:

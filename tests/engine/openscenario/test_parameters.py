@@ -54,6 +54,10 @@ def test_inner_scope_hides_outer_parameter() -> None:
         ("double", "10", "lessThan", "10", False),
         ("int", "3", "greaterOrEqual", "3", True),
         ("string", "car", "notEqualTo", "car", False),
+        ("string", "-4", "greaterOrEqual", "-5", True),
+        ("string", "-12", "lessThan", "-2", True),
+        ("string", "10", "lessThan", "9", False),
+        ("string", "van", "greaterThan", "car", True),
         ("dateTime", "2026-01-31T12:00:00", "greaterThan", "2026-01-31T11:00:00Z", True),
     ],
 )
