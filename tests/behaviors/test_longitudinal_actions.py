@@ -108,6 +108,26 @@ def test_speed_relative_to_the_actor_itself_refers_to_its_start(
 
 
 @pytest.mark.parametrize(
+    ("dimension", "value", "before", "slope", "reached"),
+    [("time", 4.0, 14.75, 10.0, 4.7), ("distance", 60.0, 14.75, 10.0, 4.7), ("rate", 2.0, 15.8, 2.0, 14.2)],
+)
+def test_speed_relative_to_a_jumping_reference_keeps_the_limits(
+    scene: RunScene, dimension: str, value: float, before: float, slope: float, reached: float
+) -> None:
+    """From 20 m/s toward 10 m/s in 4 s, over 60 m at a mean of 15 m/s, or at 2 m/s², until the other car drives at
+    40 m/s at 2.1 s: from then on at the maximum acceleration of 10 m/s², or at the given rate.
+    """
+    played = scene(
+        15,
+        ("Ego", speed(relative(0, "delta"), "linear", dimension, value)),
+        ("Other", speed(absolute(40), "step"), after(1.95)),
+    )
+    assert played.at(2.1).speed == pytest.approx(before)
+    assert played.at(3.1).speed == pytest.approx(before + slope)
+    assert played.when("action 0", "completeState") == pytest.approx(reached)
+
+
+@pytest.mark.parametrize(
     ("start", "target", "expected"), [(10, 20, 4.0), (10, 10, 0.0), (20, 0, 6.0), (-10, 10, 2 * 30 / 10 + 2 * 30 / 10)]
 )
 def test_duration_over_a_distance_of_60_m(start: float, target: float, expected: float) -> None:

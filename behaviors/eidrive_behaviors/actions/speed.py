@@ -26,7 +26,8 @@ class SpeedAction(ActionBehaviour):
     """Transition of the speed to an absolute or relative target by the given dynamics.
 
     The shape is a function of time; for a distance it is the time in which that distance is covered. A relative
-    target is read in each step, one relative to the actor itself at the start. A continuous target is kept until a
+    target is read in each step, one relative to the actor itself at the start. Where that target jumps, the speed
+    follows within the limits of the vehicle, and within the rate if one is given. A continuous target is kept until a
     later action ends it. The vehicle's Performance limits the target, and the maximum slope of all shapes except
     the step. In the following mode `follow` it limits all accelerations and jerks. An active controller receives
     the speed as its goal. The goal is reached when the vehicle drives at that speed; a vehicle that was just
@@ -107,10 +108,9 @@ class SpeedAction(ActionBehaviour):
             self._retarget(self._target())
         if self.actor.driven:
             return self._set_driver_goal()
-        if transition.done and transition.extent > 0.0:
-            speed = self._approach(transition.target)
-        else:
-            speed = transition.advance(self.context.dt)
+        speed = transition.advance(self.context.dt)
+        if self._relative is not None and transition.extent > 0.0:
+            speed = self._approach(speed)
         if self._limiter is not None and self.context.dt > 0.0:
             speed = self._limiter.advance(speed, self.context.dt)
         self.actor.motion.set_speed(speed)
@@ -144,11 +144,15 @@ class SpeedAction(ActionBehaviour):
     def _current_speed(self) -> float:
         return self.context.speed(self.actor.name) if self.actor.driven else self.actor.motion.speed
 
-    def _approach(self, target: float) -> float:
-        """Return the next speed after the transition toward a moving relative target, at the vehicle's limits [m/s]."""
-        present = self.actor.motion.speed
-        most = slope_limit(present, target, *self.actor.limits()[1:]) * self.context.dt
-        return present + min(max(target - present, -most), most)
+    def _approach(self, wanted: float) -> float:
+        """Return the next speed toward a moving target, within the limits of the vehicle and a given rate [m/s]."""
+        present, most = self.actor.motion.speed, slope_limit(self.actor.motion.speed, wanted, *self.actor.limits()[1:])
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
+            most = min(most, abs(self._dynamics.value))
+        change = wanted - present
+        return (
+            present + math.copysign(most * self.context.dt, change) if abs(change) > most * self.context.dt else wanted
+        )
 
     def _target(self) -> float:
         top = self.actor.limits()[0]
