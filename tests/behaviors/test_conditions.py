@@ -6,9 +6,12 @@ Ego drives at 20 m/s from x = 100 in lane -1, Other at 10 m/s from x = 150 ahead
 from __future__ import annotations
 
 import pytest
+from opendrive_xml import map_xml, road_xml
 from recorded_scene import RecordedScene, RunScene, first_start
-from storyboard_xml import by_entity_xml, element_state_xml, speed_xml
-from street_scene import NOTHING, after
+from storyboard_xml import by_entity_xml, element_state_xml, speed_xml, teleport_xml
+from street_scene import LANES, NOTHING, after
+
+ORIENTATION = '<Orientation type="relative" h="0.1" p="0" r="0"/>'
 
 
 def starts(played: RecordedScene) -> list[float]:
@@ -212,6 +215,30 @@ def test_angle_conditions_in_world_lane_and_relative_hold(scene: RunScene) -> No
         assert (
             first_start(scene(0.5, ("Ego", NOTHING, condition), ("Ego", turn.format(0.9)), other=(1, 150, 0))) is None
         )
+
+
+@pytest.mark.element("RelativeAngleCondition")
+@pytest.mark.parametrize(
+    ("system", "angle"),
+    [("", -0.4), ('coordinateSystem="world"', -0.4), ('coordinateSystem="entity"', -0.4),
+     ('coordinateSystem="lane"', 0.1), ('coordinateSystem="road"', 0.1)],
+)  # fmt: skip
+def test_relative_angle_on_a_bend_is_measured_to_the_axes_of_the_system(
+    scene: RunScene, system: str, angle: float
+) -> None:
+    """50 m apart on an arc of 100 m radius the lanes have directions 0.5 rad apart; Ego points 0.1 rad to the left."""
+    bend = map_xml(road_xml(length=300.0, curvature=0.01, lanes=LANES))
+    turned = f'<LanePosition roadId="1" laneId="-1" s="50">{ORIENTATION}</LanePosition>'
+    for value, is_fulfilled in ((angle, True), (0.1 - 0.4 - angle, False)):
+        condition = by_entity_xml(
+            f'<RelativeAngleCondition entityRef="Other" angleType="heading" angle="{value}" angleTolerance="0.001" '
+            f"{system}/>"
+        )
+        played = scene(
+            0.5, ("Ego", teleport_xml(turned)), ("Ego", NOTHING, condition),
+            ego=(-1, 50, 0), other=(-1, 100, 0), street=bend,
+        )  # fmt: skip
+        assert (played.when("event 1", "runningState") is not None) == is_fulfilled
 
 
 @pytest.mark.element("AngleCondition")

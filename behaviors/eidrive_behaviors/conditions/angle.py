@@ -8,6 +8,9 @@ from abc import abstractmethod
 from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
 from eidrive_scenario.api.common import Pose, wrap_angle
 
+ROAD_SYSTEMS = (model.CoordinateSystem.LANE, model.CoordinateSystem.ROAD)
+"""Coordinate systems whose axes turn along the road."""
+
 
 def angle_in_world(context: ConditionContext, entity: str, kind: model.AngleType) -> float:
     """Return heading, pitch or roll of an entity in the world [rad]."""
@@ -88,7 +91,7 @@ class AngleCondition(AngleWithin):
 
 
 class RelativeAngleCondition(AngleWithin):
-    """Angle of the entity minus that of another one."""
+    """Angle of the entity minus that of another one, in the system of lane or road each to its axes at that entity."""
 
     element: model.RelativeAngleCondition
 
@@ -100,5 +103,10 @@ class RelativeAngleCondition(AngleWithin):
         """Return the difference of the angles [rad]."""
         if self.element.entity_ref not in context.view:
             return math.nan
-        kind = self.element.angle_type
-        return angle_in_world(context, entity, kind) - angle_in_world(context, self.element.entity_ref, kind)
+        kind, system = self.element.angle_type, self.element.coordinate_system
+        mine, theirs = (
+            angle_in_world(context, name, kind)
+            - (reference_angle(context, name, kind, system) if system in ROAD_SYSTEMS else 0.0)
+            for name in (entity, self.element.entity_ref)
+        )
+        return mine - theirs
