@@ -415,6 +415,31 @@ def test_synchronize_of_much_too_fast_actor_arrives_with_the_master(scene: RunSc
     assert played.at(20.0).speed == pytest.approx(100.0 / 20.0, abs=0.1), "the mean speed"
 
 
+@pytest.mark.element("SynchronizeAction")
+@pytest.mark.parametrize(
+    ("final", "speed_at_end"),
+    [
+        ("", 40.0),
+        ('<FinalSpeed><AbsoluteSpeed value="20"/></FinalSpeed>', 20.0),
+        ('<FinalSpeed><RelativeSpeedToMaster value="5" speedTargetValueType="delta"/></FinalSpeed>', 15.0),
+    ],
+)
+def test_synchronize_arrives_at_a_moving_target(run: Run, final: str, speed_at_end: float) -> None:
+    """The master needs 10 s. The target, 20 m behind a car of 20 m/s, is then at 150 + 20 · 10 = 350 m.
+
+    Ego covers 250 m from 10 m/s; at constant acceleration its speed at the end is 2 · 25 - 10 = 40 m/s. With a final
+    speed below that of the car it arrives from ahead.
+    """
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster><LanePosition roadId="1" laneId="-2" s="200"/></TargetPositionMaster>
+      <TargetPosition><RelativeLanePosition entityRef="Car" dLane="0" dsLane="-20"/></TargetPosition>{final}
+      </SynchronizeAction></PrivateAction>"""
+    others = {"Other": (-2, 100.0, 10.0), "Car": (-1, 170.0, 20.0)}
+    played = run(11.0, ("Ego", action), ego=(-1, 100.0, 10.0), driven=False, others=others)
+    assert played.x("Ego")[200] == pytest.approx(350.0, abs=0.3)
+    assert played.of("Ego", "speed")[200] == pytest.approx(speed_at_end, abs=0.7)
+
+
 @pytest.mark.parametrize("final", ["", '<FinalSpeed><AbsoluteSpeed value="80"/></FinalSpeed>'])
 def test_synchronize_does_not_exceed_the_maximum_speed_of_the_vehicle(scene: RunScene, final: str) -> None:
     """Other needs (250 - 150) / 10 = 10 s; in that time Ego covers less than 10 s * 70 m/s, its maximum, of 800 m."""

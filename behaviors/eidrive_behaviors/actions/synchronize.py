@@ -18,13 +18,15 @@ from eidrive_scenario.api.actions import (
     TrajectoryProgress,
     facing,
     model,
+    referenced_entities,
     resolve_position,
     trajectory_of,
 )
 from eidrive_scenario.api.common import EPSILON
 
 JUST_PASSED = 10.0
-"""Distance behind the actor up to which it has passed its target [m]; it drives around to a target farther behind."""
+"""Distance behind the actor, besides that of one step, up to which it has passed its target [m]; it drives around to a
+target farther behind."""
 ON_LINE = 0.1
 """Maximum speed difference to the linear last phase at which the first phase ends [m/s]."""
 HARD = 8.0
@@ -52,6 +54,8 @@ class SynchronizeAction(ActionBehaviour):
 
     Without a final speed the acceleration is constant. An actor that is too fast for it, and would have to reverse,
     uses the mean speed of that instant as its final speed. A steady state at the end shortens distance and time.
+    A target relative to entities moves: it is expected at the arrival of the master where the speed of its last step
+    brings it. The action ends with that arrival, also if the actor has overtaken its target.
     Distances are measured along the trajectory that an entity follows, else along the roads. An entity with a negative
     speed arrives backwards. A final speed opposite to the direction of motion cannot be reached on the way to the
     target: the actor arrives at standstill and changes to the final speed at once, which is a warning. The maximum
@@ -66,7 +70,8 @@ class SynchronizeAction(ActionBehaviour):
         check_other_entity(self, self.action.master_entity_ref)
         self._phase = SynchronizationPhase.SWING
         self._rising: bool | None = None
-        self._last = (math.inf, math.inf)
+        self._last = (math.nan, math.nan)
+        """Last distances of both to their targets [m]."""
         self._measured: tuple[TrajectoryCurve | None, ...] = ()
         """Trajectories along which the distances of both were measured last."""
         self._targets: dict[str, tuple[TrajectoryCurve, bool]] = {}
@@ -97,17 +102,27 @@ class SynchronizeAction(ActionBehaviour):
             self.context.actors[name].trajectory for name in (self.actor.name, self.action.master_entity_ref)
         )
         changed, self._measured = measured != self._measured, measured
-        passed = not changed and (way > self._last[0] or master_way > self._last[1])
-        self._last = (way, master_way)
+        before, self._last = None if changed else self._last, (way, master_way)
+        moves, master_moves = (
+            bool(referenced_entities(target))
+            for target in (self.action.target_position, self.action.target_position_master)
+        )
+        if (moves or master_moves) and (before is None or dt == 0.0):
+            return Status.RUNNING  # Their speeds are known from the second step on.
+        ahead = sense * motion.speed + (way - before[0]) / dt if moves and before is not None else 0.0
         speed = abs(master_speed)
+        if master_moves and before is not None:
+            speed = (before[1] - master_way) / dt
         time = max(master_way - theirs, EPSILON) / speed if speed > EPSILON else math.inf
-        if way < mine + EPSILON or master_way < theirs + EPSILON or passed or time < dt + EPSILON:
+        if (way < mine + EPSILON and not moves) or master_way < theirs + EPSILON or time < dt + EPSILON:
             if changed:
                 return Status.RUNNING  # An action that starts in the same step may assign a trajectory.
             if final is not None:
                 self._check_direction(final, sense)
                 motion.set_speed(final)
             return Status.SUCCESS
+        if math.isfinite(time):
+            way += ahead * time
         way, present = max(way - mine, EPSILON), sense * motion.speed
         if final is None and self._mean is None and math.isfinite(time) and present > 2.0 * way / time:
             self._mean = way / time
@@ -188,7 +203,8 @@ class SynchronizeAction(ActionBehaviour):
             return self._along(actor.progress, name, position, sense)
         target: ResolvedPosition = resolve_position(position, self.context, name)
         here = self.context.pose(name)
-        straight = math.hypot(target.pose.x - here.x, target.pose.y - here.y)
+        dx, dy = target.pose.x - here.x, target.pose.y - here.y
+        straight = math.copysign(math.hypot(dx, dy), sense * (dx * math.cos(here.h) + dy * math.sin(here.h)))
         roads = self.context.roads
         start = self.context.location(name)
         if roads is None or start is None or target.location is None:
@@ -199,10 +215,13 @@ class SynchronizeAction(ActionBehaviour):
         if on_route is not None:
             return on_route[0] * sense
         shortest = roads.distance(start, target.location)
-        if shortest is None or shortest[0] * sense >= 0.0:
-            return straight if shortest is None else abs(shortest[0])
-        behind, ahead = abs(shortest[0]), roads.distance(start, target.location, sense=1 if sense > 0.0 else -1)
-        return behind if behind < JUST_PASSED or ahead is None else abs(ahead[0])
+        if shortest is None:
+            return straight
+        way = shortest[0] * sense
+        if way > -JUST_PASSED - abs(self.context.speed(name)) * self.context.dt:
+            return way
+        ahead = roads.distance(start, target.location, sense=1 if sense > 0.0 else -1)
+        return way if ahead is None else abs(ahead[0])
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
         """Return the distance along the trajectory of the entity, in its direction of motion [m]."""
