@@ -9,6 +9,8 @@ import pytest
 from recorded_scene import RunScene, first_start
 from storyboard_xml import by_entity_xml
 from street_scene import NOTHING
+from traffic_scene import definition, source, traffic
+from whole_run import Run
 
 
 @pytest.mark.element("RelativeClearanceCondition")
@@ -72,3 +74,23 @@ def test_clearance_without_the_lane_is_false(scene: RunScene) -> None:
         'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
     )
     assert first_start(scene(0.2, ("Ego", NOTHING, condition), ego=(-2, 100, 20))) is None
+
+
+@pytest.mark.parametrize("free_space", ["true", "false"])
+def test_clearance_counts_background_traffic(run: Run, free_space: str) -> None:
+    """Ego stands at 400 m. The range is 20 m behind in both lanes; boxes of traffic extend ahead of their positions."""
+    condition = by_entity_xml(
+        f'<RelativeClearanceCondition distanceForward="0" distanceBackward="20" freeSpace="{free_space}" '
+        f'oppositeLanes="false"><RelativeLaneRange from="-1" to="0"/></RelativeClearanceCondition>'
+    )
+    cars = traffic(source(0.2, 300, more=definition()))
+    played = run(
+        8.0, ("Ego", NOTHING, condition), ego=(-1, 400.0, 0.0), driven=False, globally=cars, edge="falling", seed=1
+    )
+    fronts = [
+        (box[0] + 0.5 * box[3] if free_space == "true" else point[0], frame.view.time)
+        for frame in played.frames
+        for name, box, point in zip(frame.view.names, frame.view.boxes, frame.view.position, strict=True)
+        if name.startswith("crowd.")
+    ]
+    assert played.begun("event 0") == [pytest.approx(min(time for front, time in fronts if front >= 380.0))]

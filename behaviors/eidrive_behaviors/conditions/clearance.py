@@ -14,7 +14,7 @@ class RelativeClearanceCondition(EntityCondition):
     The range must exist: without such a lane beside the entity there is no clearance. Lanes of oncoming traffic, with
     respect to the entity's heading, count only with `oppositeLanes`; its own lane always counts. The range is measured
     along the road from the reference point of the entity. With `freeSpace` every part of another box counts, else only
-    its reference point.
+    its reference point. Background traffic counts unless entities are named.
     """
 
     element: model.RelativeClearanceCondition
@@ -58,13 +58,16 @@ class RelativeClearanceCondition(EntityCondition):
 
     def _locations(self, context: ConditionContext, name: str) -> list[LaneLocation]:
         """Return locations of an entity: its reference point, and with `freeSpace` the corners of its box."""
-        other = context.location(name)
+        assert context.roads is not None
+        view, is_traffic = context.view, name in context.traffic_names
+        x, y, z = view.position[view.row(name)].tolist()
+        other = context.roads.locate_at(x, y, z=z) if is_traffic else context.location(name)
         if other is None:
             return []
         if not self.element.free_space:
             return [other]
-        assert context.roads is not None
-        outline = footprint(np.array(entity_box(context, name))).tolist()
+        box = view.boxes[view.row(name)] if is_traffic else np.array(entity_box(context, name))
+        outline = footprint(box).tolist()
         corners = (context.roads.locate_at(x, y, other) for x, y in outline)
         return [other, *(corner for corner in corners if corner is not None)]
 
