@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened, suggestion
@@ -28,14 +28,17 @@ MAPS = "EIDRIVE_MAPS"
 def find_road_file(network: model.RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
     """Return the road file of a scenario; None if it has none.
 
-    The file is searched relative to the scenario, then by its name in the folders of EIDRIVE_MAPS. A name without a
-    suffix, such as Town01, is completed to Town01.xodr.
+    The file is searched relative to the scenario, then by its name beside the scenario, which is a warning, and in the
+    folders of EIDRIVE_MAPS. A name without a suffix, such as Town01, is completed to Town01.xodr.
     """
     logic = network.logic_file if network else None
     if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
         return None
     for candidate in _candidates(logic, folder):
         if is_regular_file(candidate):
+            if candidate.parent == folder and _named(logic) not in (Path(candidate.name), Path(candidate.stem)):
+                missing = f"road file '{shortened(logic.filepath, 300)}' does not exist"
+                collector.warning(f"{missing}; that beside the scenario is used", f"write {candidate.name!r}", at=logic)
             return candidate
     collector.error(
         f"road file '{shortened(logic.filepath, 300)}' is neither {_location(folder)} nor in the folders of {MAPS}",
@@ -51,11 +54,15 @@ def _location(folder: Path) -> str:
 
 
 def _candidates(logic: model.File, folder: Path) -> Iterator[Path]:
-    named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
+    named = _named(logic)
     for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
         yield resolve_path(str(name), folder)
-        for maps in _map_folders():
-            yield maps / name.name
+        for directory in (folder, *_map_folders()):
+            yield directory / name.name
+
+
+def _named(logic: model.File) -> Path:
+    return Path(logic.filepath.strip().replace("\\", "/"))
 
 
 def _map_folders() -> list[Path]:
@@ -63,7 +70,7 @@ def _map_folders() -> list[Path]:
 
 
 def _hint(logic: model.File, folder: Path) -> str:
-    named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
+    named = _named(logic)
     places = [(folder / named).parent, *_map_folders()]
     maps = {
         file.stem for directory in places if os.path.isdir(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")

@@ -142,6 +142,26 @@ class TestRoadFile:
         monkeypatch.setenv("EIDRIVE_MAPS", f"/nonexistent:{tmp_path}")
         assert load_scenario(scenario_xml(road=self.LOGIC.format(name))).road_file == tmp_path / "Town01.xodr"
 
+    @pytest.mark.parametrize(
+        ("name", "warns"),
+        [
+            ("town.xodr", False),
+            ("./town", False),
+            ("C:\\maps\\town.xodr", True),
+            ("../elsewhere/town", True),
+            ("/home/town.xodr", True),
+        ],
+    )
+    def test_road_file_of_another_folder_is_found_beside_the_scenario(
+        self, tmp_path: Path, name: str, warns: bool
+    ) -> None:
+        (tmp_path / "town.xodr").touch()
+        path = tmp_path / "scene.xosc"
+        path.write_bytes(scenario_xml(road=self.LOGIC.format(name)))
+        scenario = load_scenario(path)
+        assert scenario.road_file == tmp_path / "town.xodr"
+        assert any("that beside the scenario is used" in text.message for text in scenario.warnings) is warns
+
     def test_missing_road_file_error_suggests_similar_name(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
