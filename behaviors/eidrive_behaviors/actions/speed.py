@@ -66,6 +66,12 @@ class SpeedAction(ActionBehaviour):
         step = dynamics.dynamics_shape is model.DynamicsShape.STEP or instantaneous
         return step and not self._continuous and not is_follow_mode(self._dynamics)
 
+    @property
+    def speed_reference(self) -> str | None:
+        """Entity of a relative target, unless it is the actor itself."""
+        name = None if self._relative is None else self._relative.entity_ref
+        return None if name == self.actor_name else name
+
     def initialise(self) -> None:
         """Start the transition from the current speed."""
         self._start = start = self._current_speed()

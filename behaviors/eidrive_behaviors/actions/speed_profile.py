@@ -60,6 +60,12 @@ class SpeedProfileAction(ActionBehaviour):
         super().__init__(action, context, actor=actor, parent=parent)
         self._delay_warning = DelayWarning(self)
 
+    @property
+    def speed_reference(self) -> str | None:
+        """Entity to whose speed the entries are relative."""
+        element = self.action.entity_ref_element
+        return element.entity_ref if self.action.entity_ref is None and element is not None else self.action.entity_ref
+
     def initialise(self) -> None:
         """Build the profile from the current speed."""
         start = self.actor.motion.speed
@@ -110,9 +116,7 @@ class SpeedProfileAction(ActionBehaviour):
 
     def _corners(self, start: float) -> list[tuple[float, float]]:
         """Return times [s] and speeds [m/s] of the corners of the profile, the current one first."""
-        name = self.action.entity_ref
-        if name is None and self.action.entity_ref_element is not None:
-            name = self.action.entity_ref_element.entity_ref
+        name = self.speed_reference
         if name is not None:
             check_presence(self, name)
         base = self.context.speed(name) if name is not None else 0.0

@@ -73,6 +73,16 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         return False
 
     @property
+    def moves_over_time(self) -> bool:
+        """Whether it moves the actor beyond its start. In Init it starts from the state that the other actions set."""
+        return bool(self.controls & MOTION) and not self.at_once
+
+    @property
+    def speed_reference(self) -> str | None:
+        """Other entity whose speed it reads at its start; None without one."""
+        return None
+
+    @property
     def is_actor_missing(self) -> bool:
         """Whether it moves an actor that is absent."""
         return bool(self.controls & MOTION) and self.actor_name is not None and not self.actor.present

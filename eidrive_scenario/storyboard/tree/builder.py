@@ -17,6 +17,7 @@ from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition
 from eidrive_scenario.storyboard.context.protocols import DomainHolder, EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.tree.elements import (
     ActElement,
     ManeuverElement,
@@ -42,17 +43,26 @@ class InitBlock(Composite):
     def start(self) -> None:
         """Execute the actions before the first view, in the order of the file.
 
-        An action that refers to an entity that a later action places is executed after it. Raise ScenarioError for
-        cyclic references.
+        An action that refers to an entity that a later action places is executed after it, and one that reads the speed
+        of an entity after the actions that set it. Raise ScenarioError for cyclic references of positions.
         """
-        pending = list(self.running)
+        pending, reads_speeds = list(self.running), False
         while pending:
-            blocked = [behaviour for behaviour in pending if not self._start_behaviour(behaviour)]
-            if len(blocked) == len(pending):
+            blocked: list[ActionBehaviour] = []
+            for number, behaviour in enumerate(pending, 1):
+                reference = None if reads_speeds else behaviour.speed_reference
+                later = [*blocked, *pending[number:]] if reference is not None else ()
+                awaits_speed = any(
+                    other.actor_name == reference and other.controls & Domain.LONGITUDINAL for other in later
+                )
+                if awaits_speed or not self._start_behaviour(behaviour):
+                    blocked.append(behaviour)
+            if len(blocked) == len(pending) and reads_speeds:
                 raise blocked[0].error(
                     "the position refers to an entity without a position", "place that entity in Init"
                 )
-            pending = blocked
+            # Speeds that refer to each other in a cycle are read in the order of the file.
+            pending, reads_speeds = blocked, len(blocked) == len(pending)
         for behaviour in self.running:
             behaviour.finish_init()
 
@@ -166,10 +176,13 @@ class Builder:
         behaviours: list[ActionBehaviour] = []
         for wrapper in (*actions.global_action, *actions.user_defined_action):
             behaviours += self._behaviours(wrapper, None)
+        by_actor: dict[str, list[ActionBehaviour]] = {}
         for private in actions.private:
             for actor in self._entities(private.entity_ref):
                 for action in private.private_action:
-                    behaviours += self._behaviours(action, actor)
+                    by_actor.setdefault(actor, []).extend(self._behaviours(action, actor))
+        for own in by_actor.values():
+            behaviours += sorted(own, key=lambda behaviour: behaviour.moves_over_time)
         return behaviours
 
     def _story(self, story: model.Story) -> StoryNode:

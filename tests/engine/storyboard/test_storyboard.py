@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import entry_points
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,12 @@ STARTS = teleport_xml(world_position_xml(5)) + speed_xml(10)
 def later(value: float, edge: str = "none") -> str:
     """Return a start trigger by the simulation time."""
     return trigger_xml(condition_xml(time_xml(value), edge))
+
+
+def relative_speed(entity: str) -> str:
+    """Return an action that sets the speed 2 m/s above that of an entity."""
+    target = f'<RelativeTargetSpeed entityRef="{entity}" value="2" speedTargetValueType="delta" continuous="false"/>'
+    return speed_xml(0).replace('<AbsoluteTargetSpeed value="0"/>', target)
 
 
 def view_of(placements: Any, tick: Any, like: Any) -> Any:
@@ -81,6 +88,25 @@ def test_relative_positions_in_init_are_independent_of_order(build: Any) -> None
     beside = teleport_xml('<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
     storyboard = build(beside + '</Private><Private entityRef="B">' + teleport_xml(world_position_xml(30)))
     assert storyboard.initial().spawns["A"].x == 32.0
+
+
+@pytest.mark.parametrize("separator", ["", '</Private><Private entityRef="A">'])
+def test_speed_change_in_init_starts_from_the_speed_step_in_any_order(build: Any, separator: str) -> None:
+    """From 10 to 20 m/s in 1 s: 15 m/s after 0.5 s, 5 + 0.1 · (11 + 12 + 13 + 14 + 15) = 11.5 m."""
+    for actions in permutations([teleport_xml(world_position_xml(5)), speed_xml(10), speed_xml(20, 1)]):
+        storyboard = build(separator.join(actions))
+        assert storyboard.initial().spawns["A"].speed == 10.0
+        last = play(build(separator.join(actions)), 5)[-1].placements["A"]
+        assert (last.x, last.speed) == pytest.approx((11.5, 15.0))
+
+
+def test_relative_speeds_in_init_are_independent_of_order(build: Any) -> None:
+    """A drives 2 m/s faster than B; of two speeds that refer to each other, the first reads a speed of 0."""
+    start, then_b = teleport_xml(world_position_xml(5)), '</Private><Private entityRef="B">'
+    spawns = build(start + relative_speed("B") + then_b + start + speed_xml(10)).initial().spawns
+    assert (spawns["A"].speed, spawns["B"].speed) == (12.0, 10.0)
+    spawns = build(start + relative_speed("B") + then_b + start + relative_speed("A")).initial().spawns
+    assert (spawns["A"].speed, spawns["B"].speed) == (2.0, 4.0)
 
 
 def test_position_relative_to_unplaced_entity_in_init_is_rejected(build: Any) -> None:
