@@ -12,6 +12,7 @@ from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_criterion
 from eidrive_scenario.openscenario.model import Element, Rule
+from eidrive_scenario.storyboard.context.condition import satisfies_rule
 
 Intervals = tuple[tuple[float, float], ...]
 
@@ -171,10 +172,20 @@ def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> TruthI
     if other is not None and _absent(other, outline):
         return never(f"{other!r} is never placed in the world")
     if other is not None and names and all(name == other for name in names) and isinstance(leaf, _PAIRS):
-        return never(f"{other!r} is compared with itself")
+        reason = f"{other!r} is compared with itself"
+        return TruthIntervals(steady=reason) if _holds_for_zero(leaf) else never(reason)
     if isinstance(leaf, model.TraveledDistanceCondition) and leaf.value <= 0.0 and set(names) <= outline.at_start:
         return TruthIntervals(steady="a traveled distance of 0 is always reached")
     return _of_quantity(leaf)
+
+
+def _holds_for_zero(leaf: Element) -> bool:
+    """Whether a condition holds for two entities without a distance, speed difference and angle between them."""
+    if isinstance(leaf, model.RelativeAngleCondition):
+        return abs(leaf.angle) <= leaf.angle_tolerance
+    if isinstance(leaf, model.RelativeDistanceCondition | model.RelativeSpeedCondition | model.TimeHeadwayCondition):
+        return satisfies_rule(0.0, leaf.rule, leaf.value)
+    return False
 
 
 def _absent(name: str, outline: Outline) -> bool:

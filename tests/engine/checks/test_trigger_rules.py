@@ -240,7 +240,17 @@ def test_edge_of_constant_parameter_is_unobserved(check: Check) -> None:
         (
             '<RelativeDistanceCondition entityRef="Ego" relativeDistanceType="lateral" freespace="false" '
             'rule="lessThan" value="5"/>',
+            ["unobserved-edge"],
+        ),
+        ('<RelativeSpeedCondition entityRef="Ego" rule="greaterThan" value="0"/>', ["impossible-condition"]),
+        ('<CollisionCondition><EntityRef entityRef="Ego"/></CollisionCondition>', ["impossible-condition"]),
+        (
+            '<RelativeAngleCondition entityRef="Ego" angleType="heading" angle="0.2" angleTolerance="0.1"/>',
             ["impossible-condition"],
+        ),
+        (
+            '<RelativeAngleCondition entityRef="Ego" angleType="heading" angle="0.1" angleTolerance="0.2"/>',
+            ["unobserved-edge"],
         ),
         ('<AccelerationCondition rule="lessThan" value="-3"/>', ["impossible-condition"]),
         ('<AccelerationCondition rule="lessThan" value="-3" direction="longitudinal"/>', []),
