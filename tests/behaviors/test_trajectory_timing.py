@@ -10,7 +10,7 @@ import math
 import pytest
 from recorded_scene import RunScene
 from street_scene import after
-from trajectories import CORNER, RELATIVE, follow_points
+from trajectories import CORNER, RELATIVE, curve, follow, follow_points, world
 from whole_run import Run
 
 from eidrive_scenario.recording.frame import Frame
@@ -23,6 +23,21 @@ def test_trajectory_without_timing_keeps_the_own_speed(scene: RunScene) -> None:
     assert (played.at(0.4).x, played.at(0.4).y) == pytest.approx((108.0, -2.0))
     assert (played.at(1.0).x, played.at(1.0).y, played.at(1.0).yaw) == pytest.approx((110.0, 8.0, math.pi / 2))
     assert played.when("action 0", "completeState") == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("timing", [RELATIVE, "<None/>"])
+def test_closed_trajectory_is_driven_in_laps_only_without_timing(run: Run, timing: str) -> None:
+    """10 m of a square in each second: 4 s for a lap; with times the action ends at 3 s at the last vertex."""
+    square = [(300.0, -2.0), (310.0, -2.0), (310.0, 8.0), (300.0, 8.0)]
+    closed = follow(curve(*(world(x, y) for x, y in square), closed=True, times=(0, 1, 2, 3)), reference=timing)
+    played = run(6.0, ("Ego", closed), ego=(-1, 300.0, 10.0), driven=False)
+    places = [tuple(played.frames[20 * second].view.position[0, :2]) for second in range(6)]
+    assert places[:4] == [pytest.approx(place) for place in square]
+    if timing == "<None/>":
+        assert places[4:] == [pytest.approx(place, abs=1e-6) for place in square[:2]]
+    else:
+        assert any("closed has no effect" in text for text in played.result.warnings)
+        assert played.frames[60].changes[0].element == "action 0"
 
 
 @pytest.mark.element("FollowTrajectoryAction", "Timing")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from functools import partial
 
@@ -134,6 +135,10 @@ class FollowTrajectoryAction(ActionBehaviour):
             what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or <None/> as the TimeReference"
             context.warn(*self.error(what, hint).diagnostics)
+        if self._timing is not None and self._trajectory.closed:
+            self._trajectory = dataclasses.replace(self._trajectory, closed=False)
+            what = "closed has no effect on a trajectory with times, which ends at its last point"
+            context.warn(*self.error(what, "write closed='false', or <None/> as the TimeReference").diagnostics)
         if self._timing is None and any(isinstance(part, model.Motion) for part in shape.walk()):
             what = "the actor keeps its own speed: Motion has no effect on a trajectory without times"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]} with Timing, or the speed by another action"
