@@ -138,6 +138,19 @@ def test_conditions_on_absent_entity_are_false(scene: RunScene) -> None:
     assert played.when("event 2", "runningState") is None
 
 
+@pytest.mark.element("RelativeSpeedCondition")
+@pytest.mark.parametrize(("direction", "speed"), [("longitudinal", 20.0), ("lateral", 10.0)])
+def test_relative_speed_in_a_direction_refers_to_the_triggering_entity(
+    scene: RunScene, direction: str, speed: float
+) -> None:
+    """From 0.1 s Ego drives towards +y at 20 m/s, Other towards +x at 10 m/s: 10 m/s to the left of Ego."""
+    across = teleport_xml('<WorldPosition x="100" y="-2" h="1.5707963267948966"/>')
+    condition = by_entity_xml(
+        f'<RelativeSpeedCondition entityRef="Other" rule="equalTo" value="{speed}" direction="{direction}"/>'
+    )
+    assert first_start(scene(0.3, ("Ego", NOTHING, condition), ("Ego", across))) == pytest.approx(0.1)
+
+
 @pytest.mark.element("TimeToCollisionCondition")
 @pytest.mark.parametrize(
     ("frame", "kind"),

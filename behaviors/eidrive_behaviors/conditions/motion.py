@@ -64,7 +64,7 @@ class SpeedCondition(MotionCondition):
 
 
 class RelativeSpeedCondition(MotionCondition):
-    """Own speed minus another entity's [m/s]; with a direction along that axis of the other entity."""
+    """Own speed minus another entity's [m/s]; with a direction along that own axis (1.3.1, RelativeSpeedCondition)."""
 
     element: model.RelativeSpeedCondition
     unit = "m/s"
@@ -83,7 +83,7 @@ class RelativeSpeedCondition(MotionCondition):
             return context.speed(entity) - context.speed(other)
         mine, theirs = velocity_of(context.view, entity), velocity_of(context.view, other)
         difference = [a - b for a, b in zip(mine, theirs, strict=True)]
-        return component_of(difference, context.pose(other).h, self.element.direction)
+        return component_of(difference, context.pose(entity).h, self.element.direction)
 
 
 class AccelerationCondition(MotionCondition):
