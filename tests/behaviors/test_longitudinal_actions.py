@@ -244,9 +244,11 @@ def test_speed_profile_is_limited_to_the_maximum_speed(scene: RunScene) -> None:
         # 10 m/s more at 1 m/s²
         ("position", (2.0, 30.0), 'maxAcceleration="1"', None, {5.0: 25.0, 9.0: 29.0}, 10.0),
         ("follow", (2.0, 30.0), 'maxAcceleration="1"', None, {5.0: 25.0, 9.0: 29.0}, 10.0),
-        # the Performance allows 10 m/s² only
-        ("position", (0.5, 30.0), 'maxAcceleration="40"', None, {0.5: 25.0}, 1.0),
-        ("position", (None, 30.0), 'maxAcceleration="40"', None, {0.5: 25.0}, 1.0),
+        # the limits of the action have precedence over the 10 m/s² of the Performance, which apply without them
+        ("position", (0.5, 30.0), 'maxAcceleration="40"', None, {0.5: 30.0}, 0.5),
+        ("position", (None, 30.0), 'maxAcceleration="40"', None, {0.2: 28.0, 0.5: 30.0}, 0.25),
+        ("position", (0.5, 30.0), "", None, {0.5: 25.0}, 1.0),
+        ("position", (None, 30.0), "", None, {0.5: 25.0}, 1.0),
         # 1 m/s² after 0.5 s and 0.25 m/s; it falls within 1 s and 0.5 m/s
         ("follow", (2.0, 30.0), 'maxAcceleration="1"', (2, 1), {0.5: 20.25, 5.0: 24.75, 9.7: 29.45}, 10.75),
         # -2 m/s² after 0.5 s, by 0.5 m/s

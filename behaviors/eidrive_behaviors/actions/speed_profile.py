@@ -38,12 +38,12 @@ class SpeedSegment:
 class SpeedProfileAction(ActionBehaviour):
     """Sequence of entry speeds, each reached after its `time` or as fast as the limits allow.
 
-    The limits are those of the action and of the vehicle's Performance, whichever is tighter. An entry that they do not
-    allow in its time is reached later. In the following mode `position` the speed is linear between entries. In
-    `follow` the acceleration is zero at both ends and its change respects the rate limits: corners of the profile
-    become parabolas. Where corners are too close for that, the speed follows the linear profile as fast as the limits
-    allow. A first entry at time 0 is a step in `position`, and the current speed in `follow`. With an entity, speeds
-    are relative to its speed at the start.
+    The limits are those of the action, which have precedence over those of the vehicle's Performance (1.3.1,
+    SpeedProfileAction). An entry that they do not allow in its time is reached later. In the following mode `position`
+    the speed is linear between entries. In `follow` the acceleration is zero at both ends and its change respects the
+    rate limits: corners of the profile become parabolas. Where corners are too close for that, the speed follows the
+    linear profile as fast as the limits allow. A first entry at time 0 is a step in `position`, and the current speed
+    in `follow`. With an entity, speeds are relative to its speed at the start.
     """
 
     domains = Domain.LONGITUDINAL
@@ -143,14 +143,14 @@ class SpeedProfileAction(ActionBehaviour):
         return corners
 
     def _limit(self, name: str) -> float:
-        """Return the tighter limit of the action and of the vehicle's Performance; infinite without one.
+        """Return the limit of the action, else that of the vehicle's Performance; infinite without one.
 
         A limit of 0 is replaced by a tiny one, with which the speed remains as it is.
         """
         entity = self.actor.entity
         performance = entity.performance if isinstance(entity, model.Vehicle) else None
         limits = (getattr(limits, name, None) for limits in (self.action.dynamic_constraints, performance))
-        return max(min((float(limit) for limit in limits if limit is not None), default=math.inf), EPSILON)
+        return max(next((float(limit) for limit in limits if limit is not None), math.inf), EPSILON)
 
     def describe(self) -> str:
         """Describe the speeds."""
