@@ -218,6 +218,16 @@ def declare(
         message = f"a constraint of parameter {name!r} is not {scalar.name}"
         collector.error(message, str(error), at=declaration)
         return
+    if scalar is STRING and any(
+        constraint.rule not in (Rule.EQUAL_TO, Rule.NOT_EQUAL_TO)
+        for group in groups
+        for constraint in group.value_constraint
+    ):
+        collector.warning(
+            f"constraints of the text parameter {name!r} compare sizes",
+            "use equalTo and notEqualTo, or declare a number",
+            at=declaration,
+        )
     if not is_allowed:
         allowed = " or ".join(
             " and ".join(f"{constraint.rule.value} {constraint.value}" for constraint in group.value_constraint)
