@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 class Orientation(Element):
-    """Heading, pitch and roll [rad], absolute or relative to the reference of the position."""
+    """Heading, pitch and roll [rad], absolute or relative to the reference of the position.
+
+    A missing type is relative in files since version 1.3, and absolute before.
+    """
 
     h: float | None = None
     p: float | None = None

@@ -137,6 +137,9 @@ class Reader:
         for name in ("catalog_reference", "catalog_references"):
             if name in values:
                 self._note_references(content, values[name])
+        if cls is model.Orientation and self.version >= (1, 3):
+            # A missing type is relative since 1.3 and was absolute before (Orientation.type).
+            values.setdefault("type", model.ReferenceContext.RELATIVE)
         return incomplete_element(cls, values)
 
     def _attributes(self, node: etree._Element, content: Rules, scope: Scope, values: dict[str, Any]) -> None:

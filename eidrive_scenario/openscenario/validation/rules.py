@@ -201,7 +201,7 @@ def check_values(elements: Sequence[model.Element], version: Version, collector:
         if message and (element.source, element.line) not in reported:
             collector.error(message, at=element)
         if isinstance(element, model.Orientation) and element == _EMPTY_ORIENTATION:
-            message = "Orientation is empty, which by the standard is heading 0 of the world frame"
+            message = "Orientation is empty, which before version 1.3 is heading 0 of the world frame"
             hint = 'omit it, or write type="relative", for the heading of the road'
             collector.warning(message, hint, at=element)
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 import pytest
 from lxml import etree
 from openscenario_xml import catalog_xml, scenario_xml
-from storyboard_xml import story_xml
+from storyboard_xml import init_xml, story_xml, teleport_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import Scenario, load_scenario
@@ -19,6 +19,7 @@ from eidrive_scenario.openscenario.model import (
     ManeuverGroup,
     MiscObject,
     MiscObjectCategory,
+    Orientation,
     Phase,
     Sun,
 )
@@ -136,13 +137,23 @@ def test_python_infinity_is_a_warning() -> None:
 
 
 def test_empty_orientation_is_a_warning() -> None:
-    """By the standard the type is absolute and the heading 0; scenariogeneration writes it by default."""
+    """Until 1.2 the type is absolute and the heading 0; scenariogeneration writes it by default."""
     relative = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation {}/></RelativeObjectPosition>'
     action = '<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>{}</Position></TeleportAction>{}'
     end = "</PrivateAction></Private>"
-    (warning,) = load_scenario(scenario_xml(init=action.format(relative.format(""), end))).warnings
+    (warning,) = load_scenario(scenario_xml(minor=2, init=action.format(relative.format(""), end))).warnings
     assert "heading 0 of the world frame" in str(warning)
+    assert load_scenario(scenario_xml(minor=3, init=action.format(relative.format(""), end))).warnings == ()
     assert load_scenario(scenario_xml(init=action.format(relative.format('type="relative"'), end))).warnings == ()
+
+
+@pytest.mark.parametrize(("minor", "expected"), [(0, None), (2, None), (3, "relative"), (4, "relative")])
+def test_missing_orientation_type_is_relative_since_version_1_3(minor: int, expected: str | None) -> None:
+    """Without a type the orientation was absolute before."""
+    place = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation h="0.2"/></RelativeObjectPosition>'
+    init = init_xml("Ego", teleport_xml(place))
+    oriented = only(load_scenario(scenario_xml(minor=minor, init=init, story=story_xml())), Orientation)
+    assert (oriented.h, oriented.type and oriented.type.value) == (0.2, expected)
 
 
 def test_none_in_optional_attribute_is_a_warning() -> None:
