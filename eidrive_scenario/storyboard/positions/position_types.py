@@ -133,13 +133,17 @@ LEVEL_SEPARATION = 0.5
 def geo_position(frame: model.GeoPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a GeoPosition by the projection of the road network.
 
-    Relative and missing angles refer to the lane at the position.
+    Relative and missing angles refer to the lane at the position. `altitude` is above the surface of the selected road,
+    `height` of older versions above the zero of the projection.
     """
     roads = roads_of(frame, context)
     x, y = plane_coordinates(frame, roads, context)
-    height = frame.altitude if frame.altitude is not None else frame.height
-    z = height_of_level(frame, roads, x, y) if height is None else height - roads.header.offset[2]
-    here = roads.locate_at(x, y, z=z)
+    if frame.altitude is None and frame.height is not None:
+        level: float | None = frame.height - roads.header.offset[2]
+    else:
+        level = height_of_level(frame, roads, x, y)
+    z = level if frame.altitude is None else (level or 0.0) + frame.altitude
+    here = roads.locate_at(x, y, z=level)
     base = roads.pose(here) if here is not None else Pose(x, y, 0.0, 0.0, 0.0, 0.0)
     return ResolvedPosition(oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
 
@@ -156,9 +160,9 @@ def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, context: Con
 
 
 def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: float) -> float | None:
-    """Return z of the road selected by verticalRoadSelection, counted from 0, the lowest [m]; None without a road.
+    """Return z of the road selected by verticalRoadSelection [m]; None without a road.
 
-    Raise ScenarioError if the level does not exist.
+    0 is the top-most road, -1 the next one below (1.3.1, GeoPosition). Raise ScenarioError if the level does not exist.
     """
     low, high = (_surface(roads, x, y, end) for end in (-HEIGHT_LIMIT, HEIGHT_LIMIT))
     if low is None or high is None:
@@ -168,12 +172,12 @@ def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: f
         height = _surface(roads, x, y, low + step * LEVEL_SEPARATION)
         if height is not None and height > levels[-1] + LEVEL_SEPARATION:
             levels.append(height)
-    level = frame.vertical_road_selection or 0
-    if not 0 <= level < len(levels):
+    below = -(frame.vertical_road_selection or 0)
+    if not 0 <= below < len(levels):
         message = "GeoPosition: the selected road level does not exist"
-        hint = f"got {level}; expected 0 to {len(levels) - 1}, counted from the lowest"
+        hint = f"got {-below}; expected {1 - len(levels)} to 0, the top-most"
         raise ScenarioError(Diagnostic.at(frame, message, hint))
-    return levels[level]
+    return levels[-1 - below]
 
 
 def _surface(roads: RoadNetwork, x: float, y: float, z: float) -> float | None:

@@ -45,7 +45,7 @@ def test_geographic_distance_equals_distance_on_the_road(globe: RuntimeContext) 
     """On the central meridian x is the false easting, and the scale factor is 0.9996."""
     first, location = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     assert first.x == pytest.approx(4.0, abs=1e-6)
-    assert (location.road, location.lane) == ("1", -1)
+    assert (location.road, location.lane) == ("2", -1)
     north, _ = at(globe, latitude_deg=LATITUDE + 100.0 / METERS_PER_DEGREE, longitude_deg=9.0)
     assert north.y - first.y == pytest.approx(99.96, abs=2e-3)
     assert north.x == pytest.approx(first.x, abs=1e-6)
@@ -62,16 +62,19 @@ def test_missing_and_relative_angles_refer_to_the_lane(globe: RuntimeContext) ->
 
 def test_height_follows_ground_level_or_altitude(globe: RuntimeContext) -> None:
     place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
-    assert at(globe, **place)[0].z == pytest.approx(10.0)
-    pose, location = at(globe, **place, vertical_road_selection=1)
-    assert location.road == "2"
-    assert pose.z == pytest.approx(17.0)
-    pose, location = at(globe, **place, altitude=118.0)
-    assert location.road == "2"
-    assert pose.z == pytest.approx(18.0)
-    assert at(globe, **place, height=111.0)[0].z == pytest.approx(11.0)
-    with pytest.raises(ScenarioError, match="road level does not exist; got 2; expected 0 to 1"):
-        at(globe, **place, vertical_road_selection=2)
+    pose, location = at(globe, **place)
+    assert (pose.z, location.road) == (pytest.approx(17.0), "2"), "the top-most road"
+    pose, location = at(globe, **place, vertical_road_selection=-1)
+    assert (pose.z, location.road) == (pytest.approx(10.0), "1")
+    pose, location = at(globe, **place, altitude=1.5)
+    assert (pose.z, location.road) == (pytest.approx(18.5), "2")
+    pose, location = at(globe, **place, altitude=1.5, vertical_road_selection=-1)
+    assert (pose.z, location.road) == (pytest.approx(11.5), "1")
+    pose, location = at(globe, **place, height=111.0)
+    assert (pose.z, location.road) == (pytest.approx(11.0), "1")
+    for level in (1, -2):
+        with pytest.raises(ScenarioError, match=f"road level does not exist; got {level}; expected -1 to 0"):
+            at(globe, **place, vertical_road_selection=level)
 
 
 @pytest.mark.element("GeoPosition")
