@@ -25,19 +25,31 @@ def test_trajectory_without_timing_keeps_the_own_speed(scene: RunScene) -> None:
     assert played.when("action 0", "completeState") == pytest.approx(1.5)
 
 
-@pytest.mark.parametrize("timing", [RELATIVE, "<None/>"])
-def test_closed_trajectory_is_driven_in_laps_only_without_timing(run: Run, timing: str) -> None:
-    """10 m of a square in each second: 4 s for a lap; with times the action ends at 3 s at the last vertex."""
+@pytest.mark.parametrize("timing", [RELATIVE, "<None/>", RELATIVE.replace('"relative"', '"absolute"')])
+def test_closed_trajectory_is_driven_in_laps_without_absolute_times(run: Run, timing: str) -> None:
+    """10 m of a square in each second: 4 s for a lap; absolute times end at 3 s at the last vertex."""
     square = [(300.0, -2.0), (310.0, -2.0), (310.0, 8.0), (300.0, 8.0)]
     closed = follow(curve(*(world(x, y) for x, y in square), closed=True, times=(0, 1, 2, 3)), reference=timing)
     played = run(6.0, ("Ego", closed), ego=(-1, 300.0, 10.0), driven=False)
     places = [tuple(played.frames[20 * second].view.position[0, :2]) for second in range(6)]
     assert places[:4] == [pytest.approx(place) for place in square]
-    if timing == "<None/>":
+    if "absolute" not in timing:
         assert places[4:] == [pytest.approx(place, abs=1e-6) for place in square[:2]]
     else:
         assert any("closed has no effect" in text for text in played.result.warnings)
         assert played.frames[60].changes[0].element == "action 0"
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+def test_closed_circle_with_times_is_driven_in_laps(run: Run, mode: str) -> None:
+    """A polygon of 72 corners, nearly a circle of 40 m, in 18 s at 13.96 m/s: 6 s after two laps, 120° are covered."""
+    angles = [math.radians(5 * corner - 90) for corner in range(72)]
+    corners = [world(300 + 40 * math.cos(angle), 38 + 40 * math.sin(angle)) for angle in angles]
+    lap = follow(curve(*corners, closed=True, times=tuple(0.25 * corner for corner in range(72))), mode, RELATIVE)
+    played = run(42.5, ("Ego", lap), ego=(-1, 300.0, 13.96), driven=False)
+    x, y, _ = played.frames[20 * 42].view.position[0]
+    assert (x, y) == pytest.approx((300 + 40 * math.cos(math.radians(30)), 38 + 40 * 0.5), abs=0.2)
+    assert played.frames[20 * 42].view.speed[0] == pytest.approx(80 * math.pi / 18.0, rel=1e-2)
 
 
 @pytest.mark.element("FollowTrajectoryAction", "Timing")

@@ -135,14 +135,20 @@ class FollowTrajectoryAction(ActionBehaviour):
             what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or <None/> as the TimeReference"
             context.warn(*self.error(what, hint).diagnostics)
-        if self._timing is not None and self._trajectory.closed:
+        if self._timing is not None and self._trajectory.closed and not self._is_relative:
             self._trajectory = dataclasses.replace(self._trajectory, closed=False)
-            what = "closed has no effect on a trajectory with times, which ends at its last point"
-            context.warn(*self.error(what, "write closed='false', or <None/> as the TimeReference").diagnostics)
+            what = "closed has no effect on a trajectory with absolute times, which ends at its last point"
+            context.warn(*self.error(what, "write closed='false', or relative as the domain").diagnostics)
         if self._timing is None and any(isinstance(part, model.Motion) for part in shape.walk()):
             what = "the actor keeps its own speed: Motion has no effect on a trajectory without times"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]} with Timing, or the speed by another action"
             context.warn(*self.error(what, hint).diagnostics)
+
+    @property
+    def _is_relative(self) -> bool:
+        """Whether its times are relative to its start."""
+        timing = self._timing
+        return timing is not None and timing.domain_absolute_relative is model.ReferenceContext.RELATIVE
 
     @property
     def controls(self) -> Domain:
@@ -343,7 +349,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
         self._progress.move(self.context.view.tick, before, pursuit.s)
-        done = not (layout.closed and self._run is None) and self._leaves(before, pursuit.s)
+        done = not layout.closed and self._leaves(before, pursuit.s)
         motion.move_to(
             pose,
             land=done,
@@ -363,7 +369,7 @@ class FollowTrajectoryAction(ActionBehaviour):
     def _clock(self, dt: float) -> float:
         assert self._timing is not None
         elapsed = self.context.time + dt
-        if self._timing.domain_absolute_relative is not model.ReferenceContext.RELATIVE:
+        if not self._is_relative:
             return (elapsed - self._timing.offset) / self._timing.scale
         return (elapsed - self._started - self._timing.offset) / self._timing.scale + self._head_start
 

@@ -58,8 +58,10 @@ class TrajectoryCurve:
 
     @property
     def end_time(self) -> float:
-        """Time of the last point [s]; 0 without times."""
-        return self.times[-1] if self.times is not None else 0.0
+        """Time of the last point [s]; 0 without times, infinite for a closed trajectory, which is followed in laps."""
+        if self.times is None:
+            return 0.0
+        return math.inf if self.closed else self.times[-1]
 
     def at(self, s: float) -> Pose:
         """Return the pose at arc length s [m]. Beyond an end it is that of the end; a closed trajectory is periodic."""
@@ -99,19 +101,27 @@ class TrajectoryCurve:
         """Return the arc length at a time [m]: at constant speed between points, or by the `speeds` at the points."""
         if self.times is None:
             return 0.0
+        laps, time = self._lap_at(time)
         index, share = self._interval(self.times, time)
         s = self.timed
         way = s[index + 1] - s[index]
-        if speeds is None:
-            return s[index] + share * way
-        span = self.times[index + 1] - self.times[index]
-        return s[index] + share * (speeds[index] * span * (1.0 - share) + share * way)
+        if speeds is not None:
+            span = self.times[index + 1] - self.times[index]
+            way = speeds[index] * span * (1.0 - share) + share * way
+        return laps * self.length + s[index] + share * way
+
+    def _lap_at(self, time: float) -> tuple[int, float]:
+        """Return the number of complete laps of a closed trajectory at a time, and the time within its lap [s]."""
+        assert self.times is not None
+        span = self.times[-1] - self.times[0]
+        laps = max(0, math.floor((time - self.times[0]) / span)) if self.closed else 0
+        return laps, time - laps * span
 
     def speed_at(self, time: float) -> float:
         """Return the mean speed between the points around a time [m/s]: 0 before the first one, the last at the end."""
         if self.times is None or time < self.times[0]:
             return 0.0
-        index, _ = self._interval(self.times, time)
+        index, _ = self._interval(self.times, self._lap_at(time)[1])
         span = self.times[index + 1] - self.times[index]
         return (self.timed[index + 1] - self.timed[index]) / span if span > 0.0 else 0.0
 

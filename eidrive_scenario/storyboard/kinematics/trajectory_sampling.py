@@ -242,9 +242,13 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Trajecto
     vertices = [_vertex(vertex.position, resolve) for vertex in shape.vertex]
     times = [vertex.time for vertex in shape.vertex]
     first, last = vertices[0].pose, vertices[-1].pose
-    if closed and math.hypot(first.x - last.x, first.y - last.y) > 1e-3:
+    gap = math.hypot(first.x - last.x, first.y - last.y)
+    if closed and gap > 1e-3:
         vertices.append(vertices[0])
-        times.append(None)
+        known = _times(times)
+        length = sum(math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in pairwise(vertices)) - gap
+        # The closing line has no time in the file: it is covered at the mean speed.
+        times.append(None if known is None or length == 0.0 else known[-1] + gap * (known[-1] - known[0]) / length)
     return _sampled_polyline(vertices, _times(times), closed)
 
 
