@@ -169,6 +169,22 @@ def test_time_to_collision_uses_the_axis_of_the_distance(scene: RunScene, frame:
     assert first_start(played) == pytest.approx(1.1)
 
 
+@pytest.mark.parametrize(
+    ("specified", "is_near"),
+    [("", True), ('relativeDistanceType="euclidianDistance"', False), ('coordinateSystem="lane"', False)],
+)
+def test_along_route_is_ignored_beside_a_distance_type_or_coordinate_system(
+    scene: RunScene, specified: str, is_near: bool
+) -> None:
+    """Other is 3 m ahead in the next lane: 3 m along the road, 5 m straight; Ego drives 1 m/s."""
+    condition = by_entity_xml(
+        f'<TimeHeadwayCondition entityRef="Other" alongRoute="true" freespace="false" rule="lessThan" value="4" '
+        f"{specified}/>"
+    )
+    played = scene(0.2, ("Ego", NOTHING, condition), ego=(-1, 100, 1), other=(-2, 103, 1))
+    assert (first_start(played) == 0.0) == is_near
+
+
 def test_time_headway_of_standing_entity_is_infinite(scene: RunScene) -> None:
     condition = '<TimeHeadwayCondition entityRef="Other" freespace="false" rule="greaterThan" value="1000"/>'
     assert first_start(scene(0.5, ("Ego", NOTHING, by_entity_xml(condition)), ego=(-1, 100, 0))) == 0.0

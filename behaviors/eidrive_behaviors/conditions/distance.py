@@ -29,15 +29,16 @@ DistanceElement = (
 class GapCondition(QuantityCondition):
     """Base class of conditions that measure a distance in the coordinate system and along the axis of their element.
 
-    `alongRoute` of version 1.0 requests the distance along the road. Without it and without a distance type the
-    distance is straight.
+    `alongRoute` of version 1.0 requests the distance along the road; beside a coordinate system or a distance type it
+    is ignored. Without all of them the distance is straight.
     """
 
     element: DistanceElement
 
     def __init__(self, element: DistanceElement, entities: Sequence[str], rule: str = "any") -> None:
         super().__init__(element, entities, rule)
-        along = bool(getattr(element, "along_route", None))
+        is_specified = element.coordinate_system is not None or element.relative_distance_type is not None
+        along = not is_specified and bool(getattr(element, "along_route", None))
         self.frame = "road" if along else resolve_coordinate_system(element.coordinate_system)
         self.kind = "longitudinal" if along else resolve_distance_type(element.relative_distance_type)
 
