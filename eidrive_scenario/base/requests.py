@@ -44,7 +44,7 @@ class Override:
     value     pedal position in [0, 1], steering wheel angle, left positive [rad], or number of the gear
     active    False ends the override
     max_rate  maximum rate of change towards the value [1/s, rad/s]; None for an immediate change
-    newton    True for a brake whose value is a force [N]
+    newton    True for a brake whose value is a force [N], and its rate [N/s]
     parked    True for the position P of an automatic transmission
     """
 

@@ -52,6 +52,14 @@ def test_pedal_override_with_max_rate_changes_gradually(run: Run) -> None:
     assert -5.5 < slope(speed, 1.2, 2.2) < -5.0
 
 
+def test_brake_force_with_max_rate_changes_gradually(run: Run) -> None:
+    """At 6000 N/s the brake of 1500 kg is at 3000 N after 0.5 s, 2 m/s², and at 6000 N after 1 s, 4 m/s²."""
+    brake = '<Throttle active="true" value="0"/><Brake active="true"><BrakeForce value="6000" maxRate="6000"/></Brake>'
+    speed = run(2.5, ("Ego", hold(brake))).of("Ego", "speed")
+    assert -2.6 < slope(speed, 0.45, 0.55) < -1.9
+    assert -4.5 < slope(speed, 1.2, 2.2) < -4.0
+
+
 def test_steering_override_yields_the_yaw_rate(run: Run) -> None:
     """1.6 rad at the wheel are 0.1 rad at the axle: at 5 m/s over 3 m the yaw rate is 5 tan(0.1) / 3 = 0.167 rad/s."""
     played = run(3, ("Ego", hold('<SteeringWheel active="true" value="1.6"/>')), ego=(-1, 100.0, 5.0))

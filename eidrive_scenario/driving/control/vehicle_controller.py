@@ -69,10 +69,11 @@ class ControlOverrides:
 
     def _moved(self, override: Override) -> float:
         """Return the value of an overridden control after this step."""
-        target = override.value / self._full_brake if override.newton else override.value
+        unit = self._full_brake if override.newton else 1.0
+        target = override.value / unit
         if override.control != "steeringWheel":
             target = min(max(target, 0.0), 1.0)
         if override.max_rate is None:
             return target
-        before, reach = self._before.get(override.control, 0.0), override.max_rate * self._dt
+        before, reach = self._before.get(override.control, 0.0), override.max_rate / unit * self._dt
         return before + min(max(target - before, -reach), reach)
