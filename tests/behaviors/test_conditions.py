@@ -252,9 +252,7 @@ def test_angle_conditions_in_world_lane_and_relative_hold(scene: RunScene) -> No
     [("", -0.4), ('coordinateSystem="world"', -0.4), ('coordinateSystem="entity"', -0.4),
      ('coordinateSystem="lane"', 0.1), ('coordinateSystem="road"', 0.1)],
 )  # fmt: skip
-def test_relative_angle_on_a_bend_is_measured_to_the_axes_of_the_system(
-    scene: RunScene, system: str, angle: float
-) -> None:
+def test_relative_angle_on_a_bend_depends_on_the_coordinate_system(scene: RunScene, system: str, angle: float) -> None:
     """50 m apart on an arc of 100 m radius the lanes have directions 0.5 rad apart; Ego points 0.1 rad to the left."""
     bend = map_xml(road_xml(length=300.0, curvature=0.01, lanes=LANES))
     turned = f'<LanePosition roadId="1" laneId="-1" s="50">{ORIENTATION}</LanePosition>'
