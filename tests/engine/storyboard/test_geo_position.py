@@ -61,17 +61,18 @@ def test_missing_and_relative_angles_refer_to_the_lane(globe: RuntimeContext) ->
 
 
 def test_height_follows_ground_level_or_altitude(globe: RuntimeContext) -> None:
+    """Without a selection the top-most road counts; `height` is above the zero of the projection."""
     place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
-    pose, location = at(globe, **place)
-    assert (pose.z, location.road) == (pytest.approx(17.0), "2"), "the top-most road"
-    pose, location = at(globe, **place, vertical_road_selection=-1)
-    assert (pose.z, location.road) == (pytest.approx(10.0), "1")
-    pose, location = at(globe, **place, altitude=1.5)
-    assert (pose.z, location.road) == (pytest.approx(18.5), "2")
-    pose, location = at(globe, **place, altitude=1.5, vertical_road_selection=-1)
-    assert (pose.z, location.road) == (pytest.approx(11.5), "1")
-    pose, location = at(globe, **place, height=111.0)
-    assert (pose.z, location.road) == (pytest.approx(11.0), "1")
+    for given, height, road in (
+        ({}, 17.0, "2"),
+        ({"vertical_road_selection": -1}, 10.0, "1"),
+        ({"altitude": 1.5}, 18.5, "2"),
+        ({"altitude": 1.5, "vertical_road_selection": -1}, 11.5, "1"),
+        ({"height": 111.0}, 11.0, "1"),
+    ):
+        pose, location = at(globe, **place, **given)
+        assert pose.z == pytest.approx(height)
+        assert location.road == road
     for level in (1, -2):
         with pytest.raises(ScenarioError, match=f"road level does not exist; got {level}; expected -1 to 0"):
             at(globe, **place, vertical_road_selection=level)
