@@ -29,6 +29,7 @@ from eidrive_scenario.openscenario.reading.reader import Reader
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.validation.rules import check_values
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.run_options import checked_settings
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.run_outcome import HOW_TO_JUDGE, UNJUDGED
 
@@ -113,7 +114,7 @@ def scenario_diagnostics(
 
 def added_sources(settings: RunSettings | None) -> tuple[str | Path, ...]:
     """Return the criteria and driving stacks that settings add to a scenario, as YAML texts and files."""
-    given = settings or RunSettings()
+    given = checked_settings(settings)
     return (*given.criteria_sources, *(stack for stack in given.stacks.values() if stack is not None))
 
 

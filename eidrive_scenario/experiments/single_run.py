@@ -21,8 +21,9 @@ from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE, RecordMode
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
-from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_seed
+from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_seed, checked_settings
 from eidrive_scenario.simulation import Observer, RunResult, Simulation
+from eidrive_scenario.simulation.observers import checked_observers
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
@@ -74,8 +75,8 @@ def run_and_save(
     Parameters in `settings` override those of the distribution. Raise InputError for an invalid scenario, setting or
     output path, ConstraintError for a run that violates constraints of parameters, and WallLimitError at the limit.
     """
-    settings = settings or RunSettings()
-    seed = checked_seed(seed)
+    settings = checked_settings(settings)
+    seed, observers = checked_seed(seed), checked_observers(observers)
     kept = record_mode(record)
     command = command or command_of_source(source, seed, settings)
     recording: Path | None = None

@@ -13,6 +13,7 @@ from eidrive_scenario.gym.libraries import gymnasium
 from eidrive_scenario.gym.settings import METADATA, RENDER_MODES, ActionSettings, ObservationSettings, RenderSettings
 from eidrive_scenario.gym.station_interface import InterfaceSettings, RewardSettings, StationInterface, parse_mapping
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
+from eidrive_scenario.run_options import checked_settings
 from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Runs:
     ) -> None:
         self._source = source if isinstance(source, Scenario | ConcreteRun) else load_scenario(source)
         _check_steps(max_steps, ticks_per_step)
-        self.settings = settings or RunSettings()
+        self.settings = checked_settings(settings)
         self.ticks_per_step = ticks_per_step
         self._duration = None if max_steps is None else max_steps * ticks_per_step * self.settings.dt
         with Simulation(self._source, settings=self.settings, load_weights=False) as simulation:

@@ -12,11 +12,12 @@ from tempfile import TemporaryDirectory
 
 from matplotlib.figure import Figure
 
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.reporting.drawing.scenario_figure import is_road_file, source_figure
-from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, paper_style, write_figure
+from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, checked_size, paper_style, write_figure
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.report_files import report_files
 from eidrive_scenario.simulation import RunResult
@@ -62,13 +63,13 @@ def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> RunDispl
     run     result of a run, or the folder or recording of one
     height  of the replay [px]
 
-    Raise InputError if there is no recording at a path, or none of its frames can be read.
+    Raise InputError if there is no recording at a path, or none of its frames can be read, and for another object.
     """
     if isinstance(run, RunResult):
         recording, verdicts = run.recording, run._repr_html_()
         text = str(run)
     else:
-        recording, verdicts = recording_in(Path(run)), ""
+        recording, verdicts = recording_in(_path(run, "the result of a run, its folder or its recording")), ""
         text = str(recording)
     return RunDisplay(verdicts + ("" if recording is None else _replay_frame(recording, height)), text)
 
@@ -80,10 +81,10 @@ def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | 
     size     width and height [mm]
     station  whose view is shaded; by default the first that drives
 
-    Raise InputError for an invalid file, SettingError for a station of a road file.
+    Raise InputError for an invalid file, SettingError for a station of a road file or another size.
     """
     path = Path(source) if is_road_file(os.fspath(source)) else resolve_scenario(os.fspath(source))
-    return Picture(source_figure(path, size, station))
+    return Picture(source_figure(path, checked_size(size), station))
 
 
 def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:
@@ -94,7 +95,7 @@ def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:
 
     Raise InputError without any result.
     """
-    return report_files([Path(run) for run in runs], Path(out))
+    return report_files([_path(run, "paths, each as an argument") for run in runs], Path(out))
 
 
 def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Path:
@@ -105,6 +106,12 @@ def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Pa
     Raise InputError if no frame can be read.
     """
     return make_replay(open_recording(recording_in(Path(recording))), Path(out)).page
+
+
+def _path(value: str | PathLike[str], expected: str) -> Path:
+    if not isinstance(value, str | PathLike):
+        raise SettingError(Diagnostic(f"not a path (got {quoted(value)}; expected {expected})"))
+    return Path(value)
 
 
 def _replay_frame(recording: Path, height: int) -> str:

@@ -14,7 +14,7 @@ from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex, cast
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario.values.parameters import Assignment
@@ -332,3 +332,10 @@ def checked_seed(seed: SupportsIndex) -> int:
         return index(seed)
     except TypeError:
         raise SettingError(Diagnostic(f"the seed is {seed!r}", "give an integer")) from None
+
+
+def checked_settings(settings: RunSettings | None) -> RunSettings:
+    """Return settings, the default ones for None. Raise SettingError for another object."""
+    if settings is not None and not isinstance(settings, RunSettings):
+        raise SettingError(Diagnostic(f"settings is {quoted(settings)}", "give RunSettings(…)"))
+    return settings or RunSettings()

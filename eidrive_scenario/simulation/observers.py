@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, suppress
 from typing import Protocol
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation.result import RunResult
 
@@ -34,6 +34,13 @@ def checked_observer(observer: Observer) -> Observer:
                 Diagnostic(f"observer {name} has no method {method}", "define observe(frame) and close()")
             )
     return observer
+
+
+def checked_observers(observers: Iterable[Observer]) -> tuple[Observer, ...]:
+    """Return observers. Raise SettingError for an object that is no list of them, such as a single one."""
+    if not isinstance(observers, Iterable):
+        raise SettingError(Diagnostic(f"observers is {quoted(observers)}", "give a list of observers"))
+    return tuple(observers)
 
 
 class Observers:

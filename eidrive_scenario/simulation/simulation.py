@@ -19,10 +19,10 @@ from eidrive_scenario.evaluation.criterion import CriteriaObserver
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.run_options import DEFAULT_SEED, RunSettings, as_setting_text, checked_seed
+from eidrive_scenario.run_options import DEFAULT_SEED, RunSettings, as_setting_text, checked_seed, checked_settings
 from eidrive_scenario.simulation.attribution import attributed, report_extension, wall_limit_error
 from eidrive_scenario.simulation.commands import add_criteria, execute
-from eidrive_scenario.simulation.observers import Observer, Observers
+from eidrive_scenario.simulation.observers import Observer, Observers, checked_observers
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings, resolve_settings
 from eidrive_scenario.simulation.result import RunResult
 from eidrive_scenario.simulation.run_outcome import (
@@ -68,8 +68,8 @@ class Simulation:
         self._observers = Observers()
         self._is_closed = False
         self.seed = seed = checked_seed(seed)
-        self.settings = settings or RunSettings()
-        self._observers.add(*observers)
+        self.settings = checked_settings(settings)
+        self._observers.add(*checked_observers(observers))
         setup = set_up_run(source, seed, self.settings, load_weights=load_weights, stack=stack)
         self.scenario, self.roads = setup.scenario, setup.roads
         self.storyboard, self.stack, self.world = setup.storyboard, setup.stack, setup.world

@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from eidrive_scenario.api.run import load_scenario
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
@@ -49,6 +50,27 @@ def test_noninteger_seed_raises(tmp_path: Path, seed: Any) -> None:
     for run in (Simulation, run_file, run_and_save):
         with pytest.raises(SettingError, match=r"the seed is .*; give an integer"):
             run(ONE, seed=seed)
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ({"observers": None}, "observers is None; give a list of observers"),
+        ({"observers": 3}, "observers is 3; give a list of observers"),
+        ({"settings": {"channel": "ideal"}}, "settings is {'channel': 'ideal'}; give RunSettings(…)"),
+        ({"settings": {}}, "settings is {}; give RunSettings(…)"),
+    ],
+)
+def test_argument_of_another_type_raises(argument: dict[str, Any], message: str) -> None:
+    for run in (Simulation, run_file, run_and_save):
+        with pytest.raises(SettingError) as caught:
+            run(ONE, **argument)
+        assert str(caught.value) == message
+
+
+def test_parameters_of_another_type_raise() -> None:
+    with pytest.raises(SettingError, match="parameters is 3; give a mapping of names to values"):
+        load_scenario(ONE, cast("Any", 3))
 
 
 @pytest.mark.parametrize("senders", [["RSU"], {"RSU"}, ("RSU",)])

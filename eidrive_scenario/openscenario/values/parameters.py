@@ -76,7 +76,9 @@ class Assignment:
 
 
 def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, Assignment]:
-    """Return the values by parameter name, each as an Assignment."""
+    """Return the values by parameter name, each as an Assignment. Raise SettingError for an object of another form."""
+    if values is not None and not isinstance(values, Mapping):
+        raise SettingError(Diagnostic(f"parameters is {quoted(values)}", "give a mapping of names to values"))
     return {
         name: value if isinstance(value, Assignment) else Assignment(_text_of(value))
         for name, value in (values or {}).items()

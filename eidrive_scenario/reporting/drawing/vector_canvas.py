@@ -318,13 +318,20 @@ def parse_size(text: str | None) -> Size:
     """Return the size [mm] of a text such as `85x60`, the default for None. Raise SettingError for another text."""
     if text is None:
         return DEFAULT_SIZE
-    parts = text.lower().removesuffix("mm").strip().split("x")
+    return checked_size(text.lower().removesuffix("mm").strip().split("x"), "--size", text)
+
+
+def checked_size(size: Any, name: str = "size", given: object = None) -> Size:
+    """Return width and height [mm]. Raise SettingError for an object of another form, and for those beyond the limits.
+
+    name, given  name of the setting, and its value if it is not `size`
+    """
     try:
-        width, height = map(float, parts)
-    except ValueError:
+        width, height = map(float, size)
+    except (TypeError, ValueError):
         width = height = math.nan
     if not all(SMALLEST_SIZE <= side <= LARGEST_SIZE for side in (width, height)):
-        message = f"--size: no width and height in millimeters (got {quoted(text)})"
+        message = f"{name}: no width and height in millimeters (got {quoted(size if given is None else given)})"
         hint = f"expected such as 85x60, within {SMALLEST_SIZE:g} to {LARGEST_SIZE:g}"
         raise SettingError(Diagnostic(message, hint))
     return width, height

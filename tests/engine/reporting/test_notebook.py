@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import html
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -55,3 +57,19 @@ def test_pictures_are_vectors_in_notebooks_and_files(source: str | Path, tmp_pat
 def test_road_file_has_no_station() -> None:
     with pytest.raises(SettingError, match="a road file has no station"):
         report.draw(library_path() / "roads" / "coop_1.xodr", station="Ego")
+
+
+@pytest.mark.parametrize(
+    ("function", "argument", "options", "message"),
+    [
+        (report.show, None, {}, "not a path (got None; expected the result of a run, its folder or its recording)"),
+        (report.write_report, ["runs"], {"out": "a"}, "not a path (got ['runs']; expected paths, each as an argument)"),
+        (report.draw, "coop/scenario_1", {"size": (0, 90)}, "size: no width and height in millimeters (got (0, 90))"),
+        (report.draw, "coop/scenario_1", {"size": 85}, "size: no width and height in millimeters (got 85)"),
+    ],
+)
+def test_wrong_argument_is_reported_with_the_expected_one(
+    function: Callable[..., object], argument: object, options: dict[str, object], message: str
+) -> None:
+    with pytest.raises(SettingError, match=re.escape(message)):
+        function(argument, **options)
