@@ -110,7 +110,7 @@ corner-cases: install  #- run the corner cases with and without messages, 10 see
 weather-sheet: install  #- render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_reports.weather_sheet
 
-pages: install  #- open a report and replays in EIDRIVE_BROWSER, with axe-playwright-python: reports/pages, two of docs/figures
+pages: install  #- open a report and replays in EIDRIVE_BROWSER, with axe-playwright-python: reports/pages, docs/figures/{replay,two_runs}.png
 	@test -n "$$EIDRIVE_BROWSER" || { echo 'EIDRIVE_BROWSER is not set: the program of Chromium'; exit 2; }
 	$(BIN)/python -m pip install axe-playwright-python
 	mkdir -p reports/pages
