@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
 from msgspec.structs import replace
 from pydantic import PositiveFloat
 
-from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
@@ -17,13 +18,14 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
+from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.v2x.messages.message import Payload
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):
-    """Settings of early fusion (property `fusion_settings`). Inherited ones apply to stations without shared points.
+    """Settings of early fusion (property `fusion_settings`). Inherited ones apply to stations without merged points.
 
     cell          cell size of the grid of transmitted points [m]
     max_lateness  maximum age of merged points; older ones show past positions [s]. Also the maximum lead of a clock
@@ -37,8 +39,8 @@ class EarlyFusion(CovarianceIntersectionFusion):
     """Fusion of lidar points: a station sends its points with its boxes and detects objects in all available points.
 
     Points are merged as measured, because their motion is unknown. A late point cloud therefore shows moving objects
-    twice. Boxes of stations without shared points are fused by covariance intersection. The station reports only
-    objects in its own points, because receivers merge these points themselves.
+    twice. Boxes of stations without merged points, such as those whose points are too old, are fused by covariance
+    intersection. The station reports only objects in its own points, because receivers merge these points themselves.
     """
 
     settings_type: ClassVar[type[Settings] | None] = EarlyFusionSettings
@@ -82,3 +84,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
         points = np.concatenate([first.points, offset @ first.pose[:3, :3]])
         intensity = np.concatenate([first.intensity, np.ones(len(offset))])
         return replace(readings, lidars={name: LidarReading(points, intensity, first.pose)})
+
+    def _select(self, reports: Sequence[Report]) -> tuple[Integers, Integers]:
+        """Omit stations whose points are merged: their objects are detected in the merged points."""
+        return super()._select([report for report in reports if report.station not in self._received])

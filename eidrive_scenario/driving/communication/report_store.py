@@ -265,12 +265,11 @@ class ReportStore:
             payload = message.payload
             if sharing is not None and payload is not None and sharing.accepts(payload) and not own:
                 longest = self._fusion.max_payload_age
-                if self._is_expired(payload.time, longest, now):
-                    expired.append(row)
                 # Data of the far future would replace all later ones of their sender.
-                elif payload.time <= now + longest + TIME_TOLERANCE:
+                if abs(payload.time - now) <= longest + TIME_TOLERANCE:
                     sharing.add(sender, payload, self._own_body.box(payload.time))
-                continue
+                elif message.kind == "features" and payload.time < now:
+                    expired.append(row)
             if message.kind == "features":
                 continue
             if self._is_expired(message.detections.time, self._lifetime, now):

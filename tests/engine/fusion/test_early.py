@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from scenario_1 import FrameCollector, edited, simulate
 
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
@@ -139,15 +141,35 @@ def test_early_fusion_ignores_ego_body_in_received_points(height: float) -> None
 
 def test_early_fusion_ignores_old_points_and_keeps_the_newest() -> None:
     ego, rsu = agent(EGO, fusion_settings={"max_lateness": 0.2}), agent(RSU)
-    old = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    old = replace(sent, detections=Detections(0.0))
     new = rsu.act(readings(0.1, (40.0, 12.0, math.pi)), (), 0.1, None).outbox[0]
     assert len(ego.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(old, 0.2)], 0.2, None).fused) == 1
     assert len(ego.act(readings(0.25, (0.0, 0.0, 0.0)), (), 0.25, None).outbox) == 1
-    late = ego.act(readings(0.3, (0.0, 0.0, 0.0)), [ReceivedMessage(old, 0.3)], 0.3, None)
-    assert (len(late.fused), late.expired) == (0, (0,))
+    assert len(ego.act(readings(0.3, (0.0, 0.0, 0.0)), [ReceivedMessage(old, 0.3)], 0.3, None).fused) == 0
     fresh = agent(EGO)
     step = fresh.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(new, 0.15), ReceivedMessage(old, 0.2)], 0.2, None)
     assert len(step.fused) == 0
+
+
+def test_boxes_of_a_station_are_fused_while_its_points_are_too_old() -> None:
+    """The points show the car 20 m ahead and the box shows it 50 m ahead, so that a fused object has one source."""
+    ego, rsu = agent(EGO, fusion_settings={"max_lateness": 0.2, "max_age": 1.0}), agent(RSU)
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    box = replace(sent.detections, boxes=sent.detections.boxes + np.array([30.0, *[0.0] * 6]))
+    inbox = {0.1: [ReceivedMessage(replace(sent, detections=box), 0.1)]}
+    fused = {}
+    for tick in range(2, 22):
+        now = 0.05 * tick
+        step = ego.act(readings(now, (0.0, 0.0, 0.0)), inbox.get(now, ()), now, None)
+        fused[tick] = [round(x, -1) for x in step.fused.boxes[:, 0].tolist()]
+        assert step.expired == ()
+    assert [fused[tick] for tick in (2, 4)] == [[20.0], [20.0]]
+    assert [fused[tick] for tick in (10, 20, 21)] == [[50.0], [50.0], []]
+    late = agent(EGO, fusion_settings={"max_lateness": 0.2}).act(
+        readings(0.4, (0.0, 0.0, 0.0)), [ReceivedMessage(replace(sent, detections=box), 0.4)], 0.4, None
+    )
+    assert [round(x, -1) for x in late.fused.boxes[:, 0].tolist()] == [50.0]
 
 
 def test_points_of_the_far_future_do_not_replace_later_ones() -> None:
@@ -155,7 +177,7 @@ def test_points_of_the_far_future_do_not_replace_later_ones() -> None:
     at = (40.0, 12.0, math.pi)
     hostile = ahead.act(readings(0.0, at, car(10.0, -6.0, "fl")), (), 0.0, None).outbox[0]
     sent = rsu.act(readings(0.1, at, car(*CAR, "fl")), (), 0.1, None).outbox[0]
-    assert not len(ego.act(readings(0.1, (0.0, 0.0, 0.0)), [ReceivedMessage(hostile, 0.1)], 0.1, None).fused)
+    ego.act(readings(0.1, (0.0, 0.0, 0.0)), [ReceivedMessage(hostile, 0.1)], 0.1, None)
     fused = ego.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(sent, 0.2)], 0.2, None).fused
     assert len(fused) == 1
     assert math.dist(fused.boxes[0, :2], CAR) < 0.5
