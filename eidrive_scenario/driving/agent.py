@@ -143,16 +143,16 @@ class Agent:
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
         x, y, z = ego.position.tolist()
         state = StationState(ego.time, x, y, z, ego.yaw, ego.speed, covariance)
-        found = fresh
+        own = fresh
         if self.sharing is not None:
-            found = self.sharing.perceive(readings, fresh, self.perception.pose)
-            found = None if found is None else self._own_body.without(found)
-        if found is not None and not own_perception:
+            own = self.sharing.perceive(readings, fresh, self.perception.pose)
+            own = None if own is None else self._own_body.without(own)
+        if own is not None and not own_perception:
             own_state = replace(state, pose_covariance=None)
-            change = self.perception.pose_change(found.time)
-            self._reports.add(Report(self.name, found, now, own_state, pose_change=change))
+            change = self.perception.pose_change(own.time)
+            self._reports.add(Report(self.name, own, now, own_state, pose_change=change))
             if self._regions is not None:
-                self._regions.add(self.name, found.time, self._own_body.reference_pose(found.time), self._view)
+                self._regions.add(self.name, own.time, self._own_body.reference_pose(own.time), self._view)
         obeys = self.planner is not None and self.settings.obey_signals
         return StationPerception(
             now,
