@@ -79,10 +79,10 @@ def _draw(
         along_long, along_upper, along_lower = (x2 - x0) / (y2 - y0), (x1 - x0) / (y1 - y0), (x2 - x1) / (y2 - y1)
         for line in range(top, bottom):
             at = line + 0.5
-            one = x0 + (at - y0) * along_long
-            other = x1 + (at - y1) * along_lower if at >= y1 else x0 + (at - y0) * along_upper
+            x_long = x0 + (at - y0) * along_long
+            x_bent = x1 + (at - y1) * along_lower if at >= y1 else x0 + (at - y0) * along_upper
             level = start + (at - y0) * downwards
-            for column in range(_first_center(min(one, other), width), _first_center(max(one, other), width)):
+            for column in range(_first_center(min(x_long, x_bent), width), _first_center(max(x_long, x_bent), width)):
                 value = max(np.float32(level + (column + 0.5) * rightwards), _LEAST)
                 if value >= near[line, column]:
                     near[line, column] = value

@@ -115,18 +115,18 @@ def _illuminate(
 
 @kernel("void(f4[:,::1], f4[:,::1], u1[::1], f4[::1], f4[::1], f4[::1], f4[:,::1], f4[:,::1])")
 def _add_grain(
-    luminance: Floats, places: Floats, finish: NDArray[np.uint8], grain: Floats, factors: Floats, place: Floats,
+    luminance: Floats, places: Floats, finish: NDArray[np.uint8], grain: Floats, factors: Floats, camera: Floats,
     patches: Floats, grit: Floats,
 ) -> None:  # fmt: skip
     """Add spatial variation of road and soil: grit near the camera, patches everywhere; darken wet parts by factors.
 
-    place (2,) is that of the camera; patches and grit are periodic tables with 4 and 24 values per meter.
+    camera (2,) is its position; patches and grit are periodic tables with 4 and 24 values per meter.
     """
     mask = len(patches) - 1
     for row, kind in enumerate(finish):
         if grain[kind] == 0.0:
             continue
-        x, y = places[0, row] + place[0], places[1, row] + place[1]
+        x, y = places[0, row] + camera[0], places[1, row] + camera[1]
         wide = patches[int(y * np.float32(4.0)) & mask, int(x * np.float32(4.0)) & mask] * np.float32(0.35)
         fine = grit[int(y * np.float32(24.0)) & mask, int(x * np.float32(24.0)) & mask]
         fine *= np.float32(4.0) / (np.float32(6.0) + places[3, row])
