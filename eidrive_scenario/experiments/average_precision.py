@@ -19,14 +19,14 @@ class Matches:
     """Result of matching the detections of one image with its objects, of one class or of all.
 
     scores (N,); correct (N,) whether the detection matches an object; counted (N,) False for detections of ignored
-    objects; found (M,) whether each object of the image, including ignored ones, is matched; taken (N,) row of the
+    objects; matched (M,) whether each object of the image, including ignored ones, is matched; taken (N,) row of the
     object that a detection matches, including ignored ones, or -1; empty if it is unknown
     """
 
     scores: Array
     correct: Bools
     counted: Bools
-    found: Bools
+    matched: Bools
     taken: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
@@ -55,24 +55,24 @@ def match_by_share(
     """
     order = matching_order(shares, scores)
     correct, counted = np.zeros(len(order), dtype=bool), np.ones(len(order), dtype=bool)
-    found = np.zeros(len(ignored), dtype=bool)
+    matched = np.zeros(len(ignored), dtype=bool)
     taken = np.full(len(order), -1)
     for rank, row in enumerate(order.tolist()):
-        free = np.where(found, -1.0, shares[row])
+        free = np.where(matched, -1.0, shares[row])
         wanted = np.where(ignored, -1.0, free)
         best = int(np.argmax(wanted)) if len(wanted) else -1
         if best >= 0 and wanted[best] >= least:
-            found[best] = correct[rank] = True
+            matched[best] = correct[rank] = True
             taken[rank] = best
             continue
         other = int(np.argmax(free)) if len(free) else -1
         if other >= 0 and free[other] >= least:
-            found[other] = True
+            matched[other] = True
             taken[rank] = other
             counted[rank] = False
         elif harmless is not None and harmless[row]:
             counted[rank] = False
-    return Matches(scores[order], correct, counted, found, taken)
+    return Matches(scores[order], correct, counted, matched, taken)
 
 
 def matching_order(shares: Array, scores: Array) -> Integers:
