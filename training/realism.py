@@ -80,7 +80,9 @@ def realism_tables(
     tables = [_by_distance(rendered), _by_weather(rendered)]
     if photographs is not None:
         judged = {"ssd_openimages": network, **shipped}
-        tables.append(_by_height(rendered, {name: _in_photographs(one, photographs) for name, one in judged.items()}))
+        tables.append(
+            _by_height(rendered, {name: _in_photographs(judge, photographs) for name, judge in judged.items()})
+        )
     return tables
 
 
