@@ -29,7 +29,7 @@ from eidrive_scenario.world.physics.bullet import (
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
 from eidrive_scenario.world.surfaces import BOX_FACES, LEVEL_GROUND, Surfaces, box_corners
 
-Thing = TypeVar("Thing")
+StaticObject = TypeVar("StaticObject")
 Cell = tuple[int, int]
 
 SQUARE = 10.0
@@ -38,25 +38,25 @@ _FAR = 300.0
 """Reach from which on the occupied cells are searched instead of all cells in reach [m]: steps of many seconds."""
 
 
-class SpatialGrid(Generic[Thing]):
+class SpatialGrid(Generic[StaticObject]):
     """Static objects, each in the cells that it may overlap."""
 
     def __init__(self) -> None:
-        self._in_cell: dict[Cell, list[Thing]] = {}
+        self._in_cell: dict[Cell, list[StaticObject]] = {}
 
-    def add(self, thing: Thing, cells: Iterable[Cell]) -> None:
+    def add(self, static_object: StaticObject, cells: Iterable[Cell]) -> None:
         """Add an object to these cells."""
         for cell in dict.fromkeys(cells):
-            self._in_cell.setdefault(cell, []).append(thing)
+            self._in_cell.setdefault(cell, []).append(static_object)
 
-    def query(self, x: float, y: float, reach: float) -> list[Thing]:
+    def query(self, x: float, y: float, reach: float) -> list[StaticObject]:
         """Return the objects in the cells within reach of a point [m], possibly with duplicates."""
-        near: list[Thing] = []
+        near: list[StaticObject] = []
         if reach > _FAR:
             side = reach + SQUARE
-            for (column, line), things in self._in_cell.items():
+            for (column, line), objects in self._in_cell.items():
                 if abs((column + 0.5) * SQUARE - x) <= side and abs((line + 0.5) * SQUARE - y) <= side:
-                    near += things
+                    near += objects
         elif self._in_cell:
             for cell in grid_cells(x, y, reach):
                 if cell in self._in_cell:
