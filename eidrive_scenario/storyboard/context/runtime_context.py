@@ -174,10 +174,10 @@ class RuntimeContext:
         state = self.view.states[row]
         return CentralObject(state.x, state.y, state.yaw, state.speed)
 
-    def add_actor(self, name: str, place: ResolvedPosition) -> None:
+    def add_actor(self, name: str, position: ResolvedPosition) -> None:
         """Teleport an actor to a position; an absent actor enters the world."""
         actor = self.actors[name]
-        actor.motion.teleport(place)
+        actor.motion.teleport(position)
         actor.invalidate_location()
         if not actor.present:
             actor.enter_world()
