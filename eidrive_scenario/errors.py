@@ -91,7 +91,10 @@ class InputError(EidriveError):
 
     def at(self, source: str, line: int | None = None) -> Self:
         """Return the error with this location at each diagnostic that has none."""
-        located = [one if one.source else replace(one, source=source, line=line) for one in self.diagnostics]
+        located = [
+            diagnostic if diagnostic.source else replace(diagnostic, source=source, line=line)
+            for diagnostic in self.diagnostics
+        ]
         return type(self)(located)
 
 
@@ -151,11 +154,11 @@ class ExtensionPlace:
     function: str = ""
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}: " if self.file else ""
+        location = f"{self.file}:{self.line}: " if self.file else ""
         value = f" ({self.value})" if self.value else ""
         subject = f" of {self.subject}" if self.subject else ""
         time = f" at t = {self.time:.3f} s" if self.time is not None else ""
-        return f"{place}{self.kind} {self.name!r}{value}{subject}{time}"
+        return f"{location}{self.kind} {self.name!r}{value}{subject}{time}"
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields by name, without unknown ones."""
@@ -201,8 +204,8 @@ class WallLimitError(SimulationError):
         return type(self), (self.limit, self.place, self.time, self.where)
 
     def as_json(self) -> dict[str, Any]:
-        place = {"kind": "run", "time": self.time} if self.place is None else self.place.as_json()
-        return {**super().as_json(), **place, "wall_limit": self.limit}
+        running = {"kind": "run", "time": self.time} if self.place is None else self.place.as_json()
+        return {**super().as_json(), **running, "wall_limit": self.limit}
 
 
 class InvalidResult(Exception):
@@ -267,7 +270,7 @@ class ErrorCollector:
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return each diagnostic once: files in the order of their first diagnostic, lines of a file ascending."""
     unique = list(dict.fromkeys(diagnostics))
-    files = {source: number for number, source in enumerate(dict.fromkeys(one.source for one in unique))}
+    files = {source: number for number, source in enumerate(dict.fromkeys(diagnostic.source for diagnostic in unique))}
     return sorted(unique, key=lambda diagnostic: (files[diagnostic.source], diagnostic.line or 0))
 
 
@@ -315,12 +318,12 @@ def most_similar(word: str, candidates: Collection[str]) -> str | None:
     return similar[0] if similar else None
 
 
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """Return a hint for an unknown word: the most similar of `known`, or a list of them if none is similar.
+def suggestion(word: str, names: Iterable[str]) -> str:
+    """Return a hint for an unknown word: the most similar of the known `names`, or a list of them if none is similar.
 
     To limit the cost, no similar word is searched if the word is too long or the known ones are too many.
     """
-    candidates = sorted(known)
+    candidates = sorted(names)
     if (similar := most_similar(word, candidates)) is not None:
         return f"did you mean {similar!r}?"
     if not candidates:

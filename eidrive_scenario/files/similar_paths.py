@@ -16,12 +16,12 @@ _MOST_ENTRIES = 2000
 def file_suggestion(
     given: str | Path,
     suffixes: Collection[str],
-    known: Iterable[str] = (),
+    names: Iterable[str] = (),
     *,
     folder: Path = Path(),
     otherwise: str = "check the path",
 ) -> str:
-    """Return a hint for a missing file: the most similar file of its folder, or else of `known` names.
+    """Return a hint for a missing file: the most similar file of its folder, or else of the known `names`.
 
     given      path, or one of the names with or without a suffix
     suffixes   of the files
@@ -31,13 +31,13 @@ def file_suggestion(
     similar = _similar_path(folder / given, suffixes)
     if similar is not None:
         return f"did you mean {str(similar.relative_to(folder) if similar.is_relative_to(folder) else similar)!r}?"
-    names, path = list(known), Path(given)
-    if not names:
+    candidates, path = list(names), Path(given)
+    if not candidates:
         return otherwise
     word = next((str(path)[: -len(suffix)] for suffix in suffixes if path.suffix == suffix), str(given))
     beside = [str(path.parent / name) for name in _names(folder / path.parent, suffixes)]
     is_path = path.suffix in suffixes or len(path.parts) > 1
-    return suggestion(word, beside if beside and is_path and most_similar(word, names) is None else names)
+    return suggestion(word, beside if beside and is_path and most_similar(word, candidates) is None else candidates)
 
 
 def _similar_path(path: Path, suffixes: Collection[str]) -> Path | None:
