@@ -107,5 +107,5 @@ def _detected_vehicles(entries: list[EvaluatedImage], dataset: Dataset) -> Bools
         )
         boxes, scores = entry.detections.boxes[confident], entry.detections.scores[confident]
         ignored = np.zeros(len(vehicle_rows), dtype=bool)
-        detected[vehicle_rows] = match(boxes, scores, dataset.box[vehicle_rows].astype(float), ignored).matched
+        detected[vehicle_rows] = match(boxes, scores, dataset.box[vehicle_rows].astype(float), ignored).found
     return detected

@@ -67,7 +67,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
                     matches = match(
                         detections.boxes[vehicles], detections.scores[vehicles], boxes, np.zeros(len(boxes), dtype=bool)
                     )
-                    detected[key][name] += int(matches.matched.sum())
+                    detected[key][name] += int(matches.found.sum())
     return {
         "vehicles": required,
         "curves": {

@@ -19,14 +19,14 @@ class Matches:
     """Result of matching the detections of one image with its objects, of one class or of all.
 
     scores (N,); correct (N,) whether the detection matches an object; counted (N,) False for detections of ignored
-    objects; matched (M,) whether each object of the image, including ignored ones, is matched; taken (N,) row of the
+    objects; found (M,) whether each object of the image, including ignored ones, is matched; taken (N,) row of the
     object that a detection matches, including ignored ones, or -1; empty if it is unknown
     """
 
     scores: Array
     correct: Bools
     counted: Bools
-    matched: Bools
+    found: Bools
     taken: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 

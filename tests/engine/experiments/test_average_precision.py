@@ -103,7 +103,7 @@ def test_match_assigns_each_object_to_its_best_detection() -> None:
     found = match(boxes, np.array([0.9, 0.8, 0.7, 0.6]), objects, np.zeros(2, dtype=bool))
     assert found.correct.tolist() == [True, False, False, True]  # overlap 0.49 is below the minimum of 0.5
     assert found.counted.all()
-    assert found.matched.all()
+    assert found.found.all()
 
 
 def test_match_ignored_objects_are_not_counted() -> None:

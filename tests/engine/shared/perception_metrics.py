@@ -89,7 +89,7 @@ def recall_by_sight(samples: Iterable[MetricSample], min_iou: float) -> Recall:
     """
     found, total = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     for sample in samples:
-        matched = _matches(sample, min_iou).matched
+        matched = _matches(sample, min_iou).found
         hidden = ~sample.own_sight
         groups = (sample.own_sight, hidden & sample.other_sight, hidden & ~sample.other_sight)
         for index, group in enumerate(groups):
