@@ -164,7 +164,7 @@ class ActionContext(ConditionContext, Protocol):
     def appearance(self, name: str) -> Appearance:
         """Return the appearance of an actor."""
 
-    def add_actor(self, name: str, position: ResolvedPosition) -> None:
+    def add_actor(self, name: str, place: ResolvedPosition) -> None:
         """Teleport an actor to a position; an absent actor enters the world."""
 
     def remove_actor(self, name: str) -> None:

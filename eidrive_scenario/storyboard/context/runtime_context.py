@@ -174,10 +174,10 @@ class RuntimeContext:
         state = self.view.states[row]
         return CentralObject(state.x, state.y, state.yaw, state.speed)
 
-    def add_actor(self, name: str, position: ResolvedPosition) -> None:
+    def add_actor(self, name: str, place: ResolvedPosition) -> None:
         """Teleport an actor to a position; an absent actor enters the world."""
         actor = self.actors[name]
-        actor.motion.teleport(position)
+        actor.motion.teleport(place)
         actor.invalidate_location()
         if not actor.present:
             actor.enter_world()
