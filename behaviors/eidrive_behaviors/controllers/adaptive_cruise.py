@@ -29,17 +29,17 @@ def number(controller: model.Controller, name: str, default: Default, *, least: 
 
     Raise ScenarioError for another text.
     """
-    entry = _entry(controller, name)
-    if entry is None:
+    declared = _last_property(controller, name)
+    if declared is None:
         return default
     try:
-        value = float(entry.value)
+        value = float(declared.value)
     except ValueError:
         value = math.nan
     if math.isfinite(value) and value >= least:
         return value
     expected = "a finite number" if least == -math.inf else f"a number of at least {least:g}"
-    raise _invalid(controller, entry, f"expected {expected}")
+    raise _invalid(controller, declared, f"expected {expected}")
 
 
 def flag(controller: model.Controller, name: str, default: bool) -> bool:
@@ -47,12 +47,12 @@ def flag(controller: model.Controller, name: str, default: bool) -> bool:
 
     Raise ScenarioError for another text.
     """
-    entry = _entry(controller, name)
-    if entry is None:
+    declared = _last_property(controller, name)
+    if declared is None:
         return default
-    value = _FLAGS.get(entry.value.strip().lower())
+    value = _FLAGS.get(declared.value.strip().lower())
     if value is None:
-        raise _invalid(controller, entry, "expected true or false")
+        raise _invalid(controller, declared, "expected true or false")
     return value
 
 
@@ -61,22 +61,22 @@ def choice(controller: model.Controller, name: str, choices: Collection[str], de
 
     Raise ScenarioError for another text.
     """
-    entry = _entry(controller, name)
-    if entry is None:
+    declared = _last_property(controller, name)
+    if declared is None:
         return default
-    if entry.value not in choices:
-        raise _invalid(controller, entry, suggestion(entry.value, choices))
-    return entry.value
+    if declared.value not in choices:
+        raise _invalid(controller, declared, suggestion(declared.value, choices))
+    return declared.value
 
 
-def _entry(controller: model.Controller, name: str) -> model.Property | None:
+def _last_property(controller: model.Controller, name: str) -> model.Property | None:
     """Return the last property of this name; None without one."""
-    return next((entry for entry in reversed(property_entries(controller)) if entry.name == name), None)
+    return next((declared for declared in reversed(property_entries(controller)) if declared.name == name), None)
 
 
-def _invalid(controller: model.Controller, entry: model.Property, expected: str) -> ScenarioError:
-    message = f"controller {controller.name!r}: invalid property {entry.name} (got {entry.value!r}; {expected})"
-    return ScenarioError(Diagnostic.at(entry, message))
+def _invalid(controller: model.Controller, declared: model.Property, expected: str) -> ScenarioError:
+    message = f"controller {controller.name!r}: invalid property {declared.name} (got {declared.value!r}; {expected})"
+    return ScenarioError(Diagnostic.at(declared, message))
 
 
 CLOSEST = 3.0
