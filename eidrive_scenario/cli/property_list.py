@@ -104,13 +104,13 @@ def _documented(text: str) -> dict[str, str]:
     texts: dict[str, str] = {}
     names: Sequence[str] = ()
     for line in inspect.cleandoc(text).splitlines():
-        entry = _ENTRY.match(line)
-        if entry:
-            names = [name.strip() for name in entry[1].split(",")]
-            units = _UNIT.findall(entry[2])
-            texts |= dict.fromkeys(names, entry[2])
+        match = _ENTRY.match(line)
+        if match:
+            names = [name.strip() for name in match[1].split(",")]
+            units = _UNIT.findall(match[2])
+            texts |= dict.fromkeys(names, match[2])
             if len(units) == len(names):
-                texts |= {name: f"{_UNIT.sub('', entry[2])} [{unit}]" for name, unit in zip(names, units, strict=True)}
+                texts |= {name: f"{_UNIT.sub('', match[2])} [{unit}]" for name, unit in zip(names, units, strict=True)}
         elif names and line.startswith("    "):
             texts |= {name: f"{texts[name]} {line.strip()}" for name in names}
         else:
