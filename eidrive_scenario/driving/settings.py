@@ -72,12 +72,12 @@ def _sensors(value: Any) -> Any:
     kinds = registry("sensors")
     sensors: dict[str, Any] = {}
     for name, given in entries:
-        entry = dict(given) if isinstance(given, Mapping) else {} if given is None else given
-        if isinstance(entry, dict) and "kind" not in entry:
+        settings = dict(given) if isinstance(given, Mapping) else {} if given is None else given
+        if isinstance(settings, dict) and "kind" not in settings:
             if name not in kinds:
                 raise ValueError(f"sensor {name!r} needs a kind, or one for its name: {suggestion(str(name), kinds)}")
-            entry["kind"] = name
-        sensors[str(name)] = entry
+            settings["kind"] = name
+        sensors[str(name)] = settings
     return sensors
 
 

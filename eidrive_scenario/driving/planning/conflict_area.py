@@ -30,27 +30,27 @@ def _areas(value: Any) -> Any:
     explanation = "an area is [x0, x1, y0, y1], a list of such, or a polygon [[x, y], [x, y], [x, y], …], in meters"
     if not isinstance(value, Sequence) or isinstance(value, str) or not value:
         raise ValueError(explanation)
-    if all(isinstance(entry, (int, float)) for entry in value) or all(_is_point(entry) for entry in value):
+    if all(isinstance(bound, (int, float)) for bound in value) or all(_is_point(point) for point in value):
         value = [value]
     polygons: list[Polygon] = []
-    for entry in value:
-        if not isinstance(entry, Sequence) or isinstance(entry, str):
+    for area in value:
+        if not isinstance(area, Sequence) or isinstance(area, str):
             raise ValueError(explanation)
-        if len(entry) == 4 and all(isinstance(bound, (int, float)) for bound in entry):
-            x0, x1, y0, y1 = entry
+        if len(area) == 4 and all(isinstance(bound, (int, float)) for bound in area):
+            x0, x1, y0, y1 = area
             if x0 >= x1 or y0 >= y1:
-                raise ValueError(f"the rectangle {list(entry)} is empty: x0 < x1 and y0 < y1 are expected")
+                raise ValueError(f"the rectangle {list(area)} is empty: x0 < x1 and y0 < y1 are expected")
             polygons.append(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
-        elif len(entry) >= 3 and all(_is_point(point) for point in entry):
-            polygons.append(tuple((point[0], point[1]) for point in entry))
+        elif len(area) >= 3 and all(_is_point(point) for point in area):
+            polygons.append(tuple((point[0], point[1]) for point in area))
         else:
             raise ValueError(explanation)
     return tuple(polygons)
 
 
-def _is_point(entry: Any) -> bool:
+def _is_point(value: Any) -> bool:
     return (
-        isinstance(entry, (list, tuple)) and len(entry) == 2 and all(isinstance(part, (int, float)) for part in entry)
+        isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(part, (int, float)) for part in value)
     )
 
 
