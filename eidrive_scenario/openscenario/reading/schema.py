@@ -112,26 +112,26 @@ def _read(cls: type[Element], version: Version) -> Rules:
     other_children: dict[str, Usage] = {}
     spelling: dict[str, str] = {}
     text_field = ""
-    for entry in fields(cls):
-        usage: Usage = entry.metadata.get(USAGE, _PLAIN)
-        if entry.name in ABOUT:
+    for field in fields(cls):
+        usage: Usage = field.metadata.get(USAGE, _PLAIN)
+        if field.name in ABOUT:
             continue
         if usage.text:
-            text_field = entry.name
+            text_field = field.name
             continue
-        kind, extras, many = _kind(hints[entry.name])
+        kind, extras, many = _kind(hints[field.name])
         is_child = isinstance(kind, type) and issubclass(kind, Element)
-        name = usage.name or _xml_name(entry.name, capital=is_child)
+        name = usage.name or _xml_name(field.name, capital=is_child)
         if not is_known(usage, version):
             (other_children if is_child else other_attributes)[name] = usage
         elif is_child:
-            children[name] = _child(entry, usage, kind, many, version)
-            spelling[entry.name] = name
+            children[name] = _child(field, usage, kind, many, version)
+            spelling[field.name] = name
         else:
             attributes[name] = AttributeRule(
-                entry.name,
+                field.name,
                 _scalar(kind, extras, version),
-                _required(entry, usage, version),
+                _required(field, usage, version),
                 _deprecated(usage, version),
                 next((extra.kind for extra in extras if isinstance(extra, NameOf)), ""),
             )
@@ -173,14 +173,14 @@ def _scalar(kind: Any, extras: tuple[Any, ...], version: Version) -> Scalar:
     return scalars.whole_number(limits) if limits else _SCALARS[kind]
 
 
-def _child(entry: Field[Any], usage: Usage, kind: type[Element], many: bool, version: Version) -> ChildRule:
-    minimum = usage.minimum if _required(entry, usage, version) else 0
+def _child(field: Field[Any], usage: Usage, kind: type[Element], many: bool, version: Version) -> ChildRule:
+    minimum = usage.minimum if _required(field, usage, version) else 0
     single = many and bool(usage.single_until) and version <= parse_version(usage.single_until)
-    return ChildRule(entry.name, kind, minimum, many, single or not many, _deprecated(usage, version))
+    return ChildRule(field.name, kind, minimum, many, single or not many, _deprecated(usage, version))
 
 
-def _required(entry: Field[Any], usage: Usage, version: Version) -> bool:
-    without_default = entry.default is MISSING and entry.default_factory is MISSING
+def _required(field: Field[Any], usage: Usage, version: Version) -> bool:
+    without_default = field.default is MISSING and field.default_factory is MISSING
     return (
         without_default
         or usage.required
