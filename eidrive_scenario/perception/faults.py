@@ -106,18 +106,20 @@ def with_false_objects(detections: Detections, objects: Sequence[FalseObject], *
 
     with_velocity  whether the detector provides velocities
     """
-    numbers = [number for number, item in enumerate(objects) if item.is_reported(detections.time)]
+    numbers = [number for number, false_object in enumerate(objects) if false_object.is_reported(detections.time)]
     if not numbers:
         return detections
     added = [objects[number] for number in numbers]
-    scores = np.array([item.score for item in added])
-    velocity: Array = np.array([item.velocity if with_velocity else (math.nan, math.nan) for item in added])
-    covariance = np.array([np.eye(2) * item.deviation**2 for item in added])
+    scores = np.array([false_object.score for false_object in added])
+    velocity: Array = np.array(
+        [false_object.velocity if with_velocity else (math.nan, math.nan) for false_object in added]
+    )
+    covariance = np.array([np.eye(2) * false_object.deviation**2 for false_object in added])
     return Detections(
         detections.time,
-        np.concatenate([detections.boxes, np.array([item.box(detections.time) for item in added])]),
+        np.concatenate([detections.boxes, np.array([false_object.box(detections.time) for false_object in added])]),
         np.concatenate([detections.scores, scores]),
-        (*detections.classes, *(item.kind for item in added)),
+        (*detections.classes, *(false_object.kind for false_object in added)),
         np.concatenate([detections.velocity, velocity]),
         np.concatenate([detections.covariance, covariance]),
         (*detections.tracks, *(FIRST_TRACK + number for number in numbers)) if detections.tracks else (),
