@@ -93,13 +93,13 @@ class Participant:
 class WeightedChoice(Generic[T]):
     """Items with weights."""
 
-    things: Sequence[T]
+    choices: Sequence[T]
     weights: Sequence[float]
 
     def draw(self, rng: np.random.Generator) -> T:
         """Return a random item."""
         shares = np.cumsum(self.weights)
-        return self.things[int(np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))]
+        return self.choices[int(np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))]
 
 
 class TrafficMix:
@@ -147,10 +147,10 @@ class TrafficMix:
     def categories(self) -> frozenset[str]:
         """Categories of all bodies that can be drawn."""
         if self._groups is None:
-            pairs = zip(self._categories.things, self._categories.weights, strict=True)
+            pairs = zip(self._categories.choices, self._categories.weights, strict=True)
             categories = [CATEGORY_FALLBACKS.get(category, category) for category, weight in pairs if weight > 0.0]
             return frozenset(body.category for category in categories for body, _ in library_bodies(category))
-        return frozenset(member.spec.category for group in self._groups.things for member in group.things)
+        return frozenset(member.spec.category for group in self._groups.choices for member in group.choices)
 
     def _entries(self, distribution: model.TrafficDistribution) -> list[model.TrafficDistributionEntry]:
         """Return the entries in the file and those of catalogs, whose kind the reader has checked."""
@@ -185,13 +185,13 @@ class TrafficMix:
         lines = {entry.name: entry.line for entry in property_entries(controller)}
         return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line, lines=lines)
 
-    def _weighted(self, things: Sequence[T], entries: Sequence[model.Element]) -> WeightedChoice[T]:
+    def _weighted(self, choices: Sequence[T], entries: Sequence[model.Element]) -> WeightedChoice[T]:
         weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             where = entries[0]
             message = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are invalid"
             raise ScenarioError(Diagnostic.at(where, message, "give weights of at least 0, not all 0"))
-        return WeightedChoice(things, weights)
+        return WeightedChoice(choices, weights)
 
 
 def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:

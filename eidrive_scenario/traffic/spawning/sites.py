@@ -241,9 +241,9 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
         if start.s is None and number == 0 and not forward:
             here = first
         parts.append((Stretch(start.road, here if forward else 0.0, first if forward else here, start.lanes), forward))
-        for entry in between[::2]:
-            whole = roads.road(entry.road).length
-            parts.append((Stretch(entry.road, 0.0, whole), entry.side < 0))
+        for road_end in between[::2]:
+            whole = roads.road(road_end.road).length
+            parts.append((Stretch(road_end.road, 0.0, whole), road_end.side < 0))
         forward = entering.side < 0
         if end.s is None and number == len(cursors) - 2 and not forward:
             there = 0.0
@@ -282,13 +282,13 @@ def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list
     seen = {RoadEnd(start, 1), RoadEnd(start, -1)}
     while queue:
         chain = queue.popleft()
-        for entry in ends.get(chain[-1], ()):
-            if entry.road == goal:
-                return [*chain, entry]
-            if entry not in seen:
-                other = RoadEnd(entry.road, -entry.side)
-                seen |= {entry, other}
-                queue.append([*chain, entry, other])
+        for end in ends.get(chain[-1], ()):
+            if end.road == goal:
+                return [*chain, end]
+            if end not in seen:
+                other = RoadEnd(end.road, -end.side)
+                seen |= {end, other}
+                queue.append([*chain, end, other])
     raise PositionError(
         Diagnostic(f"no chain of roads leads from road {start!r} to road {goal!r}", "correct the road cursors")
     )
