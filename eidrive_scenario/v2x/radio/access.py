@@ -94,14 +94,14 @@ class MediumAccess(ABC):
         self._arrivals = deque(
             sorted(
                 [*self._arrivals, *transmissions],
-                key=lambda entry: (entry.ready, entry.message.sender, entry.message.number),
+                key=lambda transmission: (transmission.ready, transmission.message.sender, transmission.message.number),
             )
         )
 
     @property
     def waiting(self) -> list[Transmission]:
         """Transmissions that have not started."""
-        return [*self._arrivals, *(entry for queue in self._waiting for entry in queue)]
+        return [*self._arrivals, *(transmission for queue in self._waiting for transmission in queue)]
 
     @abstractmethod
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
@@ -141,9 +141,11 @@ class MediumAccess(ABC):
         """Replace the stations; return the pending transmissions of removed stations."""
         rows = [self._rows.get(name) for name in names]
         gone = [name for name in self.names if name not in names]
-        lost = [entry for name in gone for entry in self._waiting[self._rows[name]]]
-        lost += [entry for entry in self._arrivals if entry.message.sender in gone]
-        self._arrivals = deque(entry for entry in self._arrivals if entry.message.sender not in gone)
+        lost = [transmission for name in gone for transmission in self._waiting[self._rows[name]]]
+        lost += [transmission for transmission in self._arrivals if transmission.message.sender in gone]
+        self._arrivals = deque(
+            transmission for transmission in self._arrivals if transmission.message.sender not in gone
+        )
         self._waiting = [deque() if old is None else self._waiting[old] for old in rows]
         self._head = [None if old is None else self._head[old] for old in rows]
         self.contending = sum(head is not None for head in self._head)
@@ -155,11 +157,11 @@ class MediumAccess(ABC):
             ("_period_busy", 0.0),
         ):
             setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
-        for entry in self.active:
-            if entry.gain is not None:
-                entry.gain = reorder_rows(entry.gain, rows, 0.0)
-            if entry.busy is not None:
-                entry.busy = reorder_rows(entry.busy, rows, False) > 0.0
+        for transmission in self.active:
+            if transmission.gain is not None:
+                transmission.gain = reorder_rows(transmission.gain, rows, 0.0)
+            if transmission.busy is not None:
+                transmission.busy = reorder_rows(transmission.busy, rows, False) > 0.0
         self.gate = self.gate.reorder(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
@@ -171,7 +173,7 @@ class MediumAccess(ABC):
 
     def evict_before(self, time: float) -> None:
         """Remove transmissions that ended before this time [s] and overlap with no unfinished one."""
-        self.active = [entry for entry in self.active if entry.end > time]
+        self.active = [transmission for transmission in self.active if transmission.end > time]
 
     def _arrive(self, transmission: Transmission) -> list[Transmission]:
         row = self._rows[transmission.message.sender]
@@ -179,12 +181,12 @@ class MediumAccess(ABC):
         dropped: list[Transmission] = []
         index = len(queue)
         if self.queue.discipline == "lcfs" and queue:
-            if any(_is_outdated(transmission, by=entry) for entry in queue):
+            if any(_is_outdated(transmission, by=queued) for queued in queue):
                 return [transmission]
-            dropped = [entry for entry in queue if _is_outdated(entry, by=transmission)]
+            dropped = [queued for queued in queue if _is_outdated(queued, by=transmission)]
             index = queue.index(dropped[0]) if dropped else index
-            for entry in dropped:
-                queue.remove(entry)
+            for queued in dropped:
+                queue.remove(queued)
         if len(queue) >= self.queue.length:
             return [*dropped, transmission]
         queue.insert(index, transmission)
@@ -235,6 +237,6 @@ def reorder_rows(values: NDArray[Any], rows: Sequence[int | None], fresh: float)
     return np.array([fresh if old is None else values[old] for old in rows], dtype=float)
 
 
-def _is_outdated(entry: Transmission, *, by: Transmission) -> bool:
+def _is_outdated(transmission: Transmission, *, by: Transmission) -> bool:
     """Return True if another message of the same kind was sent in a later tick."""
-    return entry.sent < by.sent and entry.message.kind == by.message.kind
+    return transmission.sent < by.sent and transmission.message.kind == by.message.kind

@@ -118,12 +118,12 @@ class RadioChannel(QueuedChannel):
             number = reports.get(message.sender, message.number) if message.kind == "features" else message.number
             reports[message.sender] = number
             ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], number)
-            entry = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
+            transmission = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
             self._counters.send(row, rows, message.size)
             if self._jamming.blocks(message.sender):
-                self._drop(entry)
+                self._drop(transmission)
             else:
-                offered.append(entry)
+                offered.append(transmission)
         self._access.enqueue(offered)
         return self.drain_events()
 
@@ -132,7 +132,7 @@ class RadioChannel(QueuedChannel):
         return super().deliver(receiver, now)
 
     def in_flight(self) -> int:
-        undecided = sum(len(entry.receivers) for entry in [*self._access.waiting, *self._open])
+        undecided = sum(len(transmission.receivers) for transmission in [*self._access.waiting, *self._open])
         return super().in_flight() + undecided
 
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
@@ -184,9 +184,11 @@ class RadioChannel(QueuedChannel):
         self._entry_times = {name: self._entry_times.get(name, now) for name in names}
         self._counters.flush_into(self._links)
         lost = self._access.rearrange(names)
-        gone = [entry for entry in self._open if entry.message.sender not in names]
-        self._open = [entry for entry in self._open if entry not in gone]
-        self._access.active = [entry for entry in self._access.active if entry.message.sender in names]
+        gone = [transmission for transmission in self._open if transmission.message.sender not in names]
+        self._open = [transmission for transmission in self._open if transmission not in gone]
+        self._access.active = [
+            transmission for transmission in self._access.active if transmission.message.sender in names
+        ]
         self._rows = {name: row for row, name in enumerate(names)}
         self._receivers.clear()
         self._counters = LinkCounterTable(names)
@@ -195,9 +197,9 @@ class RadioChannel(QueuedChannel):
         self._jitter_keys = [key(self._seed, "jitter", name) for name in names]
         if self._fading is not None:
             self._fading.rearrange(names)
-        for entry in [*lost, *gone]:
-            for receiver in entry.receivers:
-                self._record_loss(entry, receiver, ABSENT)
+        for transmission in [*lost, *gone]:
+            for receiver in transmission.receivers:
+                self._record_loss(transmission, receiver, ABSENT)
 
     def _advance(self, now: float) -> None:
         """Simulate the medium up to `now`. Repeated calls at the same time have no effect."""
@@ -218,32 +220,34 @@ class RadioChannel(QueuedChannel):
             self._fading.distance = self._budget.distance
         power = self.profile.radiated - self._budget.loss
         started, dropped = self._access.advance(now, power)
-        for entry in dropped:
-            self._drop(entry)
+        for transmission in dropped:
+            self._drop(transmission)
         under_way = [*self._open, *started]
-        ended = [entry for entry in under_way if entry.end <= now]
-        self._open = [entry for entry in under_way if entry.end > now]
+        ended = [transmission for transmission in under_way if transmission.end <= now]
+        self._open = [transmission for transmission in under_way if transmission.end > now]
         if ended:
             self._receive(ended, power, self._budget)
-        self._access.evict_before(min((entry.start for entry in self._open), default=now))
+        self._access.evict_before(min((transmission.start for transmission in self._open), default=now))
 
-    def _drop(self, entry: Transmission) -> None:
+    def _drop(self, transmission: Transmission) -> None:
         """Record a message that was dropped from a queue."""
-        message = entry.message
-        sender, rows = self._rows[message.sender], self._rows_of(message.sender, entry.receivers)
+        message = transmission.message
+        sender, rows = self._rows[message.sender], self._rows_of(message.sender, transmission.receivers)
         self._counters.drop(sender, rows)
-        self._outcomes.append(DroppedBlock(entry, self._access.names, sender, rows))
-        self._record_absent(entry, rows)
+        self._outcomes.append(DroppedBlock(transmission, self._access.names, sender, rows))
+        self._record_absent(transmission, rows)
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Determine the receptions of ended transmissions and enqueue their deliveries."""
         receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys, self._jamming.power)
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
-        for index, entry in enumerate(ended):
-            present = self._rows_of(entry.message.sender, entry.receivers)
-            self._record_absent(entry, present)
-            receivers.append(present if plain else self._apply_loss(entry, present, receptions.causes[index], budget))
+        for index, transmission in enumerate(ended):
+            present = self._rows_of(transmission.message.sender, transmission.receivers)
+            self._record_absent(transmission, present)
+            receivers.append(
+                present if plain else self._apply_loss(transmission, present, receptions.causes[index], budget)
+            )
         block = ReceptionBlock(ended, receptions, budget, receivers)
         self._enqueue_deliveries(block)
         self._counters.decide(
@@ -263,50 +267,54 @@ class RadioChannel(QueuedChannel):
         for index, row in zip(indices.tolist(), block.reached_receivers[delivered].tolist(), strict=True):
             receivers[index].append(names[row])
         if isinstance(delay, ConstantDelay):
-            ends = np.array([entry.end + delay.seconds for entry in block.ended])
+            ends = np.array([transmission.end + delay.seconds for transmission in block.ended])
             block.arrives[delivered] = ends[indices]
-            for entry, arrives, reached in zip(block.ended, ends.tolist(), receivers, strict=True):
-                self._links.enqueue(queue_entry(entry.message, entry.sent, arrives), *reached)
+            for transmission, arrives, reached in zip(block.ended, ends.tolist(), receivers, strict=True):
+                self._links.enqueue(queue_entry(transmission.message, transmission.sent, arrives), *reached)
             return
         arrivals = []
-        for entry, reached in zip(block.ended, receivers, strict=True):
+        for transmission, reached in zip(block.ended, receivers, strict=True):
             for name in reached:
-                arrives = entry.end + delay_of(delay, self._draws, entry.message, name)
+                arrives = transmission.end + delay_of(delay, self._draws, transmission.message, name)
                 if not self.profile.reordering:
-                    link = (entry.message.sender, name)
+                    link = (transmission.message.sender, name)
                     arrives = self._last_arrival[link] = max(arrives, self._last_arrival.get(link, arrives))
                 arrivals.append(arrives)
-                self._links.enqueue(queue_entry(entry.message, entry.sent, arrives), name)
+                self._links.enqueue(queue_entry(transmission.message, transmission.sent, arrives), name)
         block.arrives[delivered] = arrivals
 
-    def _apply_loss(self, entry: Transmission, rows: Integers, causes: NDArray[np.int8], budget: Budget) -> Integers:
+    def _apply_loss(
+        self, transmission: Transmission, rows: Integers, causes: NDArray[np.int8], budget: Budget
+    ) -> Integers:
         """Apply the additional loss model; return the rows of receivers without an additional loss."""
         remaining = []
-        sender = self._rows[entry.message.sender]
+        sender = self._rows[transmission.message.sender]
         for row in rows.tolist():
             distance = float(budget.distance[sender, row])
             reason = None
             if causes[row] == DELIVERED:
-                reason = self._losses.reason(entry.message, budget.names[row], entry.sent, distance)
+                reason = self._losses.reason(transmission.message, budget.names[row], transmission.sent, distance)
             if reason is None:
                 remaining.append(row)
             else:
-                self._record_loss(entry, budget.names[row], reason, distance)
+                self._record_loss(transmission, budget.names[row], reason, distance)
         return np.array(remaining, dtype=np.int64)
 
-    def _record_absent(self, entry: Transmission, present: Integers) -> None:
-        if len(present) < len(entry.receivers):
-            for name in entry.receivers:
+    def _record_absent(self, transmission: Transmission, present: Integers) -> None:
+        if len(present) < len(transmission.receivers):
+            for name in transmission.receivers:
                 if name not in self._rows:
-                    self._record_loss(entry, name, ABSENT)
+                    self._record_loss(transmission, name, ABSENT)
 
-    def _record_loss(self, entry: Transmission, receiver: str, reason: str, distance: float | None = None) -> None:
+    def _record_loss(
+        self, transmission: Transmission, receiver: str, reason: str, distance: float | None = None
+    ) -> None:
         """Record the loss of a sent message for a reason outside the reception model."""
-        message = entry.message
+        message = transmission.message
         counters = self._links.counters(message.sender, receiver)
         counters.count_loss(reason)
         if distance is not None:
             counters.count_outcome(distance, False)
         self._dropped.append(
-            LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
+            LinkEvent(message.sender, receiver, message.number, transmission.sent, "lost", None, reason, message.size)
         )

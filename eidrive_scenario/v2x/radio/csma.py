@@ -48,19 +48,19 @@ class PreambleDetection:
             together, pending = pending[:count], pending[count:]
             busy = self._until > instant
             until = self._until.copy()
-            for entry in together:
-                entry.busy = busy
-                row = rows[entry.message.sender]
-                received = power[row] if entry.gain is None else power[row] + entry.gain
+            for transmission in together:
+                transmission.busy = busy
+                row = rows[transmission.message.sender]
+                received = power[row] if transmission.gain is None else power[row] + transmission.gain
                 locks = ~busy & (received >= self._sensing_dbm)
-                until[locks] = np.maximum(until[locks], entry.end)
-            for entry in together:
-                until[rows[entry.message.sender]] = entry.end
+                until[locks] = np.maximum(until[locks], transmission.end)
+            for transmission in together:
+                until[rows[transmission.message.sender]] = transmission.end
             self._until = until
 
 
-def _start(entry: Transmission) -> float:
-    return entry.start
+def _start(transmission: Transmission) -> float:
+    return transmission.start
 
 
 AIFS = 32e-6 + 6 * SLOT

@@ -56,13 +56,13 @@ class ReceptionBlock(OutcomeBlock):
             budget.states[senders, reached].tolist(),
             strict=True,
         ):
-            entry = self.ended[index]
-            message, (outcome, reason) = entry.message, OUTCOMES[cause]
+            transmission = self.ended[index]
+            message, (outcome, reason) = transmission.message, OUTCOMES[cause]
             yield LinkEvent(
                 sender=message.sender,
                 receiver=budget.names[row],
                 number=message.number,
-                sent=entry.sent,
+                sent=transmission.sent,
                 outcome=outcome,
                 arrives=arrives if cause == DELIVERED else None,
                 reason=reason,
@@ -91,8 +91,8 @@ class ReceptionBlock(OutcomeBlock):
 class DroppedBlock(OutcomeBlock):
     """Outcomes of a message that was dropped from its queue; `sender` and `receivers` are rows of `names`."""
 
-    def __init__(self, entry: Transmission, names: tuple[str, ...], sender: int, receivers: Integers) -> None:
-        self._entry = entry
+    def __init__(self, transmission: Transmission, names: tuple[str, ...], sender: int, receivers: Integers) -> None:
+        self._transmission = transmission
         self._names = names
         self._sender = sender
         self._receivers = receivers
@@ -101,14 +101,14 @@ class DroppedBlock(OutcomeBlock):
         return len(self._receivers)
 
     def __iter__(self) -> Iterator[LinkEvent]:
-        message, sent = self._entry.message, self._entry.sent
+        message, sent = self._transmission.message, self._transmission.sent
         for row in self._receivers.tolist():
             yield LinkEvent(
                 message.sender, self._names[row], message.number, sent, "lost", None, CAUSES[QUEUE], message.size
             )
 
     def columns(self) -> OutcomeColumns:
-        number, sent, size = _of_messages([self._entry])
+        number, sent, size = _of_messages([self._transmission])
         all_of_one = np.zeros(len(self._receivers), dtype=np.int64)
         return OutcomeColumns(
             self._names,
@@ -123,12 +123,12 @@ class DroppedBlock(OutcomeBlock):
         )
 
 
-def _of_messages(entries: Sequence[Transmission]) -> tuple[Integers, Array, Integers]:
+def _of_messages(transmissions: Sequence[Transmission]) -> tuple[Integers, Array, Integers]:
     """Return numbers, times of sending [s] and sizes [bytes], (T,) each."""
     return (
-        np.array([entry.message.number for entry in entries], dtype=np.int64),
-        np.array([entry.sent for entry in entries], dtype=float),
-        np.array([entry.message.size for entry in entries], dtype=np.int64),
+        np.array([transmission.message.number for transmission in transmissions], dtype=np.int64),
+        np.array([transmission.sent for transmission in transmissions], dtype=float),
+        np.array([transmission.message.size for transmission in transmissions], dtype=np.int64),
     )
 
 

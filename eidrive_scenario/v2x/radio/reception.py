@@ -67,18 +67,18 @@ class Receiver:
         keys     (N, N) keys of the links, by sender and receiver
         jamming  (N,) power of jammers at the receivers [mW]; None without a jammer
         """
-        rows = np.array([budget.rows[entry.message.sender] for entry in active], dtype=np.int64)
+        rows = np.array([budget.rows[transmission.message.sender] for transmission in active], dtype=np.int64)
         received = power.take(rows, axis=0)
-        for index, entry in enumerate(active):
-            if entry.gain is not None:
-                received[index] += entry.gain
-        index_of = {id(entry): index for index, entry in enumerate(active)}
-        own = np.array([index_of[id(entry)] for entry in ended], dtype=np.int64)
+        for index, transmission in enumerate(active):
+            if transmission.gain is not None:
+                received[index] += transmission.gain
+        index_of = {id(transmission): index for index, transmission in enumerate(active)}
+        own = np.array([index_of[id(transmission)] for transmission in ended], dtype=np.int64)
         senders, signal = rows.take(own), received.take(own, axis=0)
         links, states = keys.take(senders, axis=0), budget.states.take(senders, axis=0)
-        numbers = np.array([[entry.message.number] for entry in ended])
-        sizes = np.array([[entry.message.size] for entry in ended], dtype=float)
-        noise_dbm = np.array([[self.noises_dbm[entry.bands - 1]] for entry in ended])
+        numbers = np.array([[transmission.message.number] for transmission in ended])
+        sizes = np.array([[transmission.message.size] for transmission in ended], dtype=float)
+        noise_dbm = np.array([[self.noises_dbm[transmission.bands - 1]] for transmission in ended])
         draws, snr = uniforms(links, numbers), signal - noise_dbm
 
         def lost_with(disturbance: Array) -> Bools:
@@ -87,10 +87,10 @@ class Receiver:
             return draws < self._errors(signal - floor, states, sizes)
 
         losses = [(SENSING, signal < self.sensing_dbm), (PROPAGATION, draws < self._errors(snr, states, sizes))]
-        busy = [entry.busy for entry in ended if entry.busy is not None]
+        busy = [transmission.busy for transmission in ended if transmission.busy is not None]
         if busy:
             losses.append((BUSY, np.array(busy)))
-        controls = [entry.control for entry in ended if entry.control is not None]
+        controls = [transmission.control for transmission in ended if transmission.control is not None]
         if controls:
             control = np.array(controls)
             losses += [(PROPAGATION, control == PROPAGATION), (COLLISION, control == COLLISION)]
@@ -132,10 +132,10 @@ class Receiver:
 def _is_any_overlap(active: Sequence[Transmission]) -> bool:
     """Return whether any two transmissions overlap; with carrier sensing and few stations, none do."""
     end = -math.inf
-    for entry in sorted(active, key=lambda entry: entry.start):
-        if entry.start < end - TIME_TOLERANCE:
+    for transmission in sorted(active, key=lambda transmission: transmission.start):
+        if transmission.start < end - TIME_TOLERANCE:
             return True
-        end = max(end, entry.end)
+        end = max(end, transmission.end)
     return False
 
 
@@ -161,14 +161,15 @@ def _interference(
     rows      (A,) rows of the senders of `active`
     received  (A, N) received power of each transmission at each station [dBm]
     """
-    start, end = np.array([entry.start for entry in active]), np.array([entry.end for entry in active])
+    start = np.array([transmission.start for transmission in active])
+    end = np.array([transmission.end for transmission in active])
     overlapping = (start < end[own, None] - TIME_TOLERANCE) & (start[own, None] < end - TIME_TOLERANCE)
     overlapping[np.arange(len(own)), own] = False
     same_band, shares = overlapping, None
-    if len({(entry.first_band, entry.bands) for entry in active}) > 1:
+    if len({(transmission.first_band, transmission.bands) for transmission in active}) > 1:
         # An interferer in other subchannels contributes the share of its power that lies in those of the message.
-        first = np.array([entry.first_band for entry in active])
-        last = first + np.array([entry.bands for entry in active])
+        first = np.array([transmission.first_band for transmission in active])
+        last = first + np.array([transmission.bands for transmission in active])
         common = np.minimum(last, last[own, None]) - np.maximum(first, first[own, None])
         same_band, shares = overlapping & (common > 0), common / (last - first)
     half_duplex = np.zeros((len(own), received.shape[1]), dtype=bool)
