@@ -118,13 +118,17 @@ class SignalHead(NamedTuple):
 def buildings(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Building]:
     """Yield the buildings of a road network as boxes, except objects with some ids."""
     for placed in placed_objects(roads):
-        entry = placed.object
-        if entry.type != "building" or entry.id in without:
+        road_object = placed.object
+        if road_object.type != "building" or road_object.id in without:
             continue
-        height = max([placed.height or STOREY, *(corner.height for outline in entry.outlines for corner in outline)])
+        height = max(
+            [placed.height or STOREY, *(corner.height for outline in road_object.outlines for corner in outline)]
+        )
         for pose, length, width in footprint(roads, placed):
             center = (pose.x, pose.y, pose.z + height / 2)
-            yield Building(entry.name or f"building {entry.id}", center, (length or 1.0, width or 1.0, height), pose.h)
+            yield Building(
+                road_object.name or f"building {road_object.id}", center, (length or 1.0, width or 1.0, height), pose.h
+            )
 
 
 def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:
@@ -183,24 +187,26 @@ def _drivable(roads: RoadNetwork, here: LaneLocation) -> bool:
 
 
 def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:
-    entry = placed.object
-    kind = _KINDS.get(entry.type)
-    if kind is None and entry.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
+    road_object = placed.object
+    kind = _KINDS.get(road_object.type)
+    if kind is None and road_object.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
         kind = "obstacle"
     if kind is None:
         return
     usual = SIZES[kind]
-    height = max([placed.height, *(corner.height for outline in entry.outlines for corner in outline)]) or usual[2]
+    height = (
+        max([placed.height, *(corner.height for outline in road_object.outlines for corner in outline)]) or usual[2]
+    )
     if height < LEAST:
         return
-    name = entry.name or f"{kind} {entry.id}"
+    name = road_object.name or f"{kind} {road_object.id}"
     for pose, given_length, given_width in footprint(roads, placed):
         length, width = given_length or usual[0], given_width or usual[1]
         if kind == "tree":
             yield RoadObjectBody(name, kind, pose, length, width, height, TRUNK * height)
         elif kind == "vegetation":
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=False)
-        elif kind in ("pole", "lamp", "guide post") or entry.radius:
+        elif kind in ("pole", "lamp", "guide post") or road_object.radius:
             yield RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
         else:
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
@@ -211,11 +217,11 @@ def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, floa
 
     It is the box around its outlines, or a wall along each edge of an outline that covers too little of that box.
     """
-    entry = placed.object
-    if not entry.outlines or entry.repeats:
+    road_object = placed.object
+    if not road_object.outlines or road_object.repeats:
         return [(placed.pose, placed.length, placed.width)]
     box = bounding_box(roads, placed)
-    polygons = outlines(roads, entry)
+    polygons = outlines(roads, road_object)
     if len(polygons) == 1 and len(polygons[0]) > CONVEX and _area(polygons[0]) < FILLED * box[1] * box[2]:
         corners = polygons[0]
         return list(map(_wall, corners, np.roll(corners, -1, axis=0)))
