@@ -30,41 +30,54 @@ class PlacedObject(NamedTuple):
 
 def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
     """Yield all objects, with one item for each repetition."""
-    for item in network.objects:
-        if item.repeats:
-            yield from _repeated(network, item)
+    for road_object in network.objects:
+        if road_object.repeats:
+            yield from _repeated(network, road_object)
         else:
-            width = 2.0 * item.radius if item.radius else item.width
-            length = 2.0 * item.radius if item.radius else item.length
-            yield PlacedObject(item, _pose(network, item, item.s, item.t, item.z_offset), length, width, item.height)
+            width = 2.0 * road_object.radius if road_object.radius else road_object.width
+            length = 2.0 * road_object.radius if road_object.radius else road_object.length
+            yield PlacedObject(
+                road_object,
+                _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset),
+                length,
+                width,
+                road_object.height,
+            )
 
 
 def crosswalks(network: RoadNetwork) -> tuple[Array, ...]:
     """Return the outlines of all crosswalks as polygons (M, 3)."""
-    return tuple(outline for item in network.objects if item.type == "crosswalk" for outline in outlines(network, item))
+    return tuple(
+        outline
+        for road_object in network.objects
+        if road_object.type == "crosswalk"
+        for outline in outlines(network, road_object)
+    )
 
 
-def outlines(network: RoadNetwork, item: RoadObject) -> list[Array]:
+def outlines(network: RoadNetwork, road_object: RoadObject) -> list[Array]:
     """Return the outlines of an object on the ground as polygons (M, 3), by default from its length and width."""
-    if item.outlines:
-        return [_corners(network, item, outline) for outline in item.outlines if len(outline) >= 3]
-    if item.length <= 0.0 or item.width <= 0.0:
+    if road_object.outlines:
+        return [_corners(network, road_object, outline) for outline in road_object.outlines if len(outline) >= 3]
+    if road_object.length <= 0.0 or road_object.width <= 0.0:
         return []
-    half_length, half_width = 0.5 * item.length, 0.5 * item.width
+    half_length, half_width = 0.5 * road_object.length, 0.5 * road_object.width
     rectangle = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     return [
-        _corners(network, item, tuple(Corner(False, half_length * a, half_width * b, 0.0, 0.0) for a, b in rectangle))
+        _corners(
+            network, road_object, tuple(Corner(False, half_length * a, half_width * b, 0.0, 0.0) for a, b in rectangle)
+        )
     ]
 
 
-def _corners(network: RoadNetwork, item: RoadObject, outline: tuple[Corner, ...]) -> Array:
-    pose = _pose(network, item, item.s, item.t, item.z_offset)
+def _corners(network: RoadNetwork, road_object: RoadObject, outline: tuple[Corner, ...]) -> Array:
+    pose = _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset)
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     rows = []
     for corner in outline:
         if corner.on_road:
-            s = min(max(corner.x, 0.0), network.roads[item.road].length)
-            corner_pose = network.road_pose_at(item.road, s, corner.y)
+            s = min(max(corner.x, 0.0), network.roads[road_object.road].length)
+            corner_pose = network.road_pose_at(road_object.road, s, corner.y)
             rows.append((corner_pose.x, corner_pose.y, corner_pose.z + corner.z))
         else:
             rows.append(
@@ -77,15 +90,15 @@ def _corners(network: RoadNetwork, item: RoadObject, outline: tuple[Corner, ...]
     return np.array(rows)
 
 
-def _pose(network: RoadNetwork, item: RoadObject, s: float, t: float, z_offset: float) -> Pose:
-    length = network.roads[item.road].length
-    pose = network.road_pose_at(item.road, min(max(s, 0.0), length), t)
-    turn = item.heading + (math.pi if item.orientation == "-" else 0.0)
+def _pose(network: RoadNetwork, road_object: RoadObject, s: float, t: float, z_offset: float) -> Pose:
+    length = network.roads[road_object.road].length
+    pose = network.road_pose_at(road_object.road, min(max(s, 0.0), length), t)
+    turn = road_object.heading + (math.pi if road_object.orientation == "-" else 0.0)
     return pose._replace(z=pose.z + z_offset).turned(turn)
 
 
-def _repeated(network: RoadNetwork, item: RoadObject) -> Iterator[PlacedObject]:
-    for repeat in item.repeats:
+def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedObject]:
+    for repeat in road_object.repeats:
         gapless = repeat.distance <= 0.0
         step = min(LONGEST_PART, repeat.length) if gapless else repeat.distance
         if step <= 0.0:
@@ -98,6 +111,8 @@ def _repeated(network: RoadNetwork, item: RoadObject) -> Iterator[PlacedObject]:
             share = ds / repeat.length if repeat.length > 0.0 else 0.0
             ends = repeat.t, repeat.width, repeat.height, repeat.z_offset, repeat.size, repeat.radius
             t, width, height, z, length, radius = (a + (b - a) * share for a, b in ends)
-            length, width = (2.0 * radius, 2.0 * radius) if radius else (length or item.length, width or item.width)
-            pose = _pose(network, item, repeat.s + ds, t, z)
-            yield PlacedObject(item, pose, part if gapless else length, width, height or item.height)
+            length, width = (
+                (2.0 * radius, 2.0 * radius) if radius else (length or road_object.length, width or road_object.width)
+            )
+            pose = _pose(network, road_object, repeat.s + ds, t, z)
+            yield PlacedObject(road_object, pose, part if gapless else length, width, height or road_object.height)

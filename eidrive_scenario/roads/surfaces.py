@@ -342,12 +342,12 @@ def _edge(road: Road, section: LaneSection, lane: Lane, s: Array) -> Array:
 
 def object_strips(network: RoadNetwork) -> Iterator[tuple[str, Array]]:
     """Yield painted areas among the objects as convex polygons (M, 3). Crosswalks are split into stripes."""
-    for item in network.objects:
-        if item.type == "crosswalk":
-            for outline in outlines(network, item):
+    for road_object in network.objects:
+        if road_object.type == "crosswalk":
+            for outline in outlines(network, road_object):
                 yield from _stripes(outline)
-        elif item.type == "roadMark":
-            for outline in outlines(network, item):
+        elif road_object.type == "roadMark":
+            for outline in outlines(network, road_object):
                 yield "marking_white", outline
 
 

@@ -120,7 +120,7 @@ def read_controllers(
 
 def read_objects(road: str, element: etree._Element, collector: AttributeReader) -> list[RoadObject]:
     """Return the objects of one road."""
-    return [_read_object(road, item, collector) for item in element.iterfind("objects/object")]
+    return [_read_object(road, child, collector) for child in element.iterfind("objects/object")]
 
 
 def _read_object(road: str, element: etree._Element, collector: AttributeReader) -> RoadObject:
