@@ -147,9 +147,9 @@ class Sidelink(MediumAccess):
         self._sending = [sending for sending in self._sending if sending.row in former]
         for sending in self._sending:
             sending.row = former[sending.row]
-        for entry in self.active:
-            if entry.control is not None:
-                entry.control = reorder_rows(entry.control, rows, PROPAGATION).astype(np.int8)
+        for transmission in self.active:
+            if transmission.control is not None:
+                transmission.control = reorder_rows(transmission.control, rows, PROPAGATION).astype(np.int8)
         self._history.rearrange(rows)
         self._keys = self._sci_keys()
 
