@@ -133,8 +133,8 @@ def entry_points_of(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
             if not isinstance(value, str) or ":" not in value or EntryPoint.pattern.match(value) is None:
                 raise _error(path, f"entry point {name}: {quoted(str(value))}", "write package.module:Object")
         by_group[group.removeprefix(_GROUP)] = tuple(EntryPoint(name, value, group) for name, value in points.items())
-    for entry in reversed(folders):
-        if (directory := str((folder / entry).resolve())) not in sys.path:
+    for relative in reversed(folders):
+        if (directory := str((folder / relative).resolve())) not in sys.path:
             sys.path.insert(0, directory)
     return by_group
 
@@ -154,7 +154,7 @@ def modules_of(folder: Path) -> tuple[str, ...]:
 def _texts(path: Path, content: dict[str, Any], name: str, hint: str) -> list[str]:
     """Return a list of texts in the table `tool.eidrive`. Raise SettingError for another value."""
     texts = content.get("tool", {}).get("eidrive", {}).get(name, [])
-    if not isinstance(texts, list) or not all(isinstance(entry, str) for entry in texts):
+    if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
         raise _error(path, f"tool.eidrive.{name}: {quoted(str(texts))}", hint)
     return texts
 

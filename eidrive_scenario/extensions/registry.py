@@ -310,8 +310,12 @@ def _signature_difference(own: Any, plain: Any, expected: Any) -> str:
     except (TypeError, ValueError):
         return ""
     parameters = wanted.parameters.values()
-    named = {entry.name: None for entry in parameters if entry.kind is entry.KEYWORD_ONLY}
-    positional = [None for entry in parameters if entry.kind in (entry.POSITIONAL_ONLY, entry.POSITIONAL_OR_KEYWORD)]
+    named = {parameter.name: None for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY}
+    positional = [
+        None
+        for parameter in parameters
+        if parameter.kind in (parameter.POSITIONAL_ONLY, parameter.POSITIONAL_OR_KEYWORD)
+    ]
     try:
         given.bind(*positional[isinstance(own, staticmethod) :], **named)
     except TypeError as error:
