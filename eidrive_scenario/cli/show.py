@@ -50,7 +50,9 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     from eidrive_scenario.extensions.registry import registry
 
     if what is Names.scenarios:
-        lines = _columns([(entry.name, entry.family, entry.description) for entry in library.describe_scenarios()])
+        lines = _columns(
+            [(scenario.name, scenario.family, scenario.description) for scenario in library.describe_scenarios()]
+        )
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
     elif what is Names.weather:
