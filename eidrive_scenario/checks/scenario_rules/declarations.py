@@ -110,8 +110,8 @@ def _stations_with_senders(context: LintContext) -> set[str]:
         for controller in assigned
         if is_agent_controller(controller)
     }
-    entries = (entry.name for controller in stations.values() for entry in property_entries(controller))
-    return set(stations) if "cooperates_with" in entries else set()
+    names = (declared.name for controller in stations.values() for declared in property_entries(controller))
+    return set(stations) if "cooperates_with" in names else set()
 
 
 def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
