@@ -253,15 +253,15 @@ class TrafficAreaAction(TrafficInstanceAction):
 
     def _road_ranges(self) -> list[traffic.Stretch]:
         ranges = []
-        for entry in self.action.traffic_area.road_range:
+        for road_range in self.action.traffic_area.road_range:
             cursors = [
                 traffic.Cursor(cursor.road_id, cursor.s, tuple(lane.id for lane in cursor.lane))
-                for cursor in entry.road_cursor
+                for cursor in road_range.road_cursor
             ]
             try:
-                ranges += traffic.road_range(self._roads, cursors, entry.length)
+                ranges += traffic.road_range(self._roads, cursors, road_range.length)
             except InputError as error:
-                diagnostics = [Diagnostic.at(entry, d.message, d.hint) for d in error.diagnostics]
+                diagnostics = [Diagnostic.at(road_range, d.message, d.hint) for d in error.diagnostics]
                 raise ScenarioError(diagnostics) from error
         return ranges
 
