@@ -91,21 +91,21 @@ def _crowding(dataset: Dataset) -> NDArray[np.float64]:
     return shares
 
 
-def _detected_vehicles(entries: list[EvaluatedImage], dataset: Dataset) -> Bools:
+def _detected_vehicles(images: list[EvaluatedImage], dataset: Dataset) -> Bools:
     """Return the vehicles (N,) that a detector detects at its confidence, as any class of vehicle."""
     detected = np.zeros(len(dataset.number), dtype=bool)
     required = _required(dataset)
-    for index, entry in enumerate(entries):
+    for index, image in enumerate(images):
         rows = dataset.objects(index)
         vehicle_rows = rows[required[rows]]
         confident = np.array(
             [
-                name in VEHICLES and score >= entry.confidence
-                for name, score in zip(entry.detections.classes, entry.detections.scores.tolist(), strict=True)
+                name in VEHICLES and score >= image.confidence
+                for name, score in zip(image.detections.classes, image.detections.scores.tolist(), strict=True)
             ],
             dtype=bool,
         )
-        boxes, scores = entry.detections.boxes[confident], entry.detections.scores[confident]
+        boxes, scores = image.detections.boxes[confident], image.detections.scores[confident]
         ignored = np.zeros(len(vehicle_rows), dtype=bool)
         detected[vehicle_rows] = match(boxes, scores, dataset.box[vehicle_rows].astype(float), ignored).found
     return detected

@@ -78,10 +78,10 @@ def _random_roads(rng: np.random.Generator, path: Path) -> RoadNetwork:
     if rng.random() < 0.65:
         make_roads.write(random_crossing(rng).layout(), path)
         root = etree.parse(path).getroot()
-        for item in root.iterfind(".//object[@type='building']"):
-            holder = item.getparent()
+        for building in root.iterfind(".//object[@type='building']"):
+            holder = building.getparent()
             if holder is not None:
-                holder.remove(item)
+                holder.remove(building)
         vary_signals(root, rng)
     else:
         root = winding_road(rng)

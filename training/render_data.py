@@ -100,8 +100,8 @@ def _inside(view: View, place: Place) -> bool:
 
 def table(images: list[Shot]) -> dict[str, Any]:
     """Return the columns of a dataset."""
-    labels = [(row, label) for row, entry in enumerate(images) for label in entry.labels]
-    camera = np.array([entry.camera for entry in images])
+    labels = [(row, label) for row, image in enumerate(images) for label in image.labels]
+    camera = np.array([image.camera for image in images])
     scale = np.array(STORED) / camera[:, :2]
     image_row = np.array([row for row, _ in labels], dtype=np.int64)
     box = np.array([label.box for _, label in labels]).reshape(-1, 4)
@@ -109,9 +109,9 @@ def table(images: list[Shot]) -> dict[str, Any]:
         "size": np.tile(np.array(STORED), (len(images), 1)),
         "scale": scale,
         "camera": camera,
-        "weather": np.array([entry.weather.name for entry in images]),
-        "visual_range": np.array([entry.weather.visual_range for entry in images]),
-        "sun_elevation": np.array([entry.weather.sun_elevation for entry in images]),
+        "weather": np.array([image.weather.name for image in images]),
+        "visual_range": np.array([image.weather.visual_range for image in images]),
+        "sun_elevation": np.array([image.weather.sun_elevation for image in images]),
         "picture": image_row,
         "number": np.array([label.number for _, label in labels], dtype=np.int64),
         "box": (box * np.tile(scale[image_row], 2)).astype(np.float32),
@@ -155,9 +155,9 @@ def main() -> None:
         for world_shots in render(options.seed, options.split, options.worlds, options.first, options.processes):
             images += world_shots
             progress.advance(bar)
-    write(options.out / options.split, [entry.data for entry in images], table(images))
-    size = sum(len(entry.data) for entry in images) / 2**20
-    objects = sum(len(entry.labels) for entry in images)
+    write(options.out / options.split, [image.data for image in images], table(images))
+    size = sum(len(image.data) for image in images) / 2**20
+    objects = sum(len(image.labels) for image in images)
     elapsed = time.perf_counter() - started
     print(f"{len(images)} images, {objects} objects, {size:.1f} MiB in {elapsed:.0f} s")
 

@@ -115,17 +115,17 @@ def as_one_light(images: Sequence[EvaluatedImage]) -> list[EvaluatedImage]:
     return [
         EvaluatedImage(
             Objects(
-                entry.objects.boxes,
-                merge_lights(entry.objects.names),
-                entry.objects.height,
-                entry.objects.distance,
-                entry.objects.to_find,
+                image.objects.boxes,
+                merge_lights(image.objects.names),
+                image.objects.height,
+                image.objects.distance,
+                image.objects.to_find,
             ),
-            ImageDetections(entry.detections.boxes, entry.detections.scores, merge_lights(entry.detections.classes)),
-            entry.weather,
-            entry.confidence,
+            ImageDetections(image.detections.boxes, image.detections.scores, merge_lights(image.detections.classes)),
+            image.weather,
+            image.confidence,
         )
-        for entry in images
+        for image in images
     ]
 
 
