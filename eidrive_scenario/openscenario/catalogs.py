@@ -123,7 +123,7 @@ class CatalogLibrary:
                 self._circular.add(reference)
                 continue
             if reference not in self.entries:
-                entry = self._entry(use, (*active, names))
+                entry = self._read_entry(use, (*active, names))
                 if entry is not None and reference not in self._circular:
                     self.entries[reference] = entry
             self._check_kind(use)
@@ -143,7 +143,7 @@ class CatalogLibrary:
             return None
         return CatalogFiles(self.folders, {path: catalog.document.digest for path, catalog in catalogs.items()})
 
-    def _entry(self, use: ReferenceUse, active: tuple[tuple[str, str], ...]) -> model.Element | None:
+    def _read_entry(self, use: ReferenceUse, active: tuple[tuple[str, str], ...]) -> model.Element | None:
         reference = use.reference
         catalog = self._catalog(use)
         if catalog is None:
