@@ -202,7 +202,7 @@ def declare_criteria(
         raise SettingError(Diagnostic(message, f"write {_EXAMPLE}", source, line))
     declarations = []
     diagnostics: list[Diagnostic] = []
-    for kind, settings, lines in _items(entries, known_lines, several=isinstance(data, list)):
+    for kind, settings, lines in _criterion_settings(entries, known_lines, several=isinstance(data, list)):
         here = lines.get("", line)
         try:
             origins = parameter_hints(settings, scope)
@@ -231,7 +231,7 @@ def build_criteria(declarations: Iterable[CriterionDeclaration], taken: Collecti
     return criteria
 
 
-def _items(
+def _criterion_settings(
     entries: list[dict[Any, Any]], known_lines: Mapping[str, int], *, several: bool
 ) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
     """Yield kind and settings of each criterion, and the lines of its settings; the empty key has its own line."""
