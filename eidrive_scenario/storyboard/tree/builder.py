@@ -276,24 +276,26 @@ class Builder:
             return None
         groups = []
         for group in trigger.condition_group:
-            evaluators = [evaluator for entry in group.condition if (evaluator := self._evaluator(entry)) is not None]
+            evaluators = [
+                evaluator for element in group.condition if (evaluator := self._build_evaluator(element)) is not None
+            ]
             groups.append(ConditionGroup(tuple(evaluators)))
         return WaitForTrigger(name, Trigger(groups), self._context)
 
-    def _evaluator(self, entry: model.Condition) -> ConditionEvaluator | None:
+    def _build_evaluator(self, element: model.Condition) -> ConditionEvaluator | None:
         try:
-            condition = self._condition(entry)
+            condition = self._build_condition(element)
         except ScenarioError as error:
             self._diagnostics += error.diagnostics
             return None
         if condition is None:
             return None
         self._built.append(condition)
-        return ConditionEvaluator(condition, name=entry.name, edge=entry.condition_edge.value, delay=entry.delay)
+        return ConditionEvaluator(condition, name=element.name, edge=element.condition_edge.value, delay=element.delay)
 
-    def _condition(self, entry: model.Condition) -> Condition | None:
-        by_entity = entry.by_entity_condition
-        leaf = (entry.chosen() if by_entity is None else by_entity.entity_condition).chosen()
+    def _build_condition(self, element: model.Condition) -> Condition | None:
+        by_entity = element.by_entity_condition
+        leaf = (element.chosen() if by_entity is None else by_entity.entity_condition).chosen()
         name = _registered_name(leaf, self._conditions)
         if not self._is_registered(name, self._conditions, leaf, f"{name} is not supported"):
             return None
