@@ -132,7 +132,7 @@ class SynchronizeAction(ActionBehaviour):
             message = f"{self.actor.name} cannot arrive in time: this takes more than its maximum speed, {top:g} m/s"
             self.context.warn(*self.error(message, "specify a shorter distance or more time").diagnostics)
         if final is not None:
-            motion.set_speed(sense * min(self._next(present, way, time, final, dt), top))
+            motion.set_speed(sense * min(self._next_speed(present, way, time, final, dt), top))
         elif math.isfinite(time):
             motion.set_speed(sense * min(present + 2.0 * (way / time - present) / time * dt, top))
         return Status.RUNNING
@@ -144,7 +144,7 @@ class SynchronizeAction(ActionBehaviour):
             message = f"the speed changes to {final:g} m/s at once at the target, which the actor reaches {way}"
             self.context.warn(*self.error(message, f"specify a final speed of {bound} 0 m/s").diagnostics)
 
-    def _next(self, speed: float, way: float, time: float, final: float, dt: float) -> float:
+    def _next_speed(self, speed: float, way: float, time: float, final: float, dt: float) -> float:
         """Return the speed at the end of the step, as all speeds in the direction of motion [m/s]."""
         steady = self._steady_distance(final)
         if steady > 0.0 and final > EPSILON:
