@@ -53,7 +53,7 @@ def run_rules(
         roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     except InputError:
         rules = RULES
-    yield from _run(rules, RoadLintContext(scenario, roads, tuple(added)), ignored)
+    yield from _run_rules(rules, RoadLintContext(scenario, roads, tuple(added)), ignored)
 
 
 def check_rule_names(ignored: Collection[str]) -> None:
@@ -64,7 +64,7 @@ def check_rule_names(ignored: Collection[str]) -> None:
             raise SettingError(Diagnostic(f"unknown rule {name!r}", suggestion(name, names)))
 
 
-def _run(rules: Iterable[Rule[S]], context: S, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
+def _run_rules(rules: Iterable[Rule[S]], context: S, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
     for rule in rules:
         if rule.name not in ignored:
             for diagnostic in rule.run(context):
@@ -126,7 +126,7 @@ def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
 
 def _road_file_diagnostics(path: Path, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
     try:
-        yield from _run(ROAD_FILE_RULES, RoadFileContext(RoadNetwork.load(path)), ignored)
+        yield from _run_rules(ROAD_FILE_RULES, RoadFileContext(RoadNetwork.load(path)), ignored)
     except InputError as error:
         yield from _errors(error)
 

@@ -113,18 +113,18 @@ class ReachabilityAnalysis:
     def _advance(self, node: Node) -> bool:
         states = self._states
         stop = stop_trigger(node)
-        start = self._earliest(node, node.start, starts=True) if node.start else self._first(node, starts=True)
+        start = self._earliest(node, node.start, starts=True) if node.start else self._first_time(node, starts=True)
         stopped = self._earliest(node, stop, starts=False) if stop and node.parent else math.inf
         return states.improve(node, start, stopped)
 
-    def _first(self, node: Node, *, starts: bool) -> float:
+    def _first_time(self, node: Node, *, starts: bool) -> float:
         """Return the earliest evaluation of a start trigger (start of the parent) or stop trigger (own start) [s]."""
         if node.parent is None:
             return 0.0
         return self._states.start[node.parent if starts else node]
 
     def _earliest(self, node: Node, trigger: Trigger, *, starts: bool) -> float:
-        first = self._first(node, starts=starts)
+        first = self._first_time(node, starts=starts)
         if first == math.inf:
             return first
         intervals = union(self._analyze(group, node, starts, first).intervals for group in trigger.condition_group)
@@ -134,7 +134,7 @@ class ReachabilityAnalysis:
         """Yield the analyses of all triggers that are evaluated at some time."""
         for node in self._outline.nodes:
             for trigger, starts in ((node.start, True), (stop_trigger(node), False)):
-                first = self._first(node, starts=starts)
+                first = self._first_time(node, starts=starts)
                 if trigger is not None and first < math.inf:
                     groups = tuple(self._analyze(group, node, starts, first) for group in trigger.condition_group)
                     yield TriggerAnalysis(node, trigger, starts, first, groups)

@@ -174,7 +174,7 @@ class Outline:
         teleported = {
             name
             for private in actions.private
-            if any(_places(action) for action in private.private_action)
+            if any(_is_placing(action) for action in private.private_action)
             for name in self.members(private.entity_ref)
         }
         added = {
@@ -191,7 +191,7 @@ class Outline:
     @cached_property
     def placed(self) -> frozenset[str]:
         """Return the entities that are in the world at some time."""
-        later = {name for action, actors in self.performances if _places(action) for name in actors}
+        later = {name for action, actors in self.performances if _is_placing(action) for name in actors}
         added = {
             name
             for element in self.elements
@@ -239,7 +239,7 @@ class Outline:
         return tuple(open_document(source).root for source in (scenario, *map(Path, catalogs)))
 
 
-def _places(action: model.PrivateAction) -> bool:
+def _is_placing(action: model.PrivateAction) -> bool:
     """Whether an action places its actor; an absent actor starts a trajectory at its first point."""
     return any(isinstance(below, model.TeleportAction | model.FollowTrajectoryAction) for below in action.walk())
 
