@@ -98,11 +98,11 @@ class StationAction(msgspec.Struct, frozen=True):
     def __post_init__(self) -> None:
         speed, control = self.target_speed, self.control
         if speed is not None:
-            _check("target_speed", speed, 0.0, MAX_TARGET_SPEED)
+            _check_range("target_speed", speed, 0.0, MAX_TARGET_SPEED)
         if control is not None:
-            _check("control.throttle", control.throttle, 0.0, 1.0)
-            _check("control.brake", control.brake, 0.0, 1.0)
-            _check("control.steering", control.steering, -math.pi, math.pi)
+            _check_range("control.throttle", control.throttle, 0.0, 1.0)
+            _check_range("control.brake", control.brake, 0.0, 1.0)
+            _check_range("control.steering", control.steering, -math.pi, math.pi)
 
     @property
     def drives(self) -> bool:
@@ -138,7 +138,7 @@ OWN_DECISIONS = StationAction()
 """Action that leaves all decisions to the stack."""
 
 
-def _check(name: str, value: object, low: float, high: float) -> None:
+def _check_range(name: str, value: object, low: float, high: float) -> None:
     if not (isinstance(value, Real) and low <= float(value) <= high):
         message = f"{name} of an action is {quoted(value)}"
         raise SettingError(Diagnostic(message, f"give a number from {low:.6g} to {high:.6g}"))

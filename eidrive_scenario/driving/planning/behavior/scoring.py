@@ -109,7 +109,7 @@ def evaluate(
         touching, lack = _overlaps(rolled, offsets, stops, scene.rows(near), times, ego, settings)
         risk = (lack.max(axis=1) * (1.0 - FARTHER * times / horizon)).max(axis=1)
         if touching.any():
-            collision, step, cause = _first(touching, times)
+            collision, step, cause = _first_event(touching, times)
             cause = np.where(cause >= 0, near[cause], -1)
             impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
     far = max(wanted * horizon, 1.0)
@@ -150,7 +150,7 @@ def _offsets(options: Sequence[Option], rolled: Rollout, ego: Body) -> Array:
     return offsets
 
 
-def _first(events: Bools, times: Array) -> tuple[Array, Array, Array]:
+def _first_event(events: Bools, times: Array) -> tuple[Array, Array, Array]:
     """Return time, its index and hypothesis of the first entry of `events` (P, N, K) for each proposal."""
     anyone: Bools = np.asarray(events.any(axis=1))
     step, rows = anyone.argmax(axis=1), np.arange(len(events))
