@@ -46,7 +46,7 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Pr
 def _interval(successes: int, trials: int, confidence: float, method: Literal["wilson", "exact"]) -> Proportion:
     from scipy.stats import binomtest  # takes half a second, which a run without statistics need not spend
 
-    _check(successes, trials, confidence)
+    _check_proportion(successes, trials, confidence)
     interval = binomtest(successes, trials).proportion_ci(confidence, method=method)
     return Proportion(successes, trials, float(interval.low), float(interval.high), confidence)
 
@@ -65,9 +65,9 @@ def anytime_interval(successes: int, trials: int, confidence: float = 0.95) -> P
     from scipy.optimize import brentq
 
     if trials == 0 and successes == 0:
-        _check(0, 1, confidence)
+        _check_proportion(0, 1, confidence)
         return Proportion(0, 0, 0.0, 1.0, confidence)
-    _check(successes, trials, confidence)
+    _check_proportion(successes, trials, confidence)
     failures = trials - successes
     bound = -math.log1p(-confidence)
     mixture = float(betaln(successes + 1, failures + 1))
@@ -82,7 +82,7 @@ def anytime_interval(successes: int, trials: int, confidence: float = 0.95) -> P
     return Proportion(successes, trials, low, high, confidence)
 
 
-def _check(successes: int, trials: int, confidence: float) -> None:
+def _check_proportion(successes: int, trials: int, confidence: float) -> None:
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"proportion: invalid counts (got {successes} of {trials})")
     if not 0.0 < confidence < 1.0:

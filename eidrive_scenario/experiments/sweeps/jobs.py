@@ -244,7 +244,7 @@ class SweepPlan:
         run = int(point[RUN]) if RUN in point else None
         contents = {name: digest for name in point if (digest := self.contents.get((name, point[name]))) is not None}
         inputs = {"inputs": self.inputs, "contents": contents}
-        content = {**inputs, "run": run, "seed": seed, "settings": _plain(settings)}
+        content = {**inputs, "run": run, "seed": seed, "settings": _settings_as_json(settings)}
         return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
 
 
@@ -368,13 +368,13 @@ def source_of(job: SweepJob) -> Path | ConcreteRun:
     return job.scenario if job.run is None else load_distribution(job.scenario)[job.run]
 
 
-def _plain(settings: RunSettings) -> dict[str, Any]:
-    return {name: _text(value) for name, value in asdict(settings).items()}
+def _settings_as_json(settings: RunSettings) -> dict[str, Any]:
+    return {name: _as_json(value) for name, value in asdict(settings).items()}
 
 
-def _text(value: Any) -> Any:
+def _as_json(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {str(key): _text(item) for key, item in value.items()}
+        return {str(key): _as_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_text(item) for item in value]
+        return [_as_json(item) for item in value]
     return value if value is None or isinstance(value, str | int | float | bool) else str(value)

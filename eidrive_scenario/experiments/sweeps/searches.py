@@ -97,12 +97,12 @@ class BoundarySearch:
         """Return the values of the next runs. Their outcomes are assumed to be the likelier ones for each other."""
         held, proposals = self._log.copy(), []
         for _ in range(count):
-            x, likelier = self._next(held)
+            x, likelier = self._next_value(held)
             proposals.append(x)
             held = held + self._log_likelihood(x, likelier)
         return proposals
 
-    def _next(self, log: Array) -> tuple[float, bool]:
+    def _next_value(self, log: Array) -> tuple[float, bool]:
         """Return the value with the minimum expected entropy of the boundary, and its likelier outcome."""
         posterior = _normalized(log)
         weighted = self._rates * posterior

@@ -203,7 +203,7 @@ class ResultStore:
         """Yield all runs in the order of their sweep."""
         left = max(_SMALL_SETTINGS, _MAX_COMPRESSION_RATIO * self.path.stat().st_size)
         for row in self._select("SELECT * FROM runs ORDER BY number, key"):
-            run = self._run(row, left)
+            run = self._read_run(row, left)
             left -= len(run.settings)
             yield run
 
@@ -214,7 +214,7 @@ class ResultStore:
             rows = [*self._select("SELECT * FROM runs WHERE key = ?", key)]
             if not rows:
                 raise KeyError(key)
-            runs.append(self._run(rows[0]))
+            runs.append(self._read_run(rows[0]))
         return runs
 
     def _select(self, statement: str, *values: str) -> Iterator[tuple[Any, ...]]:
@@ -224,7 +224,7 @@ class ResultStore:
         except sqlite3.Error as error:
             raise _damaged(_reason(error), self.path) from error
 
-    def _run(self, row: Sequence[Any], largest: int = _MAX_SETTINGS) -> StoredRun:
+    def _read_run(self, row: Sequence[Any], largest: int = _MAX_SETTINGS) -> StoredRun:
         """Return the run of a row with settings of at most `largest` bytes. Raise SettingError if it is damaged."""
         try:
             return _stored_run(row, min(largest, _MAX_SETTINGS))
