@@ -203,7 +203,7 @@ def write_parquet(run: RecordedRun, path: Path, table: str) -> None:
         parquet.ParquetWriter(stream, schema, compression="zstd") as writer,
     ):
         while group := list(islice(rows, _GROUP)):
-            columns = [[_known(value) for value in column] for column in zip(*group, strict=True)]
+            columns = [[_null_for_nan(value) for value in column] for column in zip(*group, strict=True)]
             writer.write_table(arrow.table(columns, schema=schema))
 
 
@@ -212,12 +212,12 @@ def _schema(arrow: Any, columns: Columns) -> Any:
     return arrow.schema([(name, types[kind]) for name, kind in columns.items()])
 
 
-def _known(value: Any) -> Any:
+def _null_for_nan(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def _field(value: Any) -> str:
-    value = _known(value)
+    value = _null_for_nan(value)
     if value is None:
         return ""
     if isinstance(value, bool):
