@@ -197,7 +197,7 @@ class Localizer:
         """Return the readings with the estimated motion, and with the sensor poses that follow from it."""
         truth = readings.ego
         if self._filter is None:
-            self._filter = InertialFilter(self._first(truth), self._noise)
+            self._filter = InertialFilter(self._initial_estimate(truth), self._noise)
         else:
             self._filter.begin_step()
         if self._imu is not None or readings.imu is not None:
@@ -218,7 +218,7 @@ class Localizer:
         )
         return at_pose(readings, self._ego)
 
-    def _first(self, truth: EgoState) -> Estimate:
+    def _initial_estimate(self, truth: EgoState) -> Estimate:
         seed, *key = self._key
         start, noise = self._start, self._noise
         deviations = np.array(

@@ -103,7 +103,7 @@ class ImageDetector(Detector):
         key = None if memory is None else self._key_of(self._network, readings)
         result = None if memory is None or key is None else memory.stations.get(key)
         if result is None:
-            result = self._process(self._network, readings)
+            result = self._detect_objects(self._network, readings)
             if memory is not None and key is not None:
                 objects = result.objects
                 image_memory.read_only(objects.boxes, objects.scores, objects.velocity, objects.covariance)
@@ -111,7 +111,7 @@ class ImageDetector(Detector):
         self.image_detections, self._signals, objects = result
         return objects
 
-    def _process(self, network: ImageNetwork, readings: Readings) -> StationDetections:
+    def _detect_objects(self, network: ImageNetwork, readings: Readings) -> StationDetections:
         prepared, self._prepared = self._prepared, {}
         images = {
             camera: prepared[camera] if camera in prepared else network.find_in(reading)

@@ -194,7 +194,7 @@ def _fit_points(
         others = np.zeros(len(places), dtype=bool)
         for other in range(len(boxes)):
             if other != row:
-                others |= _within(places, boxes[other])
+                others |= _inside_box(places, boxes[other])
         fit = _foreground(scan, camera, target, places, away, others)
         points.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
     return points
@@ -248,8 +248,8 @@ def _foreground(
     places   (N, 2) image positions of all points of the scan [px]; infinitely far aside for points behind the camera
     away     (N,) distances from the camera [m];  others  (N,) whether points are in another image box
     """
-    inside = _within(places, target.box)
-    around = _within(places, _widened(target))
+    inside = _inside_box(places, target.box)
+    around = _inside_box(places, _widened(target))
     parts = [np.flatnonzero(around)]
     if (inside & others).any():
         parts.append(np.flatnonzero(around & ~others))
@@ -303,7 +303,7 @@ def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_
     return fit
 
 
-def _within(places: Array, box: Sequence[float]) -> NDArray[np.bool_]:
+def _inside_box(places: Array, box: Sequence[float]) -> NDArray[np.bool_]:
     left, top, right, bottom = box
     x, y = places[:, 0], places[:, 1]
     return np.asarray((x >= left) & (x <= right) & (y >= top) & (y <= bottom))

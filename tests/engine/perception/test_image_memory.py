@@ -151,7 +151,7 @@ def test_station_results_are_shared_for_equal_readings_only(
         processed.append(readings)
         return StationDetections({}, (), Detections(readings.time))
 
-    monkeypatch.setattr(LearnedDetector, "_process", process)
+    monkeypatch.setattr(LearnedDetector, "_detect_objects", process)
     first, second = YoloDetector(), YoloDetector()
     found = first.detect(readings_of())
     assert second.detect(readings_of()) is found
