@@ -34,7 +34,7 @@ class JsonText:
 
     def __init__(self, kind: type) -> None:
         self._codec = codec(kind)
-        self._is_finite = _check(kind)
+        self._is_finite = _check_of(kind)
         self._arrays = _ArrayTexts()
         self._encoder = msgspec.json.Encoder(enc_hook=self._arrays.plain)
         self._decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(kind, dec_hook=_decode_array)
@@ -108,22 +108,22 @@ def _plain(value: Any) -> Any:
 
 
 @cache
-def _check(kind: Any) -> Check | None:
+def _check_of(kind: Any) -> Check | None:
     """Return the check of a type; None if it contains no number outside of arrays."""
     origin, arguments = get_origin(kind), get_args(kind)
     if kind is float:
         return isfinite
     if origin in (Union, types.UnionType):
-        return _optional(next((check for argument in arguments if (check := _check(argument)) is not None), None))
+        return _optional(next((check for argument in arguments if (check := _check_of(argument)) is not None), None))
     if origin is frozenset:
         raise TypeError(f"{kind!r}: the order of its members is undefined")
     if origin is tuple and arguments[-1] is not Ellipsis:
-        checks = [_check(argument) for argument in arguments]
-        return None if not any(checks) else lambda values: _all(checks, values)
+        checks = [_check_of(argument) for argument in arguments]
+        return None if not any(checks) else lambda values: _all_pass(checks, values)
     if origin in (tuple, Sequence):
-        return _several(_check(arguments[0]))
+        return _several(_check_of(arguments[0]))
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        inner = _several(_check(arguments[1]))
+        inner = _several(_check_of(arguments[1]))
         return None if inner is None else lambda mapping: inner(mapping.values())
     if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, msgspec.Struct)):
         return _record(kind)
@@ -138,7 +138,7 @@ def _several(inner: Check | None) -> Check | None:
     return None if inner is None else lambda values: all(map(inner, values))
 
 
-def _all(checks: Sequence[Check | None], values: Sequence[Any]) -> bool:
+def _all_pass(checks: Sequence[Check | None], values: Sequence[Any]) -> bool:
     return all(check is None or check(value) for check, value in zip(checks, values, strict=True))
 
 
@@ -146,7 +146,7 @@ def _record(kind: type) -> Check | None:
     """Return the check of a record, which reads only the fields with numbers."""
     hints = get_type_hints(kind)
     names = msgspec.structs.fields(kind) if issubclass(kind, msgspec.Struct) else fields(kind)  # type: ignore[arg-type]
-    checks = [(field.name, check) for field in names if (check := _check(hints[field.name])) is not None]
+    checks = [(field.name, check) for field in names if (check := _check_of(hints[field.name])) is not None]
     numbers = [name for name, check in checks if check is isfinite]
     others = [(attrgetter(name), check) for name, check in checks if check is not isfinite]
     if not checks:

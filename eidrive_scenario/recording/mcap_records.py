@@ -165,7 +165,7 @@ class McapFile:
             return [message] if message.channel == channel else []
         location = f"byte {record.offset}"
         data = self._content(record, location)
-        return [message_of(data[start:end]) for start, end in self._places(data, channel, location)]
+        return [message_of(data[start:end]) for start, end in self._message_bounds(data, channel, location)]
 
     def _count(self, size: int, records: int) -> None:
         """Subtract content from what the file may still have. Raise ContentLimitError if nothing is left."""
@@ -200,9 +200,9 @@ class McapFile:
             self._damage.add("a chunk does not match its checksum", location)
         return data
 
-    def _places(self, data: bytes, channel: int, location: str) -> list[tuple[int, int]]:
+    def _message_bounds(self, data: bytes, channel: int, location: str) -> list[tuple[int, int]]:
         """Return start and end of the message records of a channel in the content of a chunk."""
-        places, offset, size, count, damage = [], 0, len(data), 0, ""
+        bounds, offset, size, count, damage = [], 0, len(data), 0, ""
         unpack, unpack_channel = _HEAD.unpack_from, _CHANNEL.unpack_from
         while offset < size and count <= self._records_left:
             count += 1
@@ -216,11 +216,11 @@ class McapFile:
                 if length < _MESSAGE_HEAD.size:
                     damage = "a message cannot be read"
                 elif unpack_channel(data, start)[0] == channel:
-                    places.append((start, offset))
+                    bounds.append((start, offset))
         self._count(0, count)
         if damage:
             self._damage.add(damage, location)
-        return places
+        return bounds
 
     def _next_chunk(self, start: int) -> int | None:
         """Return the offset of the next compressed chunk from `start` on, or None."""
@@ -267,20 +267,20 @@ class _FileSums:
 
     def add_record(self, opcode: int, head: bytes, body: bytes) -> None:
         if opcode == DATA_END:
-            self._check("the data section does not match its checksum", self._sum, body[-4:])
+            self._check_checksum("the data section does not match its checksum", self._sum, body[-4:])
             self._ended = True
         elif opcode == FOOTER and len(body) == _FOOTER.size:
             if not self._ended:
                 self._damage.add("the end of the data section is missing")
             expected = zlib.crc32(head + body[:-4], self._summary)
-            self._check("the summary does not match its checksum", expected, body[-4:])
+            self._check_checksum("the summary does not match its checksum", expected, body[-4:])
         elif self._ended:
             self._summary = zlib.crc32(body, zlib.crc32(head, self._summary))
         else:
             self.add(head)
             self.add(body)
 
-    def _check(self, damage: str, computed: int, stored: bytes) -> None:
+    def _check_checksum(self, damage: str, computed: int, stored: bytes) -> None:
         if self.broken or stored != struct.pack("<I", computed):
             self._damage.add(damage)
 
