@@ -121,7 +121,7 @@ def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
     mesh = Mesh()
     outline = _outline(face.shape, width, height)
     mesh.add("steel", polygon(_at(outline, -LAYER))[:, ::-1])
-    middle = np.array([0.0, height / 2 if face.shape not in ("triangle", "yield") else _inner(face.shape, height)])
+    middle = np.array([0.0, height / 2 if face.shape not in ("triangle", "yield") else _centroid(face.shape, height)])
     mesh.add(f"sign_{face.border or face.fill}", polygon(_at(outline, 0.0)))
     if face.border:
         inner = 1.0 - 2.0 * BORDERS.get(face.shape, BORDER if face != NO_ENTRY else 0.03)
@@ -152,7 +152,7 @@ def _outline(shape: str, width: float, height: float) -> Array:
     return np.stack([half * scale * np.cos(turns), tall + tall * scale * np.sin(turns)], axis=1)
 
 
-def _inner(shape: str, height: float) -> float:
+def _centroid(shape: str, height: float) -> float:
     """Return the height of the center of a triangle."""
     return height / 3 if shape == "triangle" else 2 * height / 3
 
