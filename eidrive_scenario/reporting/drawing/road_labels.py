@@ -84,9 +84,9 @@ class RoadLabels:
                 drivable = [lane for lane in section.lanes.values() if lane.drivable and lane.id != 0]
                 for lane in section.lanes.values():
                     if lane.id != 0 and lane.width.value(at - section.s) >= least:
-                        lanes.append((str(lane.id), self._place(road, lane.id, at)[None]))
+                        lanes.append((str(lane.id), self._lane_center(road, lane.id, at)[None]))
                 if any(lane.width.value(at - section.s) < least for lane in drivable):
-                    across = np.array([self._place(road, lane.id, at) for lane in drivable])
+                    across = np.array([self._lane_center(road, lane.id, at) for lane in drivable])
                     ids = " ".join(str(lane.id) for lane in drivable)
                     longest = max(longest, (within[-1] - within[0], f"lanes {ids}", across), key=lambda entry: entry[0])
             lists.append(longest[1:])
@@ -103,7 +103,7 @@ class RoadLabels:
                 colors = [color] * len(texts)
                 taken = write_labels(canvas, texts, outlines, taken, colors=colors, size=size, inside=inside)
 
-    def _place(self, road: Road, lane: int, s: float) -> Array:
+    def _lane_center(self, road: Road, lane: int, s: float) -> Array:
         """Return the center of a lane [m]."""
         return np.array(self.network.lane_pose_at(road.id, lane, s)[:2])
 
