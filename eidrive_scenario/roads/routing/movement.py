@@ -97,7 +97,7 @@ class Movement:
             inside = section.index == len(road.sections) - 1 if direction > 0 else True
             if remaining <= 0.0 and (inside or s < section.end):
                 break
-            following = self._next(
+            following = self._next_lane(
                 road, section, lane, direction, with_traffic, offset, route=route, choose=choose, visit=visit
             )
             if following is None and (remaining <= 0.0 or to_end):
@@ -150,7 +150,7 @@ class Movement:
         t += offset
         return LaneLocation(road.id, number, s, offset, t), pose_in_lane(road, section, lane, s, offset, t, sideways)
 
-    def _next(
+    def _next_lane(
         self,
         road: Road,
         section: LaneSection,
