@@ -135,13 +135,13 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
             "basicVehicleContainerHighFrequency",
             {
                 "heading": _heading(state.yaw),
-                "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+                "speed": {"speedValue": _clamp(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
                 "driveDirection": "forward" if state.speed >= 0.0 else "backward",
                 "vehicleLength": {
-                    "vehicleLengthValue": _within(length * 10.0, 1, 1022),
+                    "vehicleLengthValue": _clamp(length * 10.0, 1, 1022),
                     "vehicleLengthConfidenceIndication": "unavailable",
                 },
-                "vehicleWidth": _within(width * 10.0, 1, 61),
+                "vehicleWidth": _clamp(width * 10.0, 1, 61),
                 "longitudinalAcceleration": {
                     "longitudinalAccelerationValue": 161,
                     "longitudinalAccelerationConfidence": 102,
@@ -182,7 +182,7 @@ def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
             "originatingVehicleContainer",
             {
                 "heading": _heading(state.yaw),
-                "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+                "speed": {"speedValue": _clamp(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
                 "driveDirection": "forward" if state.speed >= 0.0 else "backward",
             },
         )
@@ -192,7 +192,7 @@ def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
             _sensor(number, sector) for number, sector in zip_longest(range(sensors), sectors)
         ]
     if len(detections):
-        delay = _within((state.time - detections.time) * 1e3, -1500, 1500)
+        delay = _clamp((state.time - detections.time) * 1e3, -1500, 1500)
         parameters["perceivedObjectContainer"] = [
             _object(message, row, delay) for row in range(min(len(detections), 128))
         ]
@@ -210,7 +210,7 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
     vx, vy = detections.velocity[row].tolist()
     speeds = [16383, 16383]
     if not math.isnan(vx + vy):
-        speeds = [_within(100.0 * v, -16382, 16382) for v in (cos * vx + sin * vy, cos * vy - sin * vx)]
+        speeds = [_clamp(100.0 * v, -16382, 16382) for v in (cos * vx + sin * vy, cos * vy - sin * vx)]
     number = row if message.objects is None else message.objects[row]
     name = detections.classes[row]
     kind: tuple[str, dict[str, int]] = ("other", {"type": 0, "confidence": 0})
@@ -221,16 +221,16 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
     return {
         "objectID": number % 256,
         "timeOfMeasurement": delay,
-        "objectConfidence": _within(100.0 * float(detections.confidence[row]), 0, 100),
+        "objectConfidence": _clamp(100.0 * float(detections.confidence[row]), 0, 100),
         "xDistance": _distance(cos * east + sin * north),
         "yDistance": _distance(cos * north - sin * east),
         "zDistance": _distance(z - state.z),
         "xSpeed": {"value": speeds[0], "confidence": 127},
         "ySpeed": {"value": speeds[1], "confidence": 127},
         "yawAngle": {"value": _tenths_of_degrees(yaw - state.yaw), "confidence": 127},
-        "planarObjectDimension1": {"value": _within(10.0 * length, 0, 1023), "confidence": 102},
-        "planarObjectDimension2": {"value": _within(10.0 * width, 0, 1023), "confidence": 102},
-        "verticalObjectDimension": {"value": _within(10.0 * height, 0, 1023), "confidence": 102},
+        "planarObjectDimension1": {"value": _clamp(10.0 * length, 0, 1023), "confidence": 102},
+        "planarObjectDimension2": {"value": _clamp(10.0 * width, 0, 1023), "confidence": 102},
+        "verticalObjectDimension": {"value": _clamp(10.0 * height, 0, 1023), "confidence": 102},
         "objectRefPoint": 0,
         "classification": [{"confidence": 101, "class": kind}],
     }
@@ -244,10 +244,10 @@ def _sensor(number: int, sector: ViewSector | None) -> dict[str, Any]:
         first, last = 0, 3600
         if sector.half_angle < math.pi:
             first, last = (_tenths_of_degrees(sector.yaw + side * sector.half_angle) for side in (-1.0, 1.0))
-        reach = _within(10.0 * sector.range, 0, 10000) if math.isfinite(sector.range) else 10000
+        reach = _clamp(10.0 * sector.range, 0, 10000) if math.isfinite(sector.range) else 10000
         properties = {"range": reach, "horizontalOpeningAngleStart": first, "horizontalOpeningAngleEnd": last}
-        area["xSensorOffset"] = _within(100.0 * sector.x, -5000, 0)
-        area["ySensorOffset"] = _within(100.0 * sector.y, -1000, 1000)
+        area["xSensorOffset"] = _clamp(100.0 * sector.x, -5000, 0)
+        area["ySensorOffset"] = _clamp(100.0 * sector.y, -1000, 1000)
     area["vehicleSensorPropertyList"] = [properties]
     return {"sensorID": number % 256, "type": 0, "detectionArea": ("vehicleSensor", area)}
 
@@ -259,14 +259,14 @@ def _header(number: int, sender: str) -> dict[str, int]:
 def _position(state: StationState) -> dict[str, Any]:
     """Return the geographic position, with the origin of the world at latitude and longitude 0."""
     return {
-        "latitude": _within(state.y / _METERS_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
-        "longitude": _within(state.x / _METERS_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
+        "latitude": _clamp(state.y / _METERS_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
+        "longitude": _clamp(state.x / _METERS_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
         "positionConfidenceEllipse": {
             "semiMajorConfidence": 4095,
             "semiMinorConfidence": 4095,
             "semiMajorOrientation": 3601,
         },
-        "altitude": {"altitudeValue": _within(100.0 * state.z, -100_000, 800_000), "altitudeConfidence": "unavailable"},
+        "altitude": {"altitudeValue": _clamp(100.0 * state.z, -100_000, 800_000), "altitudeConfidence": "unavailable"},
     }
 
 
@@ -276,7 +276,7 @@ def _heading(yaw: float) -> dict[str, int]:
 
 
 def _distance(meters: float) -> dict[str, int]:
-    return {"value": _within(100.0 * meters, -132768, 132767), "confidence": 102}
+    return {"value": _clamp(100.0 * meters, -132768, 132767), "confidence": 102}
 
 
 def _tenths_of_degrees(angle: float) -> int:
@@ -287,5 +287,5 @@ def _milliseconds(time: float) -> int:
     return round(time * 1e3) % 65536
 
 
-def _within(value: float, low: int, high: int) -> int:
+def _clamp(value: float, low: int, high: int) -> int:
     return min(max(round(value), low), high)

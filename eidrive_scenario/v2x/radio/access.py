@@ -191,10 +191,10 @@ class MediumAccess(ABC):
             return [*dropped, transmission]
         queue.insert(index, transmission)
         if queue[0] is not self._head[row]:
-            self._next(row)
+            self._contend_next(row)
         return dropped
 
-    def _next(self, row: int) -> None:
+    def _contend_next(self, row: int) -> None:
         """Let the first message in the queue of a station contend as soon as the DCC gate opens."""
         queue = self._waiting[row]
         self.contending += bool(queue) - (self._head[row] is not None)

@@ -115,7 +115,7 @@ class Csma(MediumAccess):
                 sensing = power[row] + transmission.gain >= self.sensing_dbm
                 sensing[row] = True
             self._occupy(row, transmission, sensing, starts)
-            self._next(row)
+            self._contend_next(row)
             started.append(transmission)
         if math.isfinite(until):
             self._measure(until)

@@ -169,7 +169,7 @@ class Sidelink(MediumAccess):
         self._sending.append(Sending(row, transmission, subframe, subframe + length))
         self._sent[row].append(range(subframe, subframe + length))
         self._begin(row, transmission, subframe * SUBFRAME)
-        self._next(row)
+        self._contend_next(row)
         return transmission
 
     def _occasion(self, row: int) -> int:
