@@ -146,7 +146,7 @@ class _Boxes:
         to_body = self._rotation[rows].transpose(0, 2, 1)
         begin = (to_body @ (begins[lines] - self._centers[rows])[:, :, None])[:, :, 0]
         way = (to_body @ (ends[lines] - begins[lines])[:, :, None])[:, :, 0]
-        enters, leaves = _within(begin, way, self._half[rows] - TOUCH)
+        enters, leaves = _crossing_shares(begin, way, self._half[rows] - TOUCH)
         crossed = np.flatnonzero((enters < leaves) & (enters < 1.0) & (leaves > 0.0))
         lines, rows, shares = lines[crossed], rows[crossed], np.maximum(enters[crossed], 0.0)
         order = np.lexsort((rows, shares, lines))
@@ -194,7 +194,7 @@ def _near(begins: Array, ends: Array, circles: Array) -> tuple[Integers, Integer
     return np.concatenate(lines), np.concatenate(indices)
 
 
-def _within(begin: Array, way: Array, half: Array) -> tuple[Array, Array]:
+def _crossing_shares(begin: Array, way: Array, half: Array) -> tuple[Array, Array]:
     """Return the shares (K,) at which lines enter and leave boxes around the origin, in the frames of the boxes.
 
     begin, way, half  (K, 3) starts, vectors to the ends, and half the sizes of the boxes [m]
