@@ -31,7 +31,7 @@ def selected_parts(names: Sequence[str], others: Mapping[str, Part] | None = Non
     Raise SettingError for an unknown name.
     """
     others = others or {}
-    _check("part", names, (*PARTS, *others, ALL))
+    _check_names("part", names, (*PARTS, *others, ALL))
     chosen = [part for name, part in PARTS.items() if ALL in names or name in names]
     return (*chosen, *(part for name, part in others.items() if name in names))
 
@@ -41,7 +41,9 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
 
     Raise SettingError for a name that no part uses, or if the part uses none of them.
     """
-    _check("--detectors", names, dict.fromkeys(name for user in (*PARTS.values(), part) for name in user.detectors))
+    _check_names(
+        "--detectors", names, dict.fromkeys(name for user in (*PARTS.values(), part) for name in user.detectors)
+    )
     detectors = tuple(name for name in part.detectors if name in names) if names else part.default
     if not detectors:
         message = f"--detectors: part {part.name} uses none of them (got {quoted(','.join(names))})"
@@ -49,7 +51,7 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
     return detectors
 
 
-def _check(what: str, names: Iterable[str], valid: Iterable[str]) -> None:
+def _check_names(what: str, names: Iterable[str], valid: Iterable[str]) -> None:
     valid = tuple(valid)
     for name in names:
         if name not in valid:

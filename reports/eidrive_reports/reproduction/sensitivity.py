@@ -55,7 +55,7 @@ def conclusions(cells: Sequence[Row], effects: Sequence[Row], curve: Sequence[Ro
     texts = []
     for planner in dict.fromkeys(str(row["planner"]) for row in cells):
         some, effect, line = ([row for row in rows if row["planner"] == planner] for rows in (cells, effects, curve))
-        texts += [f"`{planner}`. {_effects(effect)}", f"`{planner}`. {_places(some)}"]
+        texts += [f"`{planner}`. {_effects(effect)}", f"`{planner}`. {_collisions_near_starts(some)}"]
         texts += [f"`{planner}`, {_threshold(line, scenario)}" for scenario in distinct(line, "scenario")]
     return tuple(texts)
 
@@ -70,7 +70,7 @@ def _effects(effects: Sequence[Row]) -> str:
     return f"Cells with fewer, as many and more collisions than without cooperation. {'; '.join(listed)}."
 
 
-def _places(cells: Sequence[Row]) -> str:
+def _collisions_near_starts(cells: Sequence[Row]) -> str:
     near = [
         f"{scenario_title(scenario)}, start {name}: {_at(cells, scenario, *places[scenario])}"
         for scenario in distinct(cells, "scenario")

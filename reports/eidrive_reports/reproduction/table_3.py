@@ -173,14 +173,14 @@ def _bus_start(scenario: str) -> str:
 def _misses(rows: Sequence[Row]) -> str:
     """Return the numbers of collisions with the vehicle as the only sender in the scenarios with one bus."""
     alone = [row for row in rows if row["senders"] == "vehicle" and row["scenario"] in SCENARIOS[:2]]
-    return " and ".join(f"{row['collisions']} of {row['episodes']} ({_place(row)}, {row['detector']})" for row in alone)
+    return " and ".join(f"{row['collisions']} of {row['episodes']} ({_label(row)}, {row['detector']})" for row in alone)
 
 
 def _finding(rows: Sequence[Row], compared: Sequence[Row], detector: str) -> str:
     mine = [row for row in rows if row["detector"] == detector]
     agree = [row for row in mine if row["agrees"]]
     apart = "; ".join(
-        f"{_place(row)}, {row['senders']}: {row['rate']:.0%} against {row['paper_rate']:.0%}"
+        f"{_label(row)}, {row['senders']}: {row['rate']:.0%} against {row['paper_rate']:.0%}"
         for row in mine
         if not row["agrees"]
     )
@@ -212,7 +212,7 @@ def _reasons(rows: Sequence[Row]) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def _place(row: Row) -> str:
+def _label(row: Row) -> str:
     return str(row["scenario"]).removeprefix("coop/")
 
 
