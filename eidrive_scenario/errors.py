@@ -318,13 +318,13 @@ def most_similar(word: str, candidates: Collection[str]) -> str | None:
     return similar[0] if similar else None
 
 
-def suggestion(word: str, known: Iterable[str]) -> str:
+def suggestion(word: object, known: Iterable[str]) -> str:
     """Return a hint for an unknown word: the most similar of `known`, or a list of them if none is similar.
 
     To limit the cost, no similar word is searched if the word is too long or the known ones are too many.
     """
     candidates = sorted(known)
-    if (similar := most_similar(word, candidates)) is not None:
+    if (similar := most_similar(str(word), candidates)) is not None:
         return f"did you mean {similar!r}?"
     if not candidates:
         return "none is known here"

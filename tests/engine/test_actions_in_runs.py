@@ -129,6 +129,8 @@ def test_action_with_invalid_values_is_an_error(values: dict[str, object], messa
 
 def test_actions_that_no_station_can_execute_are_errors() -> None:
     with Simulation(ONE) as simulation:
+        with pytest.raises(SettingError, match="None is not a station that accepts actions; known: Ego"):
+            simulation.set_action(None, StationAction())  # type: ignore[arg-type]
         with pytest.raises(SettingError, match="'Eg' is not a station that accepts actions; did you mean 'Ego'"):
             simulation.set_action("Eg", StationAction())
         with pytest.raises(SettingError, match="the action of 'RSU' drives, and the station does not"):

@@ -137,8 +137,8 @@ class LiveServer:
     """
 
     def __init__(self, page: Callable[[], bytes], feed: Feed, *, port: int = 0) -> None:
-        if not 0 <= port <= 65535:
-            raise SettingError(Diagnostic(f"port {port} does not exist", "give 1 to 65535, or 0 for a free one"))
+        if not isinstance(port, int) or not 0 <= port <= 65535:
+            raise SettingError(Diagnostic(f"port {port!r} does not exist", "give 1 to 65535, or 0 for a free one"))
         self._feed = feed
         self._token = secrets.token_urlsafe(16)
         try:

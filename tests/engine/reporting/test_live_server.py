@@ -7,6 +7,7 @@ import json
 import socket
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
@@ -191,6 +192,7 @@ def test_port_in_use_raises_setting_error(site: Site) -> None:
         LiveServer(lambda: PAGE, Feed(), port=site.port)
 
 
-def test_port_out_of_range_raises_setting_error() -> None:
-    with pytest.raises(SettingError, match="port 70000 does not exist"):
-        LiveServer(lambda: PAGE, Feed(), port=70_000)
+@pytest.mark.parametrize(("port", "text"), [(70_000, "70000"), ("8080", "'8080'"), (None, "None")])
+def test_port_that_does_not_exist_raises_setting_error(port: Any, text: str) -> None:
+    with pytest.raises(SettingError, match=f"port {text} does not exist"):
+        LiveServer(lambda: PAGE, Feed(), port=port)
