@@ -34,9 +34,9 @@ def find_road_file(network: model.RoadNetwork | None, folder: Path, collector: D
     logic = network.logic_file if network else None
     if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
         return None
-    for candidate in _candidates(logic, folder):
+    for candidate, is_stated in _candidates(logic, folder):
         if is_regular_file(candidate):
-            if candidate.parent == folder and _named(logic) not in (Path(candidate.name), Path(candidate.stem)):
+            if candidate.parent == folder and not is_stated:
                 missing = f"road file '{shortened(logic.filepath, 300)}' does not exist"
                 collector.warning(f"{missing}; that beside the scenario is used", f"write {candidate.name!r}", at=logic)
             return candidate
@@ -53,12 +53,13 @@ def _location(folder: Path) -> str:
     return "in the current folder" if folder == Path() else "in the folder of the scenario"
 
 
-def _candidates(logic: model.File, folder: Path) -> Iterator[Path]:
+def _candidates(logic: model.File, folder: Path) -> Iterator[tuple[Path, bool]]:
+    """Yield the paths of a road file in the order of search, and whether each is the stated one."""
     named = _named(logic)
     for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
-        yield resolve_path(str(name), folder)
+        yield resolve_path(str(name), folder), True
         for directory in (folder, *_map_folders()):
-            yield directory / name.name
+            yield directory / name.name, False
 
 
 def _named(logic: model.File) -> Path:
