@@ -147,6 +147,7 @@ class TestRoadFile:
         [
             ("town.xodr", False),
             ("./town", False),
+            ("{folder}/town.xodr", False),
             ("C:\\maps\\town.xodr", True),
             ("../elsewhere/town", True),
             ("/home/town.xodr", True),
@@ -157,7 +158,7 @@ class TestRoadFile:
     ) -> None:
         (tmp_path / "town.xodr").touch()
         path = tmp_path / "scene.xosc"
-        path.write_bytes(scenario_xml(road=self.LOGIC.format(name)))
+        path.write_bytes(scenario_xml(road=self.LOGIC.format(name.format(folder=tmp_path))))
         scenario = load_scenario(path)
         assert scenario.road_file == tmp_path / "town.xodr"
         assert any("that beside the scenario is used" in text.message for text in scenario.warnings) is warns
