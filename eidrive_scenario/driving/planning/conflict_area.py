@@ -121,8 +121,8 @@ class ConflictAreaPlanner(RoutePlanner):
         path = self._path
         if inside and path is not None and heights is not None:
             bottom = objects.boxes[:, 2] - objects.boxes[:, 5] / 2.0
-            places = np.column_stack([objects.boxes[:, :2], bottom])
-            inside = [index for index in inside if is_on_level(places[index], path.points, heights)]
+            points = np.column_stack([objects.boxes[:, :2], bottom])
+            inside = [index for index in inside if is_on_level(points[index], path.points, heights)]
         if not inside:
             return ()
         existence = objects.confidence.tolist()

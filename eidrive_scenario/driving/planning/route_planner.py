@@ -232,9 +232,9 @@ class RoutePlanner(Planner):
         """Return the route through all waypoints; None if one of them or the vehicle is outside the road."""
         if self.roads is None:
             return None
-        places = [lane_below(self.roads, ego), *(self.roads.locate_at(x, y) for x, y in waypoints[:, :2].tolist())]
-        on_road = [location for location in places if location is not None]
-        if len(on_road) < len(places):
+        locations = [lane_below(self.roads, ego), *(self.roads.locate_at(x, y) for x, y in waypoints[:, :2].tolist())]
+        on_road = [location for location in locations if location is not None]
+        if len(on_road) < len(locations):
             return None
         line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
         return np.asarray(line)[:, :2]
@@ -274,10 +274,10 @@ def _further(roads: RoadNetwork, location: LaneLocation) -> list[LaneLocation]:
         same = road.section_at(location.s) is road.section_at(there.s)
         if same and road.length > TURNS and step * roads.driving_direction(location.road, location.lane) > 0.0:
             return [*(location._replace(s=location.s + number * step) for number in range(1, STRIDE)), there]
-    places = [location]
-    while len(places) <= STRIDE and (onward := roads.advance(places[-1], SPACING)) is not None:
-        places.append(onward)
-    return places[1:]
+    locations = [location]
+    while len(locations) <= STRIDE and (onward := roads.advance(locations[-1], SPACING)) is not None:
+        locations.append(onward)
+    return locations[1:]
 
 
 def _with_laps(line: Array, lap: Array) -> PlannedPath:

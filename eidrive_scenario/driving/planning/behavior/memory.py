@@ -240,8 +240,8 @@ class ObjectMemory:
         if not observed or not self._objects:
             return []
         ahead: Array = np.array([(known_object.x, known_object.y) for known_object in self._objects])
-        places: Array = np.array([(known_object.x, known_object.y) for known_object in observed])
-        gap = np.hypot(places[:, None, 0] - ahead[None, :, 0], places[:, None, 1] - ahead[None, :, 1])
+        positions: Array = np.array([(known_object.x, known_object.y) for known_object in observed])
+        gap = np.hypot(positions[:, None, 0] - ahead[None, :, 0], positions[:, None, 1] - ahead[None, :, 1])
         bottom, former = (np.array([known_object.z for known_object in group]) for group in (observed, self._objects))
         fresh, earlier = ((gap < GATE) & (np.abs(bottom[:, None] - former) < OTHER_LEVEL)).nonzero()
         order = gap[fresh, earlier].argsort(kind="stable")

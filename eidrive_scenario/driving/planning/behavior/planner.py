@@ -292,10 +292,10 @@ class BehaviorPlanner(RoutePlanner):
             return None
 
         def in_view(objects: Sequence[KnownObject]) -> Bools:
-            places = np.array([(known_object.x, known_object.y) for known_object in objects]) - ego.position[:2]
+            positions = np.array([(known_object.x, known_object.y) for known_object in objects]) - ego.position[:2]
             radius = np.array([known_object.width / 2.0 for known_object in objects])
             cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-            x, y = cos * places[:, 0] + sin * places[:, 1], cos * places[:, 1] - sin * places[:, 0]
+            x, y = cos * positions[:, 0] + sin * positions[:, 1], cos * positions[:, 1] - sin * positions[:, 0]
             shown = [sector.contains(x, y, radius) for sector in sectors]
             return np.asarray(np.logical_or.reduce(shown))
 
