@@ -134,11 +134,11 @@ def judge_impact(
 def _obstruction(view: WorldView, row: int, lanes: LaneTracker) -> str | None:
     """Return the place where a body stands in the way of others, at which it must not stop; None if it does not."""
     body = np.array(view.plain_boxes[row])
-    places = points_of_boxes(body[None], BODY_GRID)[0]
-    points = [(x, y, view.states[row].z) for x, y, _ in places.tolist()]
+    grid = points_of_boxes(body[None], BODY_GRID)[0]
+    points = [(x, y, view.states[row].z) for x, y, _ in grid.tolist()]
     if any("rail" in types or "tram" in types for types in lanes.types_at(points)):
         return "on rails"
-    if any(points_in_polygon(places[:, :2], outline[:, :2]).any() for outline in crosswalks(lanes.roads)):
+    if any(points_in_polygon(grid[:, :2], outline[:, :2]).any() for outline in crosswalks(lanes.roads)):
         return "on a crosswalk"
     if any(lanes.are_against(points, float(body[6]))):
         return "in a lane of the opposite direction"
