@@ -67,8 +67,8 @@ def nearest_rows(objects: Detections, ego: EgoState, reach: float = math.inf) ->
         return []
     x, y, _ = ego.position.tolist()
     if len(objects) <= FEW:
-        places = [math.hypot(box[0] - x, box[1] - y) for box in objects.boxes.tolist()]
-        return sorted([row for row, away in enumerate(places) if away <= reach], key=places.__getitem__)
+        distances = [math.hypot(box[0] - x, box[1] - y) for box in objects.boxes.tolist()]
+        return sorted([row for row, away in enumerate(distances) if away <= reach], key=distances.__getitem__)
     distance = np.hypot(objects.boxes[:, 0] - x, objects.boxes[:, 1] - y)
     order = np.argsort(distance, kind="stable")
     return [row for row in order.tolist() if distance[row] <= reach]
