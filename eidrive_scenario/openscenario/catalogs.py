@@ -194,15 +194,15 @@ class CatalogLibrary:
     def _catalog(self, use: ReferenceUse) -> CatalogFile | None:
         """Return the catalog of that name: first in a file of that name, then in any other file."""
         name = use.reference.catalog_name
-        places = self._ordered_places(use.kinds)
-        if not places:
+        locations = self._ordered_locations(use.kinds)
+        if not locations:
             expected = " or ".join(f"{kind.__name__}Catalog" for kind in use.kinds)
             message = f"catalog {quoted(name)} has no location in CatalogLocations"
             self._error(use.reference, message, f"add {expected}")
             return None
         catalogs: dict[Path, CatalogFile] = {}
         unreadable: list[Diagnostic] = []
-        for path in _candidates(places, name):
+        for path in _candidates(locations, name):
             catalog = self._file(path)
             if catalog is not None and catalog.name == name:
                 self._collector.warnings.extend(unreadable)
@@ -228,7 +228,7 @@ class CatalogLibrary:
                 at=use.reference,
             )
             return beside
-        self._error(use.reference, *_missing_catalog(name, places, {catalog.name for catalog in catalogs.values()}))
+        self._error(use.reference, *_missing_catalog(name, locations, {catalog.name for catalog in catalogs.values()}))
         return None
 
     def _beside(self, name: str) -> CatalogFile | None:
@@ -249,7 +249,7 @@ class CatalogLibrary:
                 return catalog
         return None
 
-    def _ordered_places(self, kinds: Iterable[type[model.Element]]) -> list[Path]:
+    def _ordered_locations(self, kinds: Iterable[type[model.Element]]) -> list[Path]:
         """Return the folders for these kinds, then all others, as files may use one folder for several kinds."""
         own = [self._locations[kind.__name__] for kind in kinds if kind.__name__ in self._locations]
         return list(dict.fromkeys([*own, *self._locations.values()]))
@@ -311,10 +311,10 @@ def duplicate_entries(catalog: etree._Element, source: str) -> dict[str, Diagnos
     return entries
 
 
-def _missing_catalog(name: str, places: Iterable[Path], names: set[str]) -> tuple[str, str]:
+def _missing_catalog(name: str, locations: Iterable[Path], names: set[str]) -> tuple[str, str]:
     """Return message and hint for a catalog that is not in the given folders."""
-    missing = [shortened(str(location), 300) for location in places if not os.path.exists(location)]
-    message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(location), 300) for location in places)
+    missing = [shortened(str(location), 300) for location in locations if not os.path.exists(location)]
+    message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(location), 300) for location in locations)
     if missing:
         hint = "correct the Directory"
         if is_regular_file(library_path() / CATALOGS / f"{name}.xosc"):
@@ -332,9 +332,9 @@ def _assignments(reference: model.CatalogReference) -> dict[str, Assignment]:
     }
 
 
-def _candidates(places: Iterable[Path], name: str) -> Iterator[Path]:
+def _candidates(locations: Iterable[Path], name: str) -> Iterator[Path]:
     """Yield files that may contain a catalog of that name, those with this file name first."""
-    for location in places:
+    for location in locations:
         if is_regular_file(location):
             yield location
         elif os.path.isdir(location):

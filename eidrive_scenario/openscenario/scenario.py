@@ -72,9 +72,9 @@ def _map_folders() -> list[Path]:
 
 def _hint(logic: model.File, folder: Path) -> str:
     named = _named(logic)
-    places = [(folder / named).parent, *_map_folders()]
+    folders = [(folder / named).parent, *_map_folders()]
     maps = {
-        file.stem for directory in places if os.path.isdir(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")
+        file.stem for directory in folders if os.path.isdir(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")
     }
     if maps:
         return suggestion(named.name.removesuffix(ROADS_SUFFIX), maps)
