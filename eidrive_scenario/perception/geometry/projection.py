@@ -99,9 +99,9 @@ def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
         return np.empty(0)
     points = points_of_boxes(boxes, POINTS)
     width, height = camera.size
-    places, _ = pixels(points.reshape(-1, 3), camera)
-    places = places.reshape(len(boxes), -1, 2)
-    x, y = places[..., 0], places[..., 1]
+    positions, _ = pixels(points.reshape(-1, 3), camera)
+    positions = positions.reshape(len(boxes), -1, 2)
+    x, y = positions[..., 0], positions[..., 1]
     visible = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
     corners, _ = pixels(box_corners(boxes).reshape(-1, 3), camera)
     rows = corners.reshape(len(boxes), -1, 2)[..., 1]

@@ -216,14 +216,14 @@ class LightsOnMap:
 
     def _match(self, detections: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
         """Return score and state of the box with the highest score for each signal, by its row."""
-        places, _ = pixels(self._feet + self._heights[:, None] * (0.0, 0.0, 0.5), camera)
+        positions, _ = pixels(self._feet + self._heights[:, None] * (0.0, 0.0, 0.5), camera)
         matches: dict[int, tuple[float, str]] = {}
         for box, score, name in zip(detections.boxes, detections.scores.tolist(), detections.classes, strict=True):
             state = STOP if name == STOP_SIGN else light_state(name)
             if state is None:
                 continue
             size = np.maximum(box[2:] - box[:2], 2.0)
-            away = np.abs(places - (box[:2] + box[2:]) / 2.0) / size
+            away = np.abs(positions - (box[:2] + box[2:]) / 2.0) / size
             reach = np.where(np.isnan(away).any(axis=1), np.inf, away.max(axis=1))
             reach[self._dynamic == (name == STOP_SIGN)] = np.inf
             nearest = int(np.argmin(reach))

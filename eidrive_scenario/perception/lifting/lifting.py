@@ -165,11 +165,11 @@ def _fit_points(
 ) -> list[Fit | None]:
     """Return the fits to the points in each box, None for boxes without an object in the points."""
     world = scan.world
-    places, _ = pixels(world, camera)
-    behind = np.isnan(places[:, 0])
+    positions, _ = pixels(world, camera)
+    behind = np.isnan(positions[:, 0])
     aside = (world[behind] - camera.pose[:3, 3]) @ camera.pose[:3, 0]
-    places[behind, 0] = np.where(aside < 0.0, -math.inf, math.inf)
-    places[behind, 1] = camera.size[1] / 2.0
+    positions[behind, 0] = np.where(aside < 0.0, -math.inf, math.inf)
+    positions[behind, 1] = camera.size[1] / 2.0
     away = np.hypot(*(world[:, :2] - camera.pose[:2, 3]).T)
     in_image = edges_in_image(boxes, camera).tolist()
     points: list[Fit | None] = []
@@ -191,11 +191,11 @@ def _fit_points(
             scan.frame.covariance_to_local(spread),
             in_image[row],
         )
-        others = np.zeros(len(places), dtype=bool)
+        others = np.zeros(len(positions), dtype=bool)
         for other in range(len(boxes)):
             if other != row:
-                others |= _inside_box(places, boxes[other])
-        fit = _foreground(scan, camera, target, places, away, others)
+                others |= _inside_box(positions, boxes[other])
+        fit = _foreground(scan, camera, target, positions, away, others)
         points.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
     return points
 
@@ -239,17 +239,17 @@ class _Candidate(NamedTuple):
 
 
 def _foreground(
-    scan: Scan, camera: CameraReading, target: Target, places: Array, away: Array, others: Bools
+    scan: Scan, camera: CameraReading, target: Target, positions: Array, away: Array, others: Bools
 ) -> Fit | None:
     """Return the box of the object among the points in and around an image box, or None.
 
     Objects close to each other are one cluster: the points that are in no other image box are clustered, too.
 
-    places   (N, 2) image positions of all points of the scan [px]; infinitely far aside for points behind the camera
-    away     (N,) distances from the camera [m];  others  (N,) whether points are in another image box
+    positions  (N, 2) in the image of all points of the scan [px]; infinitely far aside for points behind the camera
+    away       (N,) distances from the camera [m];  others  (N,) whether points are in another image box
     """
-    inside = _inside_box(places, target.box)
-    around = _inside_box(places, _widened(target))
+    inside = _inside_box(positions, target.box)
+    around = _inside_box(positions, _widened(target))
     parts = [np.flatnonzero(around)]
     if (inside & others).any():
         parts.append(np.flatnonzero(around & ~others))
@@ -303,9 +303,9 @@ def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_
     return fit
 
 
-def _inside_box(places: Array, box: Sequence[float]) -> NDArray[np.bool_]:
+def _inside_box(positions: Array, box: Sequence[float]) -> NDArray[np.bool_]:
     left, top, right, bottom = box
-    x, y = places[:, 0], places[:, 1]
+    x, y = positions[:, 0], positions[:, 1]
     return np.asarray((x >= left) & (x <= right) & (y >= top) & (y <= bottom))
 
 

@@ -153,8 +153,8 @@ class InteractingModels:
         posterior = np.linalg.solve(np.eye(3) + prior @ of_others, prior[None])
         change = np.einsum("nij,nj->ni", posterior, shown)
         effect = np.zeros((2, *tracks.state.shape[1:], 3))
-        for model, places in zip(effect, tracks.state, strict=True):
-            model[:, :2] = pose_jacobian(places[:, :2], pose.x, pose.y)
+        for model, states in zip(effect, tracks.state, strict=True):
+            model[:, :2] = pose_jacobian(states[:, :2], pose.x, pose.y)
         effect[:, :, -3:] = np.eye(3)
         if self._base.measures_heading:
             effect[:, :, HEADING, 2] = 1.0
