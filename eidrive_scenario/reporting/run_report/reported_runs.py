@@ -190,9 +190,9 @@ def read_sweeps(stores: Sequence[Path]) -> tuple[list[ReportedRun], list[str]]:
             message = f"the stores have more than {MOST_RUNS} runs with a verdict"
             raise SettingError(Diagnostic(message, "eidrive results prints and exports larger sweeps", str(store)))
         runs.append(_reported(run, store))
-    places = ", ".join(map(str, stores))
+    paths = ", ".join(map(str, stores))
     lines = [
-        f"{places}: {count} {status}: {message}"
+        f"{paths}: {count} {status}: {message}"
         + (f" (such as {commands[status, message]})" * bool(commands[status, message]))
         for (status, message), count in without.most_common()
     ]
