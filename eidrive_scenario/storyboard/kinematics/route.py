@@ -50,18 +50,18 @@ def build_route(
     if roads is None:
         message = f"route {route.name!r}: the scenario has no road network"
         raise ScenarioError(Diagnostic.at(route, message, "specify one in RoadNetwork/LogicFile"))
-    places = []
+    waypoints = []
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
         if here is None:
             raise ScenarioError(
                 Diagnostic.at(waypoint, "Waypoint: the position is not on a road", "move it onto a lane")
             )
-        places.append(here)
-    costs = [_cost(route, number, roads, seed) for number in range(len(places))]
+        waypoints.append(here)
+    costs = [_cost(route, number, roads, seed) for number in range(len(waypoints))]
     try:
         connect = partial(roads.route, against_traffic=against_traffic)
-        return _connect_waypoints(places, connect, costs, start, closed=again and route.closed)
+        return _connect_waypoints(waypoints, connect, costs, start, closed=again and route.closed)
     except RouteError as error:
         (cause,) = error.diagnostics
         kind = "closed route" if again and route.closed else "route"
@@ -78,7 +78,7 @@ def faces_traffic(roads: RoadNetwork, position: ResolvedPosition) -> bool:
 
 
 def _connect_waypoints(
-    places: Sequence[LaneLocation],
+    waypoints: Sequence[LaneLocation],
     connect: Callable[..., Route],
     costs: Sequence[Cost | None],
     start: LaneLocation | None,
@@ -87,12 +87,12 @@ def _connect_waypoints(
 ) -> Route:
     if not closed:
         if start is not None:
-            return connect(start, places[-1], places[:-1], costs)
-        return connect(places[0], places[-1], places[1:-1], costs[1:])
-    lap = replace(connect(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
-    if start is None or (start[:2] == places[0][:2] and abs(start.s - places[0].s) < AT_WAYPOINT):
+            return connect(start, waypoints[-1], waypoints[:-1], costs)
+        return connect(waypoints[0], waypoints[-1], waypoints[1:-1], costs[1:])
+    lap = replace(connect(waypoints[0], waypoints[0], waypoints[1:], [*costs[1:], costs[0]]), closed=True)
+    if start is None or (start[:2] == waypoints[0][:2] and abs(start.s - waypoints[0].s) < AT_WAYPOINT):
         return lap
-    return replace(connect(start, places[0], costs=costs[:1]), lap=lap)
+    return replace(connect(start, waypoints[0], costs=costs[:1]), lap=lap)
 
 
 def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cost | None:

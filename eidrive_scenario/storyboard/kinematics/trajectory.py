@@ -171,8 +171,8 @@ class TrajectoryCurve:
         extended along its tangents.
         """
         _, clipped, square = self._nearest_of_segments(x, y)
-        places = self._starts + clipped
-        apart = places - before
+        arc_lengths = self._starts + clipped
+        apart = arc_lengths - before
         if self.closed and self.length > 0.0:
             apart -= self.length * np.round(apart / self.length)
         nearest = int(np.argmin(square))
@@ -181,7 +181,7 @@ class TrajectoryCurve:
             local = int(close[np.argmin(square[close])])
             if math.sqrt(square[local]) <= math.sqrt(square[nearest]) + REACH:
                 nearest = local
-        return float(places[nearest])
+        return float(arc_lengths[nearest])
 
     def _nearest_of_segments(
         self, x: float, y: float
