@@ -128,8 +128,9 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
         cell_row(select(episodes, scenario, f"{detector} {senders}"), scenario, detector, senders)
         for detector, scenario, senders in product(detectors, SCENARIOS, SENDERS)
     ]
-    places = product(detectors, SCENARIOS)
-    compared = [row for detector, scenario in places for row in compare(episodes, scenario, detector)]
+    compared = [
+        row for detector, scenario in product(detectors, SCENARIOS) for row in compare(episodes, scenario, detector)
+    ]
     sections = [
         Section("Set-up", _setup(rows)),
         *result_sections([*(_finding(rows, compared, detector) for detector in detectors), *_reasons(rows)]),
