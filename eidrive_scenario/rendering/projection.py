@@ -18,9 +18,9 @@ from eidrive_scenario.world.camera import Pinhole
 class CameraView:
     """Camera at a pose (4, 4): camera to world, x right, y down, z forward.
 
-    place  (3,) position in the world [m]
-    turn   (3, 3) rotation to world axes
-    own    (3, P) x and y of the rays through the pixels in the camera frame at depth 1, and their length
+    position  (3,) in the world [m]
+    turn      (3, 3) rotation to world axes
+    own       (3, P) x and y of the rays through the pixels in the camera frame at depth 1, and their length
     """
 
     def __init__(self, pose: Array, pinhole: Pinhole) -> None:
