@@ -44,7 +44,7 @@ MISSED = 10.0
 class DrivenTrajectory:
     """Goal of a driven vehicle on a trajectory, from an arc length on [m].
 
-    place  arc length of the vehicle [m], within the trajectory
+    s  arc length of the vehicle [m], within the trajectory
     """
 
     def __init__(self, layout: TrajectoryCurve, s: float) -> None:
@@ -55,7 +55,7 @@ class DrivenTrajectory:
         self._lap = _points(layout, 0.0) if layout.closed else None
 
     def move(self, pose: Pose) -> float:
-        """Update the place, and return the arc length [m] on the trajectory extended along its tangents."""
+        """Update `s`, and return the arc length [m] on the trajectory extended along its tangents."""
         layout = self._layout
         at = layout.track(pose.x, pose.y, self.s)
         self.s = at if layout.closed else min(max(at, 0.0), layout.length)
