@@ -21,7 +21,7 @@ class Workaround(msgspec.Struct, frozen=True):
     """Repair of one deviation in elements of one name.
 
     since, before  versions of the standard in which it is a deviation
-    found          returns whether an element has the deviation
+    applies        returns whether an element has the deviation
     repair         corrects an element
     """
 
