@@ -107,9 +107,9 @@ class Swarm(MaintainedTraffic):
     The whole ring is filled once. Cars outside the ellipse are removed and replaced near its edge, at sites from which
     they drive inwards relative to the entity.
 
-    speeds                    range of the initial speeds [m/s], None for the speed limit
-    same, opposite            weights of the directions of travel relative to the entity, None for any
-    front, rear, left, right  weights of the sectors around the entity, None for any
+    speeds      range of the initial speeds [m/s], None for the speed limit
+    directions  weights of the same and the opposite direction of travel relative to the entity, None for any
+    sectors     weights of the sectors front, rear, left and right of the entity, None for any
     """
 
     center: str
