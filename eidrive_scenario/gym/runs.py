@@ -29,7 +29,7 @@ OPTIONS = ("seed", "parameters")
 class Runs:
     """Source of the episodes of an environment, with the interfaces of its stations.
 
-    stations          controlled stations; None selects them by `default_stations`
+    stations          controlled stations; None: the default of the environment
     max_steps         maximum number of steps of an episode; None for the time limit of the settings only
     ticks_per_step    number of ticks for which an action applies
 
