@@ -4,7 +4,7 @@ Single-track model: R. Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer
 at standstill. Tire: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller framework
 for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014). The friction circle limits its side force beside
 the longitudinal force. Drive, brakes, rolling resistance and air drag: Rajamani, ch. 4. Vehicles with more than two
-axles: `multi_axle`.
+axles: `MultiAxleTrack`.
 """
 
 from __future__ import annotations
