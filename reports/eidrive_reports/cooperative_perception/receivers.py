@@ -219,6 +219,7 @@ class SharedDetector(Detector):
         self.features: FeatureMap | None = None
         self.fused: FeatureMap | None = None
         self.pose: EgoState | None = None
+        self.velocity_deviation = detector.velocity_deviation
         self._detector = detector
 
     @property

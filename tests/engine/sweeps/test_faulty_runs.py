@@ -134,8 +134,9 @@ def test_unwritable_folder_of_a_run_is_aborted_and_repeatable(scenario: Path, tm
 
 
 def test_sweep_into_unwritable_folder_ends_before_its_runs(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
-    store = tmp_path / "s.db"
-    result = eidrive("sweep", scenario, "--store", store, "--out", scenario)
+    store, file = tmp_path / "s.db", tmp_path / "file"
+    file.touch()
+    result = eidrive("sweep", scenario, "--store", store, "--out", file)
     assert result.exit_code == 2
-    assert "car.xosc: cannot write: File exists; choose another folder" in result.stderr
+    assert "file: cannot write: File exists; choose another folder" in result.stderr
     assert not store.exists()
