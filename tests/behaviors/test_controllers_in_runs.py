@@ -24,10 +24,13 @@ def activate(on: str) -> str:
 
 
 @pytest.mark.element("OverrideControllerValueAction")
-def test_brake_override_decelerates_by_its_share_and_is_released(run: Run) -> None:
+@pytest.mark.parametrize(("value", "warns"), [("50", False), ("0.5", True)])
+def test_brake_override_decelerates_by_its_share_and_is_released(run: Run, value: str, warns: bool) -> None:
     """Half of 10 m/s² during 1.5 s, plus rolling resistance and drag (below 0.5 m/s²)."""
-    brake = '<Throttle active="{0}" value="0"/><Brake active="{0}"><BrakePercent value="0.5"/></Brake>'
-    played = run(5, ("Ego", hold(brake.format("true")), after(1.0)), ("Ego", hold(brake.format("false")), after(2.5)))
+    brake = '<Throttle active="{0}" value="0"/><Brake active="{0}"><BrakePercent value="{1}"/></Brake>'
+    start, end = (hold(brake.format(active, value)) for active in ("true", "false"))
+    played = run(5, ("Ego", start, after(1.0)), ("Ego", end, after(2.5)))
+    assert any("is read as 50 %" in text for text in played.result.warnings) is warns
     speed = played.of("Ego", "speed")
     assert abs(slope(speed, 0.0, 1.0)) < 0.3
     assert -5.5 < slope(speed, 1.2, 2.4) < -5.0
@@ -38,15 +41,13 @@ def test_brake_force_and_parking_brake_overrides_decelerate(run: Run) -> None:
     """CAR specifies no mass: 1500 kg. 3000 N are 2 m/s²; 0.3 of the parking brake is 3 m/s²."""
     force = '<Throttle active="true" value="0"/><Brake active="true"><BrakeForce value="3000"/></Brake>'
     assert -2.5 < slope(run(2, ("Ego", hold(force))).of("Ego", "speed"), 0.5, 1.9) < -2.0
-    parking = (
-        '<Throttle active="true" value="0"/><ParkingBrake active="true"><BrakePercent value="0.3"/></ParkingBrake>'
-    )
+    parking = '<Throttle active="true" value="0"/><ParkingBrake active="true"><BrakePercent value="30"/></ParkingBrake>'
     assert -3.5 < slope(run(2, ("Ego", hold(parking))).of("Ego", "speed"), 0.5, 1.9) < -3.0
 
 
 def test_pedal_override_with_max_rate_changes_gradually(run: Run) -> None:
-    """At 0.5 1/s the brake is at 0.25 after 0.5 s and at 0.5 after 1 s."""
-    brake = '<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="0.5" maxRate="0.5"/></Brake>'
+    """At 50 %/s the brake is at 25 % after 0.5 s and at 50 % after 1 s."""
+    brake = '<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="50" maxRate="50"/></Brake>'
     speed = run(2.5, ("Ego", hold(brake))).of("Ego", "speed")
     assert -3.1 < slope(speed, 0.45, 0.55) < -2.4
     assert -5.5 < slope(speed, 1.2, 2.2) < -5.0
@@ -106,7 +107,7 @@ def test_controller_activation_continues_without_a_jump(run: Run) -> None:
 
 
 def test_pedal_override_of_deactivated_controller_has_no_effect(run: Run) -> None:
-    brake = hold('<Brake active="true"><BrakePercent value="1"/></Brake>')
+    brake = hold('<Brake active="true"><BrakePercent value="100"/></Brake>')
     played = run(3, ("Ego", activate("false"), after(0.5)), ("Ego", brake, after(1.0)))
     speed = played.of("Ego", "speed")
     assert speed[25:] == pytest.approx([speed[25]] * (len(speed) - 25), abs=1e-9)
@@ -119,7 +120,7 @@ def test_low_road_friction_limits_braking(run: Run) -> None:
         '<EnvironmentAction><Environment name="ice"><RoadCondition frictionScaleFactor="0.2" wetness="moist"/>'
         "</Environment></EnvironmentAction>"
     )
-    brake = hold('<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="1"/></Brake>')
+    brake = hold('<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="100"/></Brake>')
     played = run(3, ("Ego", brake, after(0.5)), globally=ice)
     assert slope(played.of("Ego", "speed"), 1.0, 2.5) == pytest.approx(-0.95 * 0.2 * 9.81, abs=0.35)
     environment = played.frames[0].environment

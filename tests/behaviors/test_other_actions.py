@@ -81,7 +81,7 @@ def test_assignment_of_eidrive_controller_during_the_run_is_rejected(scene: RunS
 
 def test_pedal_override_lasts_until_its_release(scene: RunScene) -> None:
     hold = private_xml(
-        '<ControllerAction><OverrideControllerValueAction><Brake active="{}"><BrakePercent value="0.5"/></Brake>'
+        '<ControllerAction><OverrideControllerValueAction><Brake active="{}"><BrakePercent value="50"/></Brake>'
         "</OverrideControllerValueAction></ControllerAction>"
     )
     played = scene(0.6, ("Ego", hold.format("true")), ("Ego", hold.format("false"), after(0.35)))

@@ -115,12 +115,21 @@ class AssignControllerAction(ActionBehaviour):
 class OverrideControllerValueAction(ActionBehaviour):
     """Override of pedals, steering wheel or gear at a value, and its end. It applies to vehicles with an active
     controller.
+
+    The unit of a BrakePercent is % (1.3.1, Brake). A value up to 1 is a share of the full brake, as in esmini, which is
+    a warning.
     """
 
     action: model.OverrideControllerValueAction
 
     def update(self) -> Status:
         """Set or release the overrides."""
+        for brake in (self.action.brake, self.action.parking_brake):
+            percent = None if brake is None else brake.brake_percent
+            if percent is not None and percent.value > 0.0 and _full_brake(percent) == 1.0:
+                share = f"{100.0 * percent.value:g}"
+                what = f"BrakePercent {percent.value:g} is read as {share} %"
+                self.context.warn(*self.error(what, f"write {share}, as its unit is %").diagnostics)
         for override in self._overrides():
             self.context.set_override(self.actor.name, override)
         return Status.SUCCESS
@@ -133,19 +142,21 @@ class OverrideControllerValueAction(ActionBehaviour):
                 overrides.append(Override(control, entry.value, entry.active, max_rate=entry.max_rate))
         for control, brake in (("brake", action.brake), ("parkingBrake", action.parking_brake)):
             if brake is not None:
-                share = brake.brake_percent or brake.brake_force
-                overrides.append(
-                    Override(
-                        control,
-                        share.value if share is not None else brake.value or 0.0,
-                        brake.active,
-                        max_rate=share.max_rate if share is not None else None,
-                        newton=brake.brake_force is not None,
-                    )
-                )
+                overrides.append(self._brake(control, brake))
         if action.gear is not None:
             overrides.append(self._gear(action.gear))
         return overrides
+
+    @staticmethod
+    def _brake(control: str, brake: model.OverrideBrakeAction | model.OverrideParkingBrakeAction) -> Override:
+        force = brake.brake_force
+        if force is not None:
+            return Override(control, force.value, brake.active, max_rate=force.max_rate, newton=True)
+        percent = brake.brake_percent
+        if percent is None:
+            return Override(control, brake.value or 0.0, brake.active)
+        full, rate = _full_brake(percent), percent.max_rate
+        return Override(control, percent.value / full, brake.active, max_rate=None if rate is None else rate / full)
 
     @staticmethod
     def _gear(gear: model.OverrideGearAction) -> Override:
@@ -160,6 +171,11 @@ class OverrideControllerValueAction(ActionBehaviour):
         """Describe the controls and their values."""
         words = [f"{o.control} {o.value:g}" if o.active else f"{o.control} free" for o in self._overrides()]
         return f"override {', '.join(words)}"
+
+
+def _full_brake(percent: model.Brake) -> float:
+    """Return the value of the full brake in the unit of a BrakePercent, its rate if the value is 0: 100, or 1."""
+    return 100.0 if (percent.value or percent.max_rate or 0.0) > 1.0 else 1.0
 
 
 def _without_effect(behaviour: ActionBehaviour) -> Status:
