@@ -154,7 +154,7 @@ def test_what_the_library_itself_gets_wrong_is_played_as_it_is_meant(cut_in: Bui
 
 
 def test_attributes_that_are_none_are_not_there(cut_in: Build) -> None:
-    """An AngleCondition without a coordinate system is in the entity's; the library cannot write such a file."""
+    """An AngleCondition without a coordinate system is in the world's; the library cannot write such a file."""
     scenario = cut_in()
     angle = xosc.AngleCondition(0.0, 0.1, xosc.AngleType.heading)
     scenario.storyboard.stoptrigger = xosc.EntityTrigger(
