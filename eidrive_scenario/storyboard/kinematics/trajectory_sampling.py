@@ -245,10 +245,12 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Trajecto
     gap = math.hypot(first.x - last.x, first.y - last.y)
     if closed and gap > 1e-3:
         vertices.append(vertices[0])
-        known = _times(times)
+        instants = _times(times)
         length = sum(math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in pairwise(vertices)) - gap
         # The closing line has no time in the file: it is covered at the mean speed.
-        times.append(None if known is None or length == 0.0 else known[-1] + gap * (known[-1] - known[0]) / length)
+        times.append(
+            None if instants is None or length == 0.0 else instants[-1] + gap * (instants[-1] - instants[0]) / length
+        )
     return _sampled_polyline(vertices, _times(times), closed)
 
 

@@ -50,8 +50,9 @@ class PreambleDetection:
             until = self._until.copy()
             for transmission in together:
                 transmission.busy = busy
-                row = rows[transmission.message.sender]
-                received = power[row] if transmission.gain is None else power[row] + transmission.gain
+                received = power[rows[transmission.message.sender]]
+                if transmission.gain is not None:
+                    received = received + transmission.gain
                 locks = ~busy & (received >= self._sensing_dbm)
                 until[locks] = np.maximum(until[locks], transmission.end)
             for transmission in together:

@@ -150,8 +150,8 @@ def test_empty_orientation_is_a_warning() -> None:
 @pytest.mark.parametrize(("minor", "expected"), [(0, None), (2, None), (3, "relative"), (4, "relative")])
 def test_missing_orientation_type_is_relative_since_version_1_3(minor: int, expected: str | None) -> None:
     """Without a type the orientation was absolute before."""
-    place = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation h="0.2"/></RelativeObjectPosition>'
-    init = init_xml("Ego", teleport_xml(place))
+    position = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation h="0.2"/></RelativeObjectPosition>'
+    init = init_xml("Ego", teleport_xml(position))
     oriented = only(load_scenario(scenario_xml(minor=minor, init=init, story=story_xml())), Orientation)
     assert (oriented.h, oriented.type and oriented.type.value) == (0.2, expected)
 
