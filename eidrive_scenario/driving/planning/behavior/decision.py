@@ -223,7 +223,7 @@ class Decider:
         return self._decision(situation, options, best)
 
     def _scene(self, situation: Situation, settings: BehaviorSettings) -> Surroundings:
-        if abs(situation.d) > OFF_PROFILE:
+        if abs(situation.steered[1]) > OFF_PROFILE:
             # A vehicle that returns behind an obstacle needs all the space.
             settings = settings.model_copy(update={"passing_gap": 0.0})
         return surroundings(

@@ -35,10 +35,11 @@ Capacity Manual (4.1 to 7.5 s)."""
 LONG, LONGEST = 2, 4
 """Number of pauses without oncoming traffic after which the vehicle relies on others to respond; and after which it
 begins behind a standing object without a place to see from: it would wait forever. A choice."""
-HEADWAYS = 4.0 / 3.0
-"""Time since the last oncoming vehicle over the longest headway that was observed, up to which the traffic may go on; a
-compromise: with 3 none of 60 random drives of `eidrive_reports.overtaking` collided, but those behind a truck waited
-more than half a minute after the last car."""
+RARE, MOST_HEADWAYS = 0.025, 2.0
+"""Probability of a headway after which no further vehicle is expected, and its maximum over the longest one until then:
+few say little about the next one."""
+QUIET = 2.0
+"""Time without traffic over the time in which some could come unseen, from which on none is expected; a choice."""
 LEAST_HEADWAY = 1.0
 """Difference between expected arrivals that belong to different vehicles [s]."""
 SLOWEST = 0.5
@@ -121,8 +122,8 @@ class OncomingTraffic:
         self._last = -math.inf
         self._arrival = -math.inf
         """Time at which the next oncoming vehicle in view is beside the vehicle, if this stands [s]."""
-        self._longest_headway = 0.0
-        """Longest time between the arrivals of oncoming vehicles [s]."""
+        self._headways, self._longest_headway = 0, 0.0
+        """Number of times between the arrivals of oncoming vehicles that were observed, and the longest one [s]."""
         self._held_up_since: float | None = None
         self._held_up_until = -math.inf
         self._free_to, self._free_at = -math.inf, 0.0
@@ -144,6 +145,7 @@ class OncomingTraffic:
             arrival = now + float(((scene.front[is_oncoming, 0] - center) / -scene.speed[is_oncoming, 0]).min())
             headway = arrival - self._arrival
             if LEAST_HEADWAY < headway < math.inf:
+                self._headways += 1
                 self._longest_headway = max(self._longest_headway, headway)
             self._arrival = arrival
         self._wanted = wanted
@@ -163,11 +165,20 @@ class OncomingTraffic:
     def _is_patient(self, now: float, pauses: int = 1) -> bool:
         """Return whether the vehicle has waited for a number of pauses, and no oncoming traffic came into view.
 
-        A pause is longer after sparse traffic, whose next vehicle may still be beyond the range of the sensors.
+        A pause is longer after sparse traffic, whose next vehicle may still be beyond the range of the sensors: after n
+        uniformly distributed headways up to an unknown limit, the next one is longer than x times the longest one with
+        the probability x**-n / (n + 1).
         """
-        since = max(self._last, now if self._held_up_since is None else self._held_up_since)
-        in_view = float(self._ahead[-1]) / max(self._usual, ONCOMING_SPEED)
-        return now - since >= pauses * max(PAUSE, HEADWAYS * self._longest_headway - in_view)
+        pause = PAUSE
+        if self._headways:
+            longer = min(max(((self._headways + 1) * RARE) ** (-1.0 / self._headways), 1.0), MOST_HEADWAYS)
+            in_view = float(self._ahead[-1]) / max(self._usual, ONCOMING_SPEED)
+            pause = max(PAUSE, longer * self._longest_headway - in_view)
+        return self._quiet(now) >= pauses * pause
+
+    def _quiet(self, now: float) -> float:
+        """Return the time for which the vehicle has waited without oncoming traffic in view [s]."""
+        return now - max(self._last, now if self._held_up_since is None else self._held_up_since)
 
     def line_changed(self, shift: float | None) -> None:
         """Move what is known to be free to another line, or forget it; `shift` as for `Decider.line_changed`."""
@@ -249,7 +260,7 @@ class OncomingTraffic:
         viewpoints = motion.s + body.center
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
-        free = self._free(outlook, here, end, now)
+        free = self._free(outlook, here, until, end, now)
         if self._suffices(free, here[0], until, end, beside, now):
             return Verdict.GO
         step = min(max(last, 0), len(times) - 1)
@@ -289,21 +300,26 @@ class OncomingTraffic:
     def _suffices(
         self, hidden: float, viewpoint: float, duration: float, end: float, beside: LanesBeside, now: float
     ) -> bool:
-        """Return whether traffic from a hidden place does not come to `end` in a time [s].
-
-        After the pause, none is expected from beyond the range of the sensors at `viewpoint`, where nothing else
-        hides it.
-        """
-        if self._is_patient(now) and self._is_in_view(hidden, viewpoint):
+        """Return whether traffic from a hidden place does not come to `end` in a time [s]."""
+        if self._is_over(hidden, viewpoint, duration, end, now):
             return hidden >= end
         speed = self.hidden_speed(beside, now)
         return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration)) >= end
+
+    def _is_over(self, hidden: float, viewpoint: float, duration: float, end: float, now: float) -> bool:
+        """Return whether no more traffic is expected from beyond the range of the sensors at `viewpoint`, where nothing
+        else hides it: after the pause, and after traffic not before a time without any that is long against that in
+        which some could come to `end` unseen."""
+        if not self._is_patient(now) or not self._is_in_view(hidden, viewpoint):
+            return False
+        unseen = duration - (hidden - end) / max(self._usual, ONCOMING_SPEED)
+        return math.isinf(self._last) or self._quiet(now) >= QUIET * unseen
 
     def _is_in_view(self, hidden: float, viewpoint: float) -> bool:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""
         return hidden >= viewpoint + float(self._ahead[-1]) - SAMPLE
 
-    def _free(self, outlook: Outlook, viewpoint: tuple[float, float], end: float, now: float) -> float:
+    def _free(self, outlook: Outlook, viewpoint: tuple[float, float], duration: float, end: float, now: float) -> float:
         """Return the place up to which the oncoming lane is free of unseen traffic [m].
 
         What was in view stays free until traffic can have come there. Where none is expected from beyond the range of
@@ -311,7 +327,7 @@ class OncomingTraffic:
         """
         still_free = self._free_to - self.hidden_speed(outlook.beside, now) * (now - self._free_at)
         hidden = self.first_hidden(outlook, viewpoint)
-        if self._is_patient(now) and self._is_in_view(hidden, viewpoint[0]) and hidden >= end:
+        if self._is_over(hidden, viewpoint[0], duration, end, now) and hidden >= end:
             hidden = math.inf
         self._free_to, self._free_at = max(still_free, hidden), now
         return self._free_to

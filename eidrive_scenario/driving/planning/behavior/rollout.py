@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import msgspec
@@ -140,11 +141,7 @@ class Roller:
             deceleration=settings.comfortable_deceleration,
             emergency=settings.hard_deceleration,
         )
-        driver = self._driver
-        greatest, braking = driver.acceleration, driver.deceleration
-        # Before a standing object the improved model tends to b²/b' - a: here the comfortable deceleration.
-        twice_root = 2.0 * math.sqrt(greatest * braking**2 / (greatest + braking))
-        self._constants = driver.standstill_gap, twice_root, driver.exponent
+        self._passing_driver = replace(self._driver, acceleration=settings.passing_acceleration)
 
     def roll(
         self,
@@ -170,12 +167,21 @@ class Roller:
             number, ahead = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
             time_gap = self._driver.time_gap if option.time_gap is None else option.time_gap
-            key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends, time_gap)
+            driver = self._passing_driver if option.profile.is_brief else self._driver
+            key = (
+                driver.acceleration,
+                proposal.share,
+                proposal.deceleration,
+                proposal.is_emergency,
+                number,
+                ends,
+                time_gap,
+            )
             if key not in motion_of:
                 if ends not in stops:
                     stops[ends] = walls_over_time(option.walls, self._times)
                 bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
-                motion_of[key] = self._motion(proposal, bounds, start, ahead, time_gap)
+                motion_of[key] = self._motion(proposal, driver, bounds, start, ahead, time_gap)
             motions.append(motion_of[key])
         s, speed, cause = zip(*motions, strict=True)
         return Rollout(np.array(s), np.array(speed), np.array(cause))
@@ -183,6 +189,7 @@ class Roller:
     def _motion(
         self,
         proposal: Proposal,
+        driver: IntelligentDriver,
         bounds: Bounds,
         start: tuple[float, float],
         leaders: list[list[Leader]],
@@ -191,8 +198,10 @@ class Roller:
         s, speed = start
         motion = _Motion([s], [speed], [])
         add_place, add_speed, add_cause = motion.s.append, motion.speed.append, motion.cause.append
-        standstill_gap, twice_root, exponent = self._constants
-        greatest, least = self._driver.acceleration, -proposal.deceleration
+        standstill_gap, exponent = driver.standstill_gap, driver.exponent
+        greatest, least = driver.acceleration, -proposal.deceleration
+        # Before a standing object the improved model tends to b²/b' - a: here the comfortable deceleration.
+        twice_root = 2.0 * math.sqrt(greatest * driver.deceleration**2 / (greatest + driver.deceleration))
         is_emergency, is_free, desired = proposal.is_emergency, bounds.are_free, bounds.wanted
         for step, dt in enumerate(self._steps):
             cause = FREE

@@ -113,15 +113,21 @@ def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> No
     assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
 
 
-def test_pause_is_longer_after_vehicles_with_long_headways() -> None:
-    """Cars at 10 m/s are in view for 8 s before they pass. After headways of 12 s the next one may come within 16 s:
-    none has come into view for 8 s then."""
+@pytest.mark.parametrize(
+    ("headways", "longest"),
+    # After n headways up to 12 s, 97.5 % of the next ones are shorter than 12 s ((n + 1) 0.025)^(-1/n), the predictive
+    # distribution of the uniform one with an unknown limit; after one, the wait is bounded.
+    [(1, 24.0), (3, 24.0), (5, 17.54), (9, 14.0)],
+)
+def test_pause_is_longer_after_vehicles_with_long_headways(headways: int, longest: float) -> None:
+    """Cars at 10 m/s are in view for 8 s before they pass, so the next one is in view 8 s before its headway ends."""
     observed = traffic(80.0)
-    for now in np.arange(0.0, 20.05, 0.1):
-        cars = [(80.0 - 10.0 * (now - start), 3.5, -10.0) for start in (0.0, 12.0) if start <= now < start + 8.0]
+    starts, end = 12.0 * np.arange(headways + 1), 12.0 * headways + 8.0
+    for now in np.arange(0.0, end + 0.05, 0.1):
+        cars = [(80.0 - 10.0 * (now - start), 3.5, -10.0) for start in starts if start <= now < start + 8.0]
         observed.observe(scene(*cars), 0.0, 10.0, float(now), held_up=True)
-    assert observed.hidden_speed(BESIDE, 20.0 + PAUSE + 1.5) == 15.0
-    assert observed.hidden_speed(BESIDE, 20.0 + PAUSE + 2.5) == 10.0
+    assert observed.hidden_speed(BESIDE, end + longest - 8.0 - 0.3) == 15.0
+    assert observed.hidden_speed(BESIDE, end + longest - 8.0 + 0.3) == 10.0
 
 
 def test_column_with_short_headways_does_not_lengthen_the_pause() -> None:

@@ -124,3 +124,18 @@ def test_speed_limit_of_a_curve_and_its_approach() -> None:
     assert limits[125] == pytest.approx(math.sqrt(SETTINGS.lateral_acceleration * 50.0), rel=0.01)
     assert limits[200] == pytest.approx(30.0)
     np.testing.assert_allclose(np.diff(limits[60:95] ** 2), -2.0 * SETTINGS.comfortable_deceleration, rtol=1e-6)
+
+
+def test_vehicle_accelerates_harder_to_pass_in_a_lane_of_the_opposite_direction() -> None:
+    """Below half of the wanted speed the acceleration of the model is within 7 % of its maximum: 1.5 m/s² by the
+    settings, and 2.4 m/s², the limit of comfort of nuPlan, where the vehicle should not stay long."""
+    passing = LateralProfile("pass", (0.0, 20.0, 60.0, 80.0), (0.0, 3.0, 3.0, 0.0), side=1, border=0.8)
+    course = Course(ALONG, np.full(len(ALONG), 50.0), 15.0)
+    reached = {}
+    for profile in (passing, LateralProfile("route", (0.0,), (0.0,))):
+        leads = np.zeros((1, len(TIMES)), dtype=bool)
+        option = Option(FREE, profile, leads, [], leads)
+        rolled = Roller(SETTINGS, TIMES).roll([option], course, (0.0, 0.0), (FRONT, CENTER), leader(900.0, 15.0))
+        reached[profile.name] = float(rolled.speed[0, 8])
+    assert reached["route"] == pytest.approx(2.0 * 1.5, rel=0.07)
+    assert reached["pass"] == pytest.approx(2.0 * 2.4, rel=0.07)
