@@ -107,6 +107,8 @@ class Span(NamedTuple):
     open_high: bool
     hidden: bool
     """Whether something nearer hides one of the ends."""
+    may_miss: bool
+    """Whether the rays may have missed the side that ends the object at the near end: it is seen at a grazing angle."""
 
 
 def size_cost(span: Span, mean: float, deviation: float) -> float:
@@ -141,7 +143,9 @@ def complete_span(span: Span, mean: float, deviation: float) -> tuple[float, flo
         unseen = size - measured
         return size, (span.low + span.high) / 2.0, unseen**2 / 12.0 + RANGE_NOISE**2
     middle = span.low + size / 2.0 if span.open_high else span.high - size / 2.0
-    return size, middle, spread / 4.0 + RANGE_NOISE**2
+    # If the side was missed, the middle of the points is as likely that of the object.
+    offset = (size - measured) / 2.0 if span.may_miss else 0.0
+    return size, middle, spread / 4.0 + offset**2 + RANGE_NOISE**2
 
 
 THIN = 0.4
@@ -360,7 +364,8 @@ def _spans(
         if any(ends):
             open_low, open_high = ends
         gap = spacing * (2.0 if open_low and open_high else 1.0)
-        spans.append(Span(low, high, gap, open_low, open_high, any(ends)))
+        may_miss = 0.0 < gaps[axis] < gaps[1 - axis] and pattern.azimuth * distance**2 / gaps[axis] > depth
+        spans.append(Span(low, high, gap, open_low, open_high, any(ends), may_miss))
     return spans[0], spans[1]
 
 

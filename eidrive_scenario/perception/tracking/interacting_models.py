@@ -168,16 +168,20 @@ class InteractingModels:
         """Return mean and covariance of each track over both models."""
         return _moments(self._aligned(tracks.state), tracks.covariance, tracks.probability)
 
-    def velocity(self, tracks: Tracks, recent: Bools | None = None) -> Array:
+    def velocity(self, tracks: Tracks, recent: Bools | None = None, across: Array | None = None) -> Array:
         """Return the mean velocities (N, 2) [m/s].
 
-        recent  whether objects (N,) have been detected in few scans: their velocity is 0 unless it is certain
+        recent  whether objects (N,) have been detected in few scans: their velocity is 0 unless it is certain, and so
+                is its component in the directions `across` their bodies (N, 2), in which vehicles do not move
         """
         moves = Estimates(tracks.state[MOVES], tracks.covariance[MOVES])
         velocity, probability = self._base.velocity(moves.state), tracks.probability[MOVES]
-        if recent is not None and recent.any():
+        if recent is not None and across is not None and recent.any():
             least = CERTAIN**2 * self._base.speed_variance(moves)
             probability = np.where(recent & (np.square(velocity).sum(axis=1) < least), 0.0, probability)
+            drift = np.einsum("ni,ni->n", velocity, across)
+            least = CERTAIN**2 * self._base.speed_variance(moves, across)
+            velocity = velocity - np.where(recent & (np.square(drift) < least), drift, 0.0)[:, None] * across
         return np.asarray(probability[:, None] * velocity)
 
     def course(self, tracks: Tracks) -> Array:

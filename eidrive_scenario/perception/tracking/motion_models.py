@@ -82,8 +82,8 @@ class MotionModel(ABC):
         """Return velocities (N, 2) [m/s]."""
 
     @abstractmethod
-    def speed_variance(self, tracks: Estimates) -> Array:
-        """Return the variances (N,) of the speeds in the directions of motion [m²/s²]."""
+    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
+        """Return the variances (N,) of the speeds in these directions (N, 2), None: those of motion [m²/s²]."""
 
 
 class ConstantVelocity(MotionModel):
@@ -121,10 +121,10 @@ class ConstantVelocity(MotionModel):
     def velocity(self, state: Array) -> Array:
         return state[:, 2:4]
 
-    def speed_variance(self, tracks: Estimates) -> Array:
-        velocity = tracks.state[:, 2:4]
-        variance = np.einsum("ni,nij,nj->n", velocity, tracks.covariance[:, 2:4, 2:4], velocity)
-        return np.asarray(variance / np.maximum(np.square(velocity).sum(axis=1), 1e-12))
+    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
+        along = tracks.state[:, 2:4] if directions is None else directions
+        variance = np.einsum("ni,nij,nj->n", along, tracks.covariance[:, 2:4, 2:4], along)
+        return np.asarray(variance / np.maximum(np.square(along).sum(axis=1), 1e-12))
 
 
 class TurnRate(MotionModel):
@@ -199,7 +199,7 @@ class TurnRate(MotionModel):
     def velocity(self, state: Array) -> Array:
         return np.stack([state[:, 3] * np.cos(state[:, 2]), state[:, 3] * np.sin(state[:, 2])], axis=1)
 
-    def speed_variance(self, tracks: Estimates) -> Array:
+    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
         return tracks.covariance[:, 3, 3]
 
 
@@ -229,7 +229,7 @@ class Standing(MotionModel):
     def velocity(self, state: Array) -> Array:
         return np.zeros((len(state), 2))
 
-    def speed_variance(self, tracks: Estimates) -> Array:
+    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
         return np.zeros(len(tracks.state))
 
     def _at_rest(self, tracks: Estimates) -> Estimates:

@@ -330,7 +330,7 @@ class Tracker(TrackingMethod):
             self._boxes(rows, state),
             np.array([history.score for history in histories]) * existence,
             tuple([history.name for history in histories]),
-            self._filter.velocity(tracks, recent),
+            self._filter.velocity(tracks, recent, _axes(self._shape[rows, 4])[:, 1]),
             covariance[:, :2, :2],
             tuple([history.number or 0 for history in histories]),
             existence,

@@ -150,8 +150,8 @@ class UncertainPose(MotionModel):
     def velocity(self, state: Array) -> Array:
         return self._base.velocity(state)
 
-    def speed_variance(self, tracks: Estimates) -> Array:
-        return self._base.speed_variance(tracks)
+    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
+        return self._base.speed_variance(tracks, directions)
 
     def _shifted(self, tracks: Estimates, pose: PoseUncertainty, sign: float) -> Estimates:
         """Return the tracks with the effect of the pose error on their position and heading added or subtracted."""

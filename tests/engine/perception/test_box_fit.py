@@ -210,6 +210,17 @@ def test_fit_box_of_grazed_flank_is_behind_visible_side(side: float, hidden: tup
     assert side * found.box[1] - across / 2.0 == pytest.approx(0.6, abs=0.1)
 
 
+@pytest.mark.parametrize("first", [2.65, 2.95, 3.2])
+def test_missed_side_of_an_oncoming_car_is_within_the_stated_deviation(first: float) -> None:
+    """Rays 1.05 m apart meet the front and the hood of a car 1.8 m wide at y = 3.5, and may pass its side, which is
+    seen at 7°: the column at `first` may be on it or not."""
+    sparse = Pattern(math.radians(2.3), math.radians(1.3), math.radians(10.0))
+    points = np.array([(24.3, first, 0.7), (25.9, first, 1.1), (24.3, first + 1.05, 0.7)])
+    fitted = fit(points, pattern=sparse, heading=0.0)
+    assert fitted.name == "car"
+    assert abs(fitted.box[1] - 3.5) < 2.0 * math.sqrt(fitted.covariance[1, 1])
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_fit_box_of_single_column_beside_occluder_extends_behind_it(seed: int) -> None:
     rng = np.random.default_rng(seed)

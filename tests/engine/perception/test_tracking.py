@@ -369,6 +369,17 @@ def test_velocity_of_new_track_is_zero_until_it_is_known() -> None:
     assert held.velocity[0, 0] == pytest.approx(15.0, abs=1.0)
 
 
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0])
+def test_new_vehicle_moves_across_its_axis_only_if_that_is_certain(yaw: float) -> None:
+    """Successive boxes differ by -0.75 m in x and, by an error of one deviation, 0.2 m in y within 0.05 s: 15 and 4
+    m/s. A car drives along its axis, and 4 m/s are no evidence of the contrary; 15 m/s across a wrong axis are."""
+    track = tracker(confirm=(2, 3))
+    for number, y in enumerate((0.0, 0.2, 0.0, 0.2)):
+        reported = track.update(cars(0.05 * number, (-0.75 * number, y, yaw), deviation=0.2))
+    assert reported.velocity[0, 0] == pytest.approx(-15.0, abs=3.0)
+    assert reported.velocity[0, 1] == pytest.approx(0.0, abs=1e-9) or yaw != 0.0
+
+
 def test_position_of_standing_object_stays_as_uncertain_as_common_errors() -> None:
     """300 boxes of a standard deviation of 3 m, all of them 3 m too near, are no precise position: a better sensor is
     believed at once."""
