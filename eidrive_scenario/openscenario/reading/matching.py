@@ -7,7 +7,7 @@ XML Schema requires that each model is deterministic. The states give the expect
 from __future__ import annotations
 
 from collections import deque
-from itertools import pairwise
+from collections.abc import Iterable
 
 import msgspec
 
@@ -29,16 +29,11 @@ class Group(msgspec.Struct, frozen=True):
     repeated: bool = False
 
 
-class Automaton(msgspec.Struct):
+class Automaton(msgspec.Struct, frozen=True):
     """Automaton with state 0 before the first child; `steps` maps the name of the next child to the next state."""
 
-    steps: list[dict[str, int]] = msgspec.field(default_factory=lambda: [{}])
-    accepting: set[int] = msgspec.field(default_factory=set)
-    distances: dict[int, int] = msgspec.field(default_factory=dict)
-    """Minimum number of children from each state to an accepting state."""
-
-    def __post_init__(self) -> None:
-        self.distances = self._distances()
+    steps: list[dict[str, int]]
+    accepting: set[int]
 
     def after(self, state: int, name: str) -> int:
         """Return the state after a child of that name; for a misplaced child, the next state that it may reach."""
@@ -64,93 +59,54 @@ class Automaton(msgspec.Struct):
 
     def missing(self, state: int) -> list[tuple[str, ...]]:
         """Return the alternatives for each of the minimum children that must follow."""
-        distance = self.distances
         needed: list[tuple[str, ...]] = []
-        while distance[state] > 0:
-            nearer = {name: to for name, to in self.steps[state].items() if distance[to] == distance[state] - 1}
+        while distance := self._distance(state):
+            nearer = {name: to for name, to in self.steps[state].items() if self._distance(to) < distance}
             needed.append(tuple(nearer))
             state = min(nearer.values())
         return needed
 
-    def _distances(self) -> dict[int, int]:
-        into: dict[int, set[int]] = {}
-        for state, step in enumerate(self.steps):
-            for to in step.values():
-                into.setdefault(to, set()).add(state)
-        distance = dict.fromkeys(self.accepting, 0)
-        queue = deque(self.accepting)
-        while queue:
-            state = queue.popleft()
-            for before in into.get(state, ()):
-                if before not in distance:
-                    distance[before] = distance[state] + 1
-                    queue.append(before)
-        return distance
-
-
-class _Piece(msgspec.Struct):
-    """Part of the automaton: its first and last states, and whether it may be empty."""
-
-    empty: bool
-    first: list[int]
-    last: list[int]
-
-
-class _Builder:
-    def __init__(self) -> None:
-        self.names: list[str] = [""]
-        self.follow: list[list[int]] = [[]]
-
-    def piece(self, part: Leaf | Group) -> _Piece:
-        if isinstance(part, Leaf):
-            return self._leaf(part)
-        pieces = [self.piece(member) for member in part.parts]
-        group = self._alternatives(pieces) if part.exclusive else self._chain(pieces)
-        if part.repeated:
-            self._link(group.last, group.first)
-        return _Piece(group.empty or part.optional, group.first, group.last)
-
-    def _leaf(self, leaf: Leaf) -> _Piece:
-        copies = [self._state(leaf.name) for _ in range(max(leaf.minimum, 1))]
-        for before, after in pairwise(copies):
-            self._link([before], [after])
-        if leaf.maximum is None:
-            self._link([copies[-1]], [copies[-1]])
-        return _Piece(leaf.minimum == 0, copies[:1], copies[-1:])
-
-    def _chain(self, pieces: list[_Piece]) -> _Piece:
-        chain = _Piece(True, [], [])
-        for piece in pieces:
-            self._link(chain.last, piece.first)
-            chain = _Piece(
-                chain.empty and piece.empty,
-                chain.first + piece.first if chain.empty else chain.first,
-                chain.last + piece.last if piece.empty else piece.last,
-            )
-        return chain
-
-    @staticmethod
-    def _alternatives(pieces: list[_Piece]) -> _Piece:
-        return _Piece(
-            not pieces or any(piece.empty for piece in pieces),
-            [state for piece in pieces for state in piece.first],
-            [state for piece in pieces for state in piece.last],
-        )
-
-    def _state(self, name: str) -> int:
-        self.names.append(name)
-        self.follow.append([])
-        return len(self.names) - 1
-
-    def _link(self, before: list[int], after: list[int]) -> None:
-        for state in before:
-            self.follow[state].extend(after)
+    def _distance(self, state: int) -> int:
+        """Return the minimum number of children up to an accepting state, which every state reaches."""
+        count, reached = 0, {state}
+        while reached.isdisjoint(self.accepting):
+            count, reached = count + 1, {to for at in reached for to in self.steps[at].values()}
+        return count
 
 
 def automaton(model: Group) -> Automaton:
     """Build the automaton of a content model."""
-    builder = _Builder()
-    root = builder.piece(model)
-    builder.follow[0] = root.first
-    steps = [{builder.names[to]: to for to in following} for following in builder.follow]
-    return Automaton(steps, set(root.last) | ({0} if root.empty else set()))
+    names: list[str] = [""]
+    following: list[list[int]] = [[]]
+
+    def link(before: Iterable[int], after: Iterable[int]) -> None:
+        for state in before:
+            following[state].extend(after)
+
+    def add(part: Leaf | Group) -> tuple[bool, list[int], list[int]]:
+        """Add the states of a part; return whether it may be empty, and its first and last states."""
+        if isinstance(part, Leaf):
+            copies = list(range(len(names), len(names) + max(part.minimum, 1)))
+            names.extend(part.name for _ in copies)
+            following.extend([after] for after in copies[1:])
+            following.append(copies[-1:] if part.maximum is None else [])
+            return part.minimum == 0, copies[:1], copies[-1:]
+        members = [add(member) for member in part.parts]
+        if part.exclusive:
+            is_optional = not members or any(may_be_empty for may_be_empty, _, _ in members)
+            first = [state for _, entrances, _ in members for state in entrances]
+            last = [state for _, _, exits in members for state in exits]
+        else:
+            is_optional, first, last = True, [], []
+            for may_be_empty, entrances, exits in members:
+                link(last, entrances)
+                first = first + entrances if is_optional else first
+                last = last + exits if may_be_empty else exits
+                is_optional = is_optional and may_be_empty
+        if part.repeated:
+            link(last, first)
+        return is_optional or part.optional, first, last
+
+    is_empty_allowed, following[0], last = add(model)
+    steps = [{names[to]: to for to in targets} for targets in following]
+    return Automaton(steps, {*last, 0} if is_empty_allowed else set(last))
