@@ -63,45 +63,33 @@ def version_of(document: Document, collector: DiagnosticCollector, older: Versio
     older  version as which a file of revMajor 0 is read, with a warning
     """
     root = document.root
+    at = Location(document.name, line_of(root))
     if root.tag not in ROOTS:
         name = etree.QName(root)
-        in_namespace = bool(name.namespace) and name.localname in ROOTS
-        collector.error(
-            f"the root element is {root.tag} (expected OpenSCENARIO)",
-            f"remove xmlns={name.namespace!r}: the standard has no namespace"
-            if in_namespace
-            else "check the kind of the file",
-            at=Location(document.name, line_of(root)),
-        )
+        hint = "check the kind of the file"
+        if name.namespace and name.localname in ROOTS:
+            hint = f"remove xmlns={name.namespace!r}: the standard has no namespace"
+        collector.error(f"the root element is {root.tag} (expected OpenSCENARIO)", hint, at=at)
         return None
     header = root.find("FileHeader")
     if header is None:
-        collector.error(
-            "OpenSCENARIO lacks the element FileHeader",
-            "its revMajor and revMinor specify the version of the standard",
-            at=Location(document.name, line_of(root)),
-        )
+        hint = "its revMajor and revMinor specify the version of the standard"
+        collector.error("OpenSCENARIO lacks the element FileHeader", hint, at=at)
         return None
-    return _revision(header, document, collector, older)
-
-
-def _revision(
-    header: etree._Element, document: Document, collector: DiagnosticCollector, older: Version | None
-) -> Version | None:
+    at = Location(document.name, line_of(header))
     numbers = []
-    for name in ("revMajor", "revMinor"):
-        text = header.get(name)
+    for attribute in ("revMajor", "revMinor"):
+        text = header.get(attribute)
         if text is None or not (text.strip().isascii() and text.strip().isdigit()):
-            problem = f"lacks the attribute {name!r}" if text is None else f"has the {name} {text!r}"
-            hint = "version 1.4 is revMajor 1 and revMinor 4"
-            collector.error(f"FileHeader {problem}", hint, at=Location(document.name, line_of(header)))
+            problem = f"lacks the attribute {attribute!r}" if text is None else f"has the {attribute} {text!r}"
+            collector.error(f"FileHeader {problem}", "version 1.4 is revMajor 1 and revMinor 4", at=at)
             return None
         numbers.append(int(text.strip()[:9]))
     version = (numbers[0], numbers[1])
     if version in VERSIONS:
         return version
+    is_older = older is not None and version < older
     supported = "known: " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
-    report = collector.warning if older and version < older else collector.error
-    message = f"FileHeader has the version {version[0]}.{version[1]}"
-    report(message, supported, at=Location(document.name, line_of(header)))
-    return older if older and version < older else None
+    report = collector.warning if is_older else collector.error
+    report(f"FileHeader has the version {version[0]}.{version[1]}", supported, at=at)
+    return older if is_older else None

@@ -133,7 +133,9 @@ class Reader:
         if content.choice and not any(
             child.tag in content.choice or child.tag not in content.children for child in children
         ):
-            self._report_empty(node, cls, content)
+            # The schemas up to 1.2 allow an empty choice
+            report = self._warn if cls in _MAY_BE_EMPTY else self._error
+            report(f"{node.tag} is empty", "it contains one of " + ", ".join(content.choice), node)
         for name in ("catalog_reference", "catalog_references"):
             if name in values:
                 self._note_references(content, values[name])
@@ -166,17 +168,18 @@ class Reader:
             if error.message:
                 self._error(f"{name} of {node.tag}: {error.message}", error.hint, node)
         except ValueError as error:
+            # Python literals that XML does not have; scenariogeneration 0.16 writes some
+            message = f"{name} of {node.tag} is {quoted(text)}, which is"
             if text == "None" and not rule.required:
-                self._warn_of_python(name, node, text, "which is read as a missing attribute", "omit it")
+                self._warn(f"{message} read as a missing attribute", "omit it", node)
             elif text in _INFINITE and rule.scalar is DOUBLE:
                 value = float(text)
-                self._warn_of_python(name, node, text, "which is read as infinity", f"write {text.upper()}")
+                self._warn(f"{message} read as infinity", f"write {text.upper()}", node)
             else:
-                message = f"{name} of {node.tag} is {quoted(text)}, which is not {rule.scalar.name}"
-                self._error(message, str(error), node)
+                self._error(f"{message} not {rule.scalar.name}", str(error), node)
         if rule.deprecated:
             self._deprecated(f"the attribute {name!r} of {node.tag}", rule.deprecated, node)
-        if isinstance(value, model.Enumeration) and rule.scalar.is_deprecated(value):
+        if isinstance(value, model.Enumeration) and value in rule.scalar.deprecated:
             self._deprecated(f"{value.value!r} of {type(value).__name__}", value.usage.deprecated, node)
         return value
 
@@ -208,11 +211,7 @@ class Reader:
         elif node in self._with_text:
             self._error(f"{node.tag} contains text; only elements are allowed", "remove the text", node)
         elif not content.children and node in self._with_space:
-            self.collector.warning(
-                f"{node.tag} contains white space; the schema allows no content",
-                f"write <{node.tag} …/>",
-                at=Location(self.source, line_of(node)),
-            )
+            self._warn(f"{node.tag} contains white space; the schema allows no content", f"write <{node.tag} …/>", node)
 
     def _child(
         self,
@@ -236,12 +235,6 @@ class Reader:
         else:
             values.setdefault(rule.field, element)
 
-    def _report_empty(self, node: etree._Element, cls: type[model.Element], content: Rules) -> None:
-        """Report an empty choice, which the schemas up to 1.2 allow; a warning for classes that files leave empty."""
-        report = self.collector.warning if cls in _MAY_BE_EMPTY else self.collector.error
-        hint = "it contains one of " + ", ".join(content.choice)
-        report(f"{node.tag} is empty", hint, at=Location(self.source, line_of(node)))
-
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> model.Element:
         """Read declarations in their order, so that each may use those before it."""
         content = rules(model.ParameterDeclarations, self.version)
@@ -254,11 +247,11 @@ class Reader:
         for child in children:
             if child.tag in content.children:
                 errors_before = self._error_count
-                declaration = self._element(child, model.ParameterDeclaration, scope, {})
-                is_valid = self._error_count == errors_before
-                declared.append(
-                    self._declare(cast(model.ParameterDeclaration, declaration), scope, assignments, is_valid)
+                declaration = cast(
+                    model.ParameterDeclaration, self._element(child, model.ParameterDeclaration, scope, {})
                 )
+                is_valid = self._error_count == errors_before
+                declared.append(self._declare(declaration, scope, assignments, is_valid))
         values["parameter_declaration"] = tuple(declared)
         self._unknown_parameters(assignments, scope.parameters)
         assignments.clear()
@@ -285,8 +278,7 @@ class Reader:
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
             origin = assignment.origin or Location(self.source)
-            hint = suggestion(name, declared)
-            self.collector.error(f"unknown parameter {name!r}", hint, at=origin)
+            self.collector.error(f"unknown parameter {name!r}", suggestion(name, declared), at=origin)
 
     def _note_references(self, content: Rules, value: Any) -> None:
         entries = {child.cls for child in rules(model.Catalog, self.version).children.values()}
@@ -294,15 +286,11 @@ class Reader:
         references = value if isinstance(value, tuple) else (value,)
         self.references.extend(ReferenceUse(reference, kinds) for reference in references)
 
-    def _warn_of_python(self, name: str, node: etree._Element, text: str, effect: str, hint: str) -> None:
-        """Warn of a Python literal that XML does not have; scenariogeneration 0.16 writes some."""
-        message = f"{name} of {node.tag} is {quoted(text)}, {effect}"
-        self.collector.warning(message, hint, at=Location(self.source, line_of(node)))
-
     def _deprecated(self, subject: str, since: str, node: etree._Element) -> None:
-        self.collector.warning(
-            f"{subject} is deprecated since OpenSCENARIO {since}", at=Location(self.source, line_of(node))
-        )
+        self._warn(f"{subject} is deprecated since OpenSCENARIO {since}", "", node)
+
+    def _warn(self, message: str, hint: str, node: etree._Element) -> None:
+        self.collector.warning(message, hint, at=Location(self.source, line_of(node)))
 
     def _error(self, message: str, hint: str, node: etree._Element) -> None:
         self._error_count += 1

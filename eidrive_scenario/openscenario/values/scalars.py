@@ -35,10 +35,6 @@ class Scalar(msgspec.Struct, frozen=True):
     deprecated: frozenset[Any] = frozenset()
     """Values that the version deprecates."""
 
-    def is_deprecated(self, value: Any) -> bool:
-        """Whether the version deprecates this value."""
-        return value in self.deprecated
-
 
 def _double(text: str) -> float:
     text = text.strip(_WHITE_SPACE)
@@ -47,8 +43,8 @@ def _double(text: str) -> float:
     return float(text)
 
 
-def integer(limits: Limits) -> Callable[[str], int]:
-    """Return a converter to whole numbers within limits."""
+def whole_number(limits: Limits) -> Scalar:
+    """Return the type of whole numbers within limits."""
 
     def convert(text: str) -> int:
         text = text.strip(_WHITE_SPACE)
@@ -59,7 +55,7 @@ def integer(limits: Limits) -> Callable[[str], int]:
             raise ValueError(f"expected a number between {limits.lowest} and {limits.highest}")
         return value
 
-    return convert
+    return Scalar("a whole number", convert, True)
 
 
 def _boolean(text: str) -> bool:
@@ -85,15 +81,10 @@ def _date_time(text: str) -> datetime:
 
 
 DOUBLE = Scalar("a number", _double, True)
-INTEGER = Scalar("a whole number", integer(INT), True)
+INTEGER = whole_number(INT)
 BOOLEAN = Scalar("a truth value", _boolean, True)
 STRING = Scalar("a text", str, True)
 DATE_TIME = Scalar("a date and time", _date_time)
-
-
-def whole_number(limits: Limits) -> Scalar:
-    """Return the type of whole numbers within limits."""
-    return Scalar("a whole number", integer(limits), True)
 
 
 def enumeration(cls: type[Enumeration], version: Version) -> Scalar:

@@ -73,6 +73,6 @@ def test_enumeration_literals_depend_on_the_version() -> None:
 def test_deprecated_literals_are_accepted_and_marked() -> None:
     old, new = enumeration(Priority, (1, 1)), enumeration(Priority, (1, 2))
     assert old.convert("overwrite") is new.convert("overwrite") is Priority.OVERWRITE
-    assert not old.is_deprecated(Priority.OVERWRITE)
-    assert new.is_deprecated(Priority.OVERWRITE)
+    assert not old.deprecated
+    assert new.deprecated == {Priority.OVERWRITE}
     assert enumeration(RelativeDistanceType, (1, 0)).convert("cartesianDistance")
