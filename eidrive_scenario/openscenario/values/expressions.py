@@ -85,11 +85,6 @@ HELP = "allowed are + - * / % not and or, brackets, and " + " ".join(FUNCTIONS)
 _KEYWORDS = {"and", "or", "not"}
 
 
-def parameters_of(text: str) -> list[str]:
-    """Return the parameters in an expression."""
-    return REFERENCE.findall(text)
-
-
 def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
     """Return the value of an expression without its `${` and `}`. Raise ExpressionError if it is invalid."""
     if len(text) > MAX_LENGTH:

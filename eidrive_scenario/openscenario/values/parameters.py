@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -131,11 +132,16 @@ class Scope:
         match = REFERENCE.fullmatch(text)
         if match:
             parameter = self.find(match.group(1))
-            return self._convert(parameter.text, scalar, f"${parameter.name} is {quoted(parameter.text)}")
-        if not (text.startswith("${") and text.endswith("}") and scalar.takes_expressions):
+            result, subject = parameter.text, f"${parameter.name} is {quoted(parameter.text)}"
+        elif text.startswith("${") and text.endswith("}") and scalar.takes_expressions:
+            result = format_value(self._evaluate(text, as_text=scalar is STRING))
+            subject = f"the expression {quoted(text[2:-1])} is {result}"
+        else:
             return scalar.convert(text)
-        result = format_value(self._evaluate(text, as_text=scalar is STRING))
-        return self._convert(result, scalar, f"the expression {quoted(text[2:-1])} is {result}")
+        try:
+            return scalar.convert(result if scalar in TEXTUAL else _whole(result))
+        except ValueError as error:
+            raise ExpressionError(f"{subject}, which is not {scalar.name}", str(error)) from error
 
     def evaluate(self, text: str) -> Value:
         """Return the value of `$name` or `${expression}` in its own type, for texts outside of attributes.
@@ -151,27 +157,19 @@ class Scope:
     def _evaluate(self, text: str, *, as_text: bool) -> Value:
         """Return the value of `${expression}`; only if `as_text` is True may it concatenate texts."""
         body = text[2:-1]
-        used = {name: self.find(name) for name in expressions.parameters_of(body)}
+        references = REFERENCE.findall(body)
+        used = {name: self.find(name) for name in references}
         operands = {name: parameter.operand for name, parameter in used.items()}
         if as_text and expressions.joins_text(body, operands):
-            return self._concatenate(body, {name: parameter.text for name, parameter in used.items()})
+            try:
+                self.budget.join(len(body) + sum(len(used[name].text) for name in references))
+            except BudgetError as error:
+                message = f"the expression {quoted(body)} is too long: {error}"
+                raise ExpressionError(message, "concatenate less") from error
+            return expressions.concatenate(body, {name: parameter.text for name, parameter in used.items()})
         if not EXPRESSION.fullmatch(text):
             raise ExpressionError(f"{quoted(text)} has characters that an expression may not have", expressions.HELP)
         return expressions.evaluate(body, operands)
-
-    def _concatenate(self, text: str, values: Mapping[str, str]) -> str:
-        length = len(text) + sum(len(values[name]) for name in expressions.parameters_of(text))
-        try:
-            self.budget.join(length)
-        except BudgetError as error:
-            raise ExpressionError(f"the expression {quoted(text)} is too long: {error}", "concatenate less") from error
-        return expressions.concatenate(text, values)
-
-    def _convert(self, text: str, scalar: Scalar, subject: str) -> Any:
-        try:
-            return scalar.convert(text if scalar in TEXTUAL else _whole(text))
-        except ValueError as error:
-            raise ExpressionError(f"{subject}, which is not {scalar.name}", str(error)) from error
 
 
 def format_value(value: Value) -> str:
@@ -259,25 +257,25 @@ def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
         sides = value, scalar.convert(_without_fraction(constraint.value, scalar))
         if scalar is STRING and all(fits_type(side, DOUBLE) for side in sides):
             sides = DOUBLE.convert(sides[0]), DOUBLE.convert(sides[1])
-        if not compare(sides[0], constraint.rule, sides[1]):
+        elif scalar is DATE_TIME:
+            sides = _in_time_zone(sides[0]), _in_time_zone(sides[1])
+        if not _COMPARISONS[constraint.rule](*sides):
             return False
     return True
 
 
-def compare(left: Any, rule: Rule, right: Any) -> bool:
-    """Whether two values of one type satisfy a rule."""
-    if isinstance(left, datetime) and isinstance(right, datetime):
-        left, right = (moment if moment.tzinfo else moment.replace(tzinfo=UTC) for moment in (left, right))
-    return bool(_COMPARISONS[rule](left, right))
+def _in_time_zone(moment: datetime) -> datetime:
+    """Return a moment as UTC if it has no time zone: Python does not order moments with and without one."""
+    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
 _COMPARISONS = {
-    Rule.EQUAL_TO: lambda left, right: left == right,
-    Rule.NOT_EQUAL_TO: lambda left, right: left != right,
-    Rule.GREATER_THAN: lambda left, right: left > right,
-    Rule.GREATER_OR_EQUAL: lambda left, right: left >= right,
-    Rule.LESS_THAN: lambda left, right: left < right,
-    Rule.LESS_OR_EQUAL: lambda left, right: left <= right,
+    Rule.EQUAL_TO: operator.eq,
+    Rule.NOT_EQUAL_TO: operator.ne,
+    Rule.GREATER_THAN: operator.gt,
+    Rule.GREATER_OR_EQUAL: operator.ge,
+    Rule.LESS_THAN: operator.lt,
+    Rule.LESS_OR_EQUAL: operator.le,
 }
 
 
@@ -323,41 +321,27 @@ def resolve_references(
     if scope is None:
         return data
     diagnostics: list[Diagnostic] = []
-    resolved = _resolve(data, scope, path, source, line, lines or {}, diagnostics)
+
+    def resolve(data: Any, path: str, line: int | None) -> Any:
+        line = lines.get(path, line) if lines else line
+        if isinstance(data, Mapping):
+            return {key: resolve(value, _below(path, key), line) for key, value in data.items()}
+        if isinstance(data, list | tuple):
+            return [resolve(value, _below(path, index), line) for index, value in enumerate(data)]
+        if not is_reference(data):
+            return data
+        try:
+            return scope.evaluate(data)
+        except ExpressionError as error:
+            if error.message:
+                message = f"setting {path!r}: {error.message}" if path else error.message
+                diagnostics.append(Diagnostic(message, error.hint, source, line))
+            return data
+
+    resolved = resolve(data, path, line)
     if diagnostics:
         raise SettingError(diagnostics)
     return resolved
-
-
-def _resolve(
-    data: Any,
-    scope: Scope,
-    path: str,
-    source: str,
-    line: int | None,
-    lines: Mapping[str, int],
-    diagnostics: list[Diagnostic],
-) -> Any:
-    line = lines.get(path, line)
-    if isinstance(data, Mapping):
-        return {
-            key: _resolve(value, scope, _below(path, key), source, line, lines, diagnostics)
-            for key, value in data.items()
-        }
-    if isinstance(data, list | tuple):
-        return [
-            _resolve(value, scope, _below(path, index), source, line, lines, diagnostics)
-            for index, value in enumerate(data)
-        ]
-    if not is_reference(data):
-        return data
-    try:
-        return scope.evaluate(data)
-    except ExpressionError as error:
-        if error.message:
-            message = f"setting {path!r}: {error.message}" if path else error.message
-            diagnostics.append(Diagnostic(message, error.hint, source, line))
-        return data
 
 
 def parameter_hints(data: Any, scope: Scope | None, path: str = "") -> dict[str, str]:
@@ -368,9 +352,8 @@ def parameter_hints(data: Any, scope: Scope | None, path: str = "") -> dict[str,
     if scope is None:
         return {}
     if isinstance(data, Mapping | list | tuple):
-        entries = data.items() if isinstance(data, Mapping) else enumerate(data)
         hints: dict[str, str] = {}
-        for key, value in entries:
+        for key, value in data.items() if isinstance(data, Mapping) else enumerate(data):
             hints |= parameter_hints(value, scope, _below(path, key))
         return hints
     if not is_reference(data):
