@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -88,15 +89,10 @@ class CatalogLibrary:
         self._collector = collector
         self._locations: dict[str, Path] = {}
         for name, location in vars(locations).items() if locations else ():
-            if (
-                isinstance(location, model.CatalogLocation)
-                and location.directory
-                and isinstance(location.directory.path, str)
-            ):
-                kind = "".join(
-                    word.capitalize() for word in name.removesuffix("_catalog").split("_")
-                )  # As `MiscObject`
-                self._locations[kind] = resolve_path(location.directory.path, folder)
+            directory = location.directory if isinstance(location, model.CatalogLocation) else None
+            if directory and isinstance(directory.path, str):
+                kind = name.removesuffix("_catalog").title().replace("_", "")  # As `MiscObject`
+                self._locations[kind] = resolve_path(directory.path, folder)
         self.folders: dict[Path, Listing] = {path: listing_of(path) for path in self._locations.values()}
         """Locations of catalogs with their listings, before any file in them is read."""
         self._is_complete = True
@@ -111,22 +107,24 @@ class CatalogLibrary:
             names = (reference.catalog_name, reference.entry_name)
             if not all(isinstance(name, str) for name in names):
                 continue
+            message, hint = "", ""
             if names in active:
-                self._error(
-                    reference, f"catalog entry {quoted(names[1])} refers to itself", "remove the circular reference"
-                )
-                self._circular.add(reference)
-                continue
-            if len(active) >= MAX_NESTED_REFERENCES:
-                message = f"catalog entries are nested deeper than {len(active)} levels"
-                self._error(reference, message, "flatten them")
+                message, hint = f"catalog entry {quoted(names[1])} refers to itself", "remove the circular reference"
+            elif len(active) >= MAX_NESTED_REFERENCES:
+                message, hint = f"catalog entries are nested deeper than {len(active)} levels", "flatten them"
+            if message:
+                self._collector.error(message, hint, at=reference)
                 self._circular.add(reference)
                 continue
             if reference not in self.entries:
                 entry = self._read_entry(use, (*active, names))
                 if entry is not None and reference not in self._circular:
                     self.entries[reference] = entry
-            self._check_kind(use)
+            kept = self.entries.get(reference)
+            if kept is not None and not isinstance(kept, use.kinds):
+                message = f"catalog entry {quoted(names[1])} is a {type(kept).__name__}"
+                expected = " or ".join(kind.__name__ for kind in use.kinds)
+                self._collector.error(message, f"expected {expected}", at=reference)
 
     @property
     def digests(self) -> dict[str, str]:
@@ -148,21 +146,19 @@ class CatalogLibrary:
         catalog = self._catalog(use)
         if catalog is None:
             return None
-        node = catalog.entries.get(reference.entry_name)
+        name = reference.entry_name
+        node = catalog.entries.get(name)
         if node is None:
-            self._error(
-                reference,
-                f"catalog {quoted(catalog.name)} has no entry {quoted(reference.entry_name)}",
-                suggestion(reference.entry_name, catalog.entries),
-            )
+            message = f"catalog {quoted(catalog.name)} has no entry {quoted(name)}"
+            self._collector.error(message, suggestion(name, catalog.entries), at=reference)
             return None
-        if reference.entry_name in catalog.duplicates:
-            self._collector.errors.append(catalog.duplicates[reference.entry_name])
+        if name in catalog.duplicates:
+            self._collector.errors.append(catalog.duplicates[name])
             return None
         rule = rules(model.Catalog, catalog.version).children.get(node.tag)
         if rule is None:
-            message = f"catalog entry {quoted(reference.entry_name)} is a {node.tag}, which is not allowed in a catalog"
-            self._error(reference, message, f"remove it from {catalog.document.name}:{line_of(node)}")
+            message = f"catalog entry {quoted(name)} is a {node.tag}, which is not allowed in a catalog"
+            self._collector.error(message, f"remove it from {catalog.document.name}:{line_of(node)}", at=reference)
             return None
         try:
             self._collector.budget.enter_catalog_element(sum(1 for _ in node.iter()))
@@ -172,24 +168,12 @@ class CatalogLibrary:
         reader = Reader(catalog.document.name, catalog.version, self._collector, catalog.document.read)
         lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._collector.budget)
         entry = reader.read(node, rule.cls, _assignments(reference), lent)
-        for name in sorted(lent.lent or ()):
-            self._collector.warning(
-                f"catalog entry {quoted(reference.entry_name)} uses the parameter {quoted(name)} of the scenario",
-                "declare it in the entry, and assign it in the CatalogReference",
-                at=entry,
-            )
+        for parameter in sorted(lent.lent or ()):
+            message = f"catalog entry {quoted(name)} uses the parameter {quoted(parameter)} of the scenario"
+            hint = "declare it in the entry, and assign it in the CatalogReference"
+            self._collector.warning(message, hint, at=entry)
         self.resolve(reader.references, active)
         return entry
-
-    def _check_kind(self, use: ReferenceUse) -> None:
-        entry = self.entries.get(use.reference)
-        if entry is not None and not isinstance(entry, use.kinds):
-            expected = " or ".join(kind.__name__ for kind in use.kinds)
-            self._error(
-                use.reference,
-                f"catalog entry {quoted(use.reference.entry_name)} is a {type(entry).__name__}",
-                f"expected {expected}",
-            )
 
     def _catalog(self, use: ReferenceUse) -> CatalogFile | None:
         """Return the catalog of that name: first in a file of that name, then in any other file."""
@@ -198,7 +182,7 @@ class CatalogLibrary:
         if not locations:
             expected = " or ".join(f"{kind.__name__}Catalog" for kind in use.kinds)
             message = f"catalog {quoted(name)} has no location in CatalogLocations"
-            self._error(use.reference, message, f"add {expected}")
+            self._collector.error(message, f"add {expected}", at=use.reference)
             return None
         catalogs: dict[Path, CatalogFile] = {}
         unreadable: list[Diagnostic] = []
@@ -222,25 +206,21 @@ class CatalogLibrary:
         beside = self._beside(name)
         if beside is not None:
             parent = Path(beside.document.name).parent
-            self._collector.warning(
-                f"catalog {quoted(name)} is not in the given folders, but in {parent}",
-                f"specify the folder {parent}",
-                at=use.reference,
-            )
+            message = f"catalog {quoted(name)} is not in the given folders, but in {parent}"
+            self._collector.warning(message, f"specify the folder {parent}", at=use.reference)
             return beside
-        self._error(use.reference, *_missing_catalog(name, locations, {catalog.name for catalog in catalogs.values()}))
+        message, hint = _missing_catalog(name, locations, {catalog.name for catalog in catalogs.values()})
+        self._collector.error(message, hint, at=use.reference)
         return None
 
     def _beside(self, name: str) -> CatalogFile | None:
         """Return the catalog from a sibling of the given folders; this finds it if only some files were moved."""
         self._is_complete = False
-        folders = {
-            folder
-            for location in self._locations.values()
-            if os.path.isdir(location)
-            for folder in _listing(location.parent)
-            if os.path.isdir(folder) and folder not in self._locations.values()
-        }
+        folders: set[Path] = set()
+        for location in filter(os.path.isdir, self._locations.values()):
+            with suppress(OSError):  # A folder that cannot be listed
+                folders.update(filter(os.path.isdir, location.parent.iterdir()))
+        folders -= set(self._locations.values())
         for folder in sorted(folders):
             path = folder / f"{name}.xosc"
             catalog = self._file(path) if is_regular_file(path) else None
@@ -268,17 +248,6 @@ class CatalogLibrary:
             if collector.errors:
                 self._unreadable[path] = tuple(collector.errors)
         return self._files[path]
-
-    def _error(self, reference: model.CatalogReference, message: str, hint: str) -> None:
-        self._collector.error(message, hint, at=reference)
-
-
-def _listing(folder: Path) -> list[Path]:
-    """Return the content of a folder; an empty list if it cannot be listed."""
-    try:
-        return list(folder.iterdir())
-    except OSError:
-        return []
 
 
 def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
