@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened, suggestion
 from eidrive_scenario.extensions.library import ROADS_SUFFIX, from_library, resolve_path
@@ -34,51 +34,28 @@ def find_road_file(network: model.RoadNetwork | None, folder: Path, collector: D
     logic = network.logic_file if network else None
     if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
         return None
-    for candidate, is_stated in _candidates(logic, folder):
+    stated, subject = Path(logic.filepath.strip().replace("\\", "/")), f"road file '{shortened(logic.filepath, 300)}'"
+    map_folders = [Path(entry) for entry in os.environ.get(MAPS, "").split(os.pathsep) if entry]
+    for path in (stated, stated.with_name(stated.name + ROADS_SUFFIX)) if stated.name else ():
+        candidate = resolve_path(str(path), folder)
         if is_regular_file(candidate):
-            if candidate.parent == folder and not is_stated:
-                missing = f"road file '{shortened(logic.filepath, 300)}' does not exist"
-                collector.warning(f"{missing}; that beside the scenario is used", f"write {candidate.name!r}", at=logic)
             return candidate
-    collector.error(
-        f"road file '{shortened(logic.filepath, 300)}' is neither {_location(folder)} nor in the folders of {MAPS}",
-        _hint(logic, folder),
-        at=logic,
-    )
-    return None
-
-
-def _location(folder: Path) -> str:
-    """Describe the base of relative paths; for a scenario without a file it is the current folder."""
-    return "in the current folder" if folder == Path() else "in the folder of the scenario"
-
-
-def _candidates(logic: model.File, folder: Path) -> Iterator[tuple[Path, bool]]:
-    """Yield the paths of a road file in the order of search, and whether each is the stated one."""
-    named = _named(logic)
-    for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
-        yield resolve_path(str(name), folder), True
-        for directory in (folder, *_map_folders()):
-            yield directory / name.name, False
-
-
-def _named(logic: model.File) -> Path:
-    return Path(logic.filepath.strip().replace("\\", "/"))
-
-
-def _map_folders() -> list[Path]:
-    return [Path(entry) for entry in os.environ.get(MAPS, "").split(os.pathsep) if entry]
-
-
-def _hint(logic: model.File, folder: Path) -> str:
-    named = _named(logic)
-    folders = [(folder / named).parent, *_map_folders()]
-    maps = {
-        file.stem for directory in folders if os.path.isdir(directory) for file in directory.glob(f"*{ROADS_SUFFIX}")
-    }
+        for directory in (folder, *map_folders):
+            candidate = directory / path.name
+            if is_regular_file(candidate):
+                if candidate.parent == folder:
+                    message = f"{subject} does not exist; that beside the scenario is used"
+                    collector.warning(message, f"write {candidate.name!r}", at=logic)
+                return candidate
+    folders = filter(os.path.isdir, [(folder / stated).parent, *map_folders])
+    maps = {file.stem for directory in folders for file in directory.glob(f"*{ROADS_SUFFIX}")}
+    hint = f"check LogicFile, or set {MAPS} to the folders of the maps"
     if maps:
-        return suggestion(named.name.removesuffix(ROADS_SUFFIX), maps)
-    return f"check LogicFile, or set {MAPS} to the folders of the maps"
+        hint = suggestion(stated.name.removesuffix(ROADS_SUFFIX), maps)
+    # Relative paths in a scenario without a file are relative to the current folder
+    base = "in the current folder" if folder == Path() else "in the folder of the scenario"
+    collector.error(f"{subject} is neither {base} nor in the folders of {MAPS}", hint, at=logic)
+    return None
 
 
 EntityObject: TypeAlias = model.Vehicle | model.Pedestrian | model.MiscObject
@@ -229,11 +206,8 @@ def _body(entity: model.ScenarioObject, body: model.Element | None) -> EntityObj
 
 
 def _values(declarations: model.ParameterDeclarations | model.VariableDeclarations | None) -> dict[str, str]:
-    if declarations is None:
-        return {}
-    if isinstance(declarations, model.ParameterDeclarations):
-        return {declaration.name: declaration.value for declaration in declarations.parameter_declaration}
-    return {declaration.name: declaration.value for declaration in declarations.variable_declaration}
+    children: Any = declarations.children() if declarations is not None else ()
+    return {declaration.name: declaration.value for declaration in children}
 
 
 def _controllers(
@@ -249,17 +223,13 @@ def _controllers(
 def _other_kind(root: model.OpenScenario, name: str) -> Diagnostic:
     """Return the error for a catalog or a parameter value distribution."""
     if root.catalog is not None:
-        return Diagnostic(
-            "the file is a catalog, not a scenario", "specify a scenario that refers to it", name, root.catalog.line
-        )
-    distribution = root.parameter_value_distribution
-    assert distribution is not None
-    return Diagnostic(
-        "the file is a parameter value distribution, not a scenario",
-        f"its scenario is {distribution.scenario_file.filepath!r}",
-        name,
-        distribution.line,
-    )
+        kind, hint, line = "catalog", "specify a scenario that refers to it", root.catalog.line
+    else:
+        distribution = root.parameter_value_distribution
+        assert distribution is not None
+        kind, line = "parameter value distribution", distribution.line
+        hint = f"its scenario is {distribution.scenario_file.filepath!r}"
+    return Diagnostic(f"the file is a {kind}, not a scenario", hint, name, line)
 
 
 class EntitySelections:

@@ -9,11 +9,10 @@ The parameters are declared in the file like all others; other engines use their
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 from weakref import WeakKeyDictionary
 
-import msgspec
 from pydantic import Field, model_validator
 
 from eidrive_scenario.base.randomness import generator
@@ -76,60 +75,40 @@ def variations(scenario: Scenario) -> Mapping[str, Distribution]:
 
 def _read_variations(scenario: Scenario) -> Mapping[str, Distribution]:
     errors = ErrorCollector()
-    specified: list[_Specification] = []
+    specified: list[tuple[CustomCommandAction, dict[Any, Any]]] = []
     for command in scenario.custom_commands:
         if command.type == COMMAND:
             with errors:
-                specified += _specifications(scenario, command)
-    names = {specification.name for specification in specified}
+                specified.append((command, _content(scenario, command)))
+    drawn = {str(name) for _, content in specified for name in content}
     distributions: dict[str, Distribution] = {}
-    for specification in specified:
-        with errors:
-            if specification.name in distributions:
-                raise specification.error(f"parameter {quoted(specification.name)} is drawn twice", "remove one")
-            distributions[specification.name] = specification.distribution(scenario, names)
+    for command, content in specified:
+        lines, scope = key_lines(command.content, command.line), hide_parameters(command.scope, drawn)
+        for key, bounds in content.items():
+            name, prefix = str(key), f"{key}."
+            source, line = command.source, lines.get(name, command.line)
+            own = {path.removeprefix(prefix): at for path, at in lines.items() if path.startswith(prefix)}
+            message, hint = "", ""
+            if name in distributions:
+                message, hint = f"parameter {quoted(name)} is drawn twice", "remove one"
+            elif name not in scenario.parameters:
+                message, hint = f"parameter {quoted(name)} is not declared", suggestion(name, scenario.parameters)
+            elif not isinstance(bounds, dict) or not bounds:
+                message, hint = f"parameter {quoted(name)} is {quoted(bounds)}", _EXPECTED
+            with errors:
+                if message:
+                    raise SettingError(Diagnostic(f"{COMMAND}: {message}", hint, source, line))
+                origins = parameter_hints(bounds, scope)
+                resolved = resolve_references(bounds, scope, source=source, line=line, lines=own)
+                distributions[name] = parse_settings(
+                    Distribution, resolved, source=source, line=line, lines=own, origins=origins
+                )
     errors.raise_if_any()
     return distributions
 
 
-class _Specification(msgspec.Struct, frozen=True):
-    """Parameter and its bounds, as a command specifies them.
-
-    lines  line of each setting of the command, by its dotted path
-    """
-
-    command: CustomCommandAction
-    name: str
-    bounds: Any
-    lines: Mapping[str, int]
-
-    @property
-    def line(self) -> int:
-        return self.lines.get(self.name, self.command.line)
-
-    def error(self, message: str, hint: str) -> SettingError:
-        """Return an error with the line of the parameter in the command."""
-        return SettingError(Diagnostic(f"{COMMAND}: {message}", hint, self.command.source, self.line))
-
-    def distribution(self, scenario: Scenario, drawn: Collection[str]) -> Distribution:
-        """Return the distribution, whose bounds must not refer to parameters that are `drawn`."""
-        if self.name not in scenario.parameters:
-            raise self.error(
-                f"parameter {quoted(self.name)} is not declared", suggestion(self.name, scenario.parameters)
-            )
-        if not isinstance(self.bounds, dict) or not self.bounds:
-            raise self.error(f"parameter {quoted(self.name)} is {quoted(self.bounds)}", _EXPECTED)
-        source = self.command.source
-        prefix = f"{self.name}."
-        own = {path.removeprefix(prefix): line for path, line in self.lines.items() if path.startswith(prefix)}
-        scope = hide_parameters(self.command.scope, drawn)
-        origins = parameter_hints(self.bounds, scope)
-        bounds = resolve_references(self.bounds, scope, source=source, line=self.line, lines=own)
-        return parse_settings(Distribution, bounds, source=source, line=self.line, lines=own, origins=origins)
-
-
-def _specifications(scenario: Scenario, command: CustomCommandAction) -> Iterator[_Specification]:
-    """Yield the parameters of a command. Raise SettingError if it is not a mapping or not in Init."""
+def _content(scenario: Scenario, command: CustomCommandAction) -> dict[Any, Any]:
+    """Return the bounds of each parameter of a command. Raise SettingError if it is not a mapping or not in Init."""
     source, line = command.source, command.line
     initial = scenario.storyboard.init.actions.user_defined_action
     if not any(command is action.custom_command_action for action in initial):
@@ -138,6 +117,4 @@ def _specifications(scenario: Scenario, command: CustomCommandAction) -> Iterato
     if not isinstance(data, dict):
         hint = "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}"
         raise SettingError(Diagnostic(f"{COMMAND} is {quoted(data)}", hint, source, line))
-    lines = key_lines(command.content, line)
-    for name, bounds in data.items():
-        yield _Specification(command, str(name), bounds, lines)
+    return data
