@@ -9,8 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
-import msgspec
-
 from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import ErrorCollector
 from eidrive_scenario.extensions.library import resolve_scenario
@@ -29,14 +27,8 @@ Key = tuple[str, str, tuple[tuple[str, Assignment], ...]]
 """Path and SHA-256 of a scenario file, and the values of its parameters."""
 
 
-class _Kept(msgspec.Struct, frozen=True):
-    """Scenario, and the characters of its expressions before the first run."""
-
-    scenario: Scenario
-    concatenated: int
-
-
-_kept: KeptFiles[Key, _Kept] = KeptFiles(MAX_KEPT)
+_kept: KeptFiles[Key, tuple[Scenario, int]] = KeptFiles(MAX_KEPT)
+"""Scenarios, and the characters of their expressions before the first run."""
 
 
 def load_kept(path: Path, parameters: Mapping[str, str | Assignment] | None = None) -> Scenario:
@@ -51,15 +43,15 @@ def load_kept(path: Path, parameters: Mapping[str, str | Assignment] | None = No
     except OSError:  # Larger, or an error that `load_scenario` reports
         return load_scenario(path, assignments)
     key = str(path), sha256_of(content), tuple(assignments.items())
-    kept = _kept.get(key)
-    if kept is not None and _is_current(kept.scenario, path):
-        if kept.scenario.scope is not None:
-            kept.scenario.scope.budget.concatenated = kept.concatenated  # Each run may use the whole limit
-        return kept.scenario
+    kept, concatenated = _kept.get(key) or (None, 0)
+    if kept is not None and _is_current(kept, path):
+        if kept.scope is not None:
+            kept.scope.budget.concatenated = concatenated  # Each run may use the whole limit
+        return kept
     scenario = load_scenario(path, assignments)
     if scenario.catalog_files is not None and scenario.scope is not None:
         key = key[0], scenario.digest, key[2]  # The content that was read, if the file has changed since
-        _kept.put(key, _Kept(scenario, scenario.scope.budget.concatenated), len(content))
+        _kept.put(key, (scenario, scenario.scope.budget.concatenated), len(content))
     return scenario
 
 

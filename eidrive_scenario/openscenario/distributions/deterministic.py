@@ -126,8 +126,7 @@ def combinations_of(deterministic: model.Deterministic, collector: DiagnosticCol
     if magnitude > math.log10(sys.maxsize):
         count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
         message = f"the distribution expands to {count} runs"
-        hint = "use larger steps in its ranges"
-        collector.error(message, hint, at=deterministic)
+        collector.error(message, "use larger steps in its ranges", at=deterministic)
         return CartesianProduct(())
     return CartesianProduct(tuple(sources))
 
@@ -177,14 +176,10 @@ def _steps(name: str, given: model.DistributionRange, collector: DiagnosticColle
     if not (math.isfinite(given.step_width) and given.step_width > 0):
         collector.error(f"stepWidth is {format_value(given.step_width)}", "specify a number above zero", at=given)
         return None
-    lower, upper, step = (
-        _exact(value) for value in (given.range.lower_limit, given.range.upper_limit, given.step_width)
-    )
+    # The decimals of the file, not the binary numbers next to them
+    limits = (given.range.lower_limit, given.range.upper_limit, given.step_width)
+    lower, upper, step = (Fraction(repr(value)) for value in limits)
     return SteppedRange(name, lower, step, (upper - lower) // step + 1, Location.of(given))
-
-
-def _exact(value: float) -> Fraction:
-    return Fraction(repr(value))
 
 
 def valid_range(given: model.Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import overload
 
@@ -16,7 +16,6 @@ from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
 from eidrive_scenario.openscenario.loading import ConcreteRun
-from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
 from eidrive_scenario.openscenario.reading.document import read_root
 from eidrive_scenario.openscenario.reading.parsing import Source, open_document
 
@@ -98,35 +97,20 @@ def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansi
     if read is None or distribution is None or collector.errors:
         collector.raise_on_error()
         assert read is not None  # an unknown version is an error
-        raise ScenarioError(_other_kind(read.root, document.name))
-    varied = _varied(distribution, seed, collector)
-    report = collector.error if document.path is not None else collector.warning
-    scenario = _scenario_file(distribution.scenario_file, document.folder, report)
-    return DistributionExpansion(document.name, scenario, varied, collector.raise_on_error())
-
-
-def _varied(
-    distribution: ParameterValueDistribution, seed: float, collector: DiagnosticCollector
-) -> CartesianProduct | StochasticSampler:
+        kind = "catalog" if read.root.catalog is not None else "scenario"
+        message = f"the file is a {kind}, not a parameter value distribution"
+        raise ScenarioError(Diagnostic(message, "", document.name, read.root.line))
+    varied: CartesianProduct | StochasticSampler
     if distribution.stochastic is not None:
-        return draws_of(distribution.stochastic, seed, collector)
-    assert distribution.deterministic is not None
-    return combinations_of(distribution.deterministic, collector)
-
-
-def _scenario_file(file: File, folder: Path, report: Callable[..., None]) -> Path:
-    path = resolve_path(file.filepath, folder)
+        varied = draws_of(distribution.stochastic, seed, collector)
+    else:
+        assert distribution.deterministic is not None
+        varied = combinations_of(distribution.deterministic, collector)
+    file = distribution.scenario_file
+    path = resolve_path(file.filepath, document.folder)
     if not is_regular_file(path):
+        report = collector.error if document.path is not None else collector.warning
         siblings = path.parent.glob("*.xosc") if os.path.isdir(path.parent) else ()
-        report(
-            f"ScenarioFile: scenario {quoted(file.filepath)} does not exist",
-            suggestion(path.stem, {sibling.stem for sibling in siblings}),
-            at=file,
-        )
-    return path
-
-
-def _other_kind(root: OpenScenario, name: str) -> Diagnostic:
-    """Return the error for a catalog or a scenario."""
-    kind = "catalog" if root.catalog is not None else "scenario"
-    return Diagnostic(f"the file is a {kind}, not a parameter value distribution", "", name, root.line)
+        hint = suggestion(path.stem, {sibling.stem for sibling in siblings})
+        report(f"ScenarioFile: scenario {quoted(file.filepath)} does not exist", hint, at=file)
+    return DistributionExpansion(document.name, path, varied, collector.raise_on_error())

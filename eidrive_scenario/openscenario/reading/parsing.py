@@ -134,7 +134,12 @@ def _from_tree(source: Any) -> Document:
     name = f"<{type(source).__name__}>"
     root = source
     if hasattr(root, "get_element"):
-        root = _element_of(root, name)
+        try:
+            root = root.get_element()
+        except Exception as error:  # libraries raise any type; scenariogeneration one of unsupported versions
+            message = f"get_element() raises {type(error).__name__}: {error}"
+            hint = "correct the object; write_xml fails for the same reason"
+            raise ScenarioError(Diagnostic(message, hint, name)) from error
     if hasattr(root, "getroot"):
         root = root.getroot()
     if isinstance(root, etree._Element):
@@ -149,17 +154,6 @@ def _from_tree(source: Any) -> Document:
     return Document(parse(text, name), name, None, Path(), text, sha256_of(text))
 
 
-def _element_of(source: SupportsGetElement, name: str) -> Any:
-    """Return the root element. Raise ScenarioError if its library reports an error."""
-    try:
-        return source.get_element()
-    except Exception as error:  # libraries raise any type; scenariogeneration raises errors of unsupported versions
-        message = f"get_element() raises {type(error).__name__}: {error}"
-        raise ScenarioError(
-            Diagnostic(message, "correct the object; write_xml fails for the same reason", name)
-        ) from error
-
-
 def _serialize(root: ElementTree.Element, name: str) -> bytes:
     """Return the text of a tree without line numbers.
 
@@ -169,23 +163,18 @@ def _serialize(root: ElementTree.Element, name: str) -> bytes:
     indented = copy.deepcopy(root)
     try:
         for node in indented.iter():
-            _check_attributes(node, name)
+            attributes: list[tuple[str, Any]] = list(node.items())
+            for attribute, value in attributes:
+                if value is None:
+                    del node.attrib[attribute]
+                elif not isinstance(value, str):
+                    message = f"{attribute} of {node.tag} is {value!r} of the type {type(value).__name__}"
+                    raise ScenarioError(Diagnostic(message, "use a text, the only type of XML attributes", name))
         ElementTree.indent(indented)
         text: bytes = ElementTree.tostring(indented, "utf-8", xml_declaration=True)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ScenarioError(Diagnostic(f"cannot be written as XML: {error}", "use only texts", name)) from error
     return text
-
-
-def _check_attributes(node: ElementTree.Element, name: str) -> None:
-    """Remove attributes that are None. Raise ScenarioError for others that are not texts."""
-    attributes: list[tuple[str, Any]] = list(node.items())
-    for attribute, value in attributes:
-        if value is None:
-            del node.attrib[attribute]
-        elif not isinstance(value, str):
-            message = f"{attribute} of {node.tag} is {value!r} of the type {type(value).__name__}"
-            raise ScenarioError(Diagnostic(message, "use a text, the only type of XML attributes", name))
 
 
 def parse(content: bytes, name: str) -> etree._Element:

@@ -22,21 +22,21 @@ def scenario_objects(
     entities: model.Entities | None, entries: Mapping[model.CatalogReference, model.Element]
 ) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
     """Yield every scenario object and its body, trailers after their towing vehicles; None for an unknown body."""
-    for entity in entities.scenario_object if entities else ():
-        yield from _with_trailers(entity, entries)
-
-
-def _with_trailers(
-    entity: model.ScenarioObject, entries: Mapping[model.CatalogReference, model.Element]
-) -> Iterator[tuple[model.ScenarioObject, model.Element | None]]:
-    body: model.Element | None = (
-        entity.vehicle or entity.pedestrian or entity.misc_object or entity.external_object_reference or entity.sensor
-    )
-    if body is None and entity.catalog_reference is not None:
-        body = entries.get(entity.catalog_reference)
-    yield entity, body
-    if isinstance(body, model.Vehicle) and body.trailer is not None and body.trailer.trailer is not None:
-        yield from _with_trailers(body.trailer.trailer, entries)
+    for towing in entities.scenario_object if entities else ():
+        entity: model.ScenarioObject | None = towing
+        while entity is not None:
+            body: model.Element | None = (
+                entity.vehicle
+                or entity.pedestrian
+                or entity.misc_object
+                or entity.external_object_reference
+                or entity.sensor
+            )
+            if body is None and entity.catalog_reference is not None:
+                body = entries.get(entity.catalog_reference)
+            yield entity, body
+            trailer = body.trailer if isinstance(body, model.Vehicle) else None
+            entity = trailer.trailer if trailer is not None else None
 
 
 T = TypeVar("T")
@@ -180,19 +180,19 @@ def check_names(
             unnamed.add(kind)
             continue
         if name in declared[kind] and kind in _UNIQUE:
-            collector.error(
-                f"two {_plural(kind)} are named {name!r}",
-                f"the other one is in line {declared[kind][name].line}; rename one",
-                at=element,
-            )
+            plural = "entities" if kind == "entity" else f"{kind}s"
+            hint = f"the other one is in line {declared[kind][name].line}; rename one"
+            collector.error(f"two {plural} are named {name!r}", hint, at=element)
         declared[kind].setdefault(name, element)
     complete = {kind: names for kind, names in declared.items() if kind not in unnamed}
-    exempt = {id(parameter) for element in elements for parameter in _undeclared_parameter(element)}
-    exempt |= {
-        id(element.trailer_ref)
-        for element in elements
-        if isinstance(element, model.Trailer) and _has_no_trailer(element)
-    }
+    exempt: set[int] = set()
+    for element in elements:
+        if isinstance(element, model.Condition) and element.by_value_condition is not None and is_criterion(element):
+            # The parameter of a criterion of ScenarioRunner need not be declared
+            exempt.update(map(id, element.by_value_condition.children()))
+        elif isinstance(element, model.Trailer) and element.trailer_ref and element.trailer_ref.entity_ref == "":
+            # The default of catalog vehicles with a trailer parameter: no trailer
+            exempt.add(id(element.trailer_ref))
     storyboard = StoryboardNames(root.storyboard, entries)
     storyboard.check_unique(collector)
     for element in elements:
@@ -216,17 +216,6 @@ def _definitions(
             yield kind, getattr(element, "name", None), element
 
 
-def _undeclared_parameter(element: model.Element) -> Iterator[model.Element]:
-    """Yield the ParameterCondition of a criterion of ScenarioRunner, whose parameter need not be declared."""
-    if isinstance(element, model.Condition) and element.by_value_condition is not None and is_criterion(element):
-        yield from element.by_value_condition.children()
-
-
-def _has_no_trailer(trailer: model.Trailer) -> bool:
-    """Whether a trailer has an empty reference, the default of catalog vehicles with a trailer parameter."""
-    return trailer.trailer_ref is not None and trailer.trailer_ref.entity_ref == ""
-
-
 def _check_references(
     element: model.Element,
     version: Version,
@@ -242,7 +231,3 @@ def _check_references(
                 suggestion(name, defined[kind]),
                 at=element,
             )
-
-
-def _plural(kind: str) -> str:
-    return "entities" if kind == "entity" else kind + "s"

@@ -85,30 +85,25 @@ UNLIMITED: tuple[type[model.Element], ...] = (
     model.TrafficSinkAction,
 )
 """Elements whose numbers are limits; an infinite number is no limit."""
+_MOTION_LIMITS = (
+    "max_speed",
+    "max_acceleration",
+    "max_deceleration",
+    "max_acceleration_rate",
+    "max_deceleration_rate",
+)
 NOT_NEGATIVE: Mapping[type[model.Element], tuple[str, ...]] = {
     model.AngleCondition: ("angle_tolerance",),
     model.AnimationAction: ("animation_duration",),
     model.Dimensions: ("length", "width", "height"),
-    model.DynamicConstraints: (
-        "max_speed",
-        "max_acceleration",
-        "max_deceleration",
-        "max_acceleration_rate",
-        "max_deceleration_rate",
-    ),
+    model.DynamicConstraints: _MOTION_LIMITS,
     model.EndOfRoadCondition: ("duration",),
     model.FollowTrajectoryAction: ("initial_distance_offset",),
     model.LaneOffsetActionDynamics: ("max_lateral_acc",),
     model.LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
     model.LightStateAction: ("transition_time",),
     model.OffroadCondition: ("duration",),
-    model.Performance: (
-        "max_speed",
-        "max_acceleration",
-        "max_deceleration",
-        "max_acceleration_rate",
-        "max_deceleration_rate",
-    ),
+    model.Performance: _MOTION_LIMITS,
     model.Phase: ("duration",),
     model.Precipitation: ("intensity", "precipitation_intensity"),
     model.ReachPositionCondition: ("tolerance",),
