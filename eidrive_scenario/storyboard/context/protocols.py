@@ -6,7 +6,7 @@ A condition reads the state of the run. An action also requests changes: those o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
@@ -217,32 +217,3 @@ class ControllerContext(ConditionContext, Protocol):
 
     def take_external_pose(self, name: str) -> ExternalPose | None:
         """Return and discard the pose that was set from outside for an entity; None without one."""
-
-
-class PreemptableAction(Protocol):
-    """Element whose behaviours hold domains that a later action can acquire."""
-
-    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
-        """Return the behaviours that lose their domains together with this one, including it."""
-
-    def preempt(self, behaviour: DomainHolder, why: str) -> None:
-        """Stop a behaviour whose domain another action has acquired."""
-
-
-class PendingAction(Protocol):
-    """Element that awaits an absent entity until all elements are updated at an instant."""
-
-    def abort(self) -> None:
-        """Stop the actions whose entity is still absent."""
-
-
-class DomainHolder(Protocol):
-    """Behaviour that holds control domains of an actor (ASAM OpenSCENARIO XML 1.3.1, 7.5.1)."""
-
-    @property
-    def name(self) -> str:
-        """Name of the behaviour."""
-
-    @property
-    def resource(self) -> str:
-        """Part of the domain that it holds; empty for the whole domain."""

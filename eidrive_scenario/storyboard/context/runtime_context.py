@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 from msgspec.structs import replace
 
@@ -11,14 +11,12 @@ from eidrive_scenario.base.requests import Override
 from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.protocols import (
-    DomainHolder,
     E,
     EntityAbsentError,
     MotionChange,
-    PendingAction,
     PositionCache,
-    PreemptableAction,
     speed_change,
 )
 from eidrive_scenario.storyboard.kinematics.actor import Actor
@@ -34,6 +32,16 @@ from eidrive_scenario.world.view import WorldView
 if TYPE_CHECKING:
     from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
     from eidrive_scenario.traffic.spawning.population import CentralObject
+
+
+class PreemptableAction(Protocol):
+    """Element whose behaviours hold domains that a later action can acquire."""
+
+    def linked_behaviours(self, behaviour: ActionBehaviour) -> Sequence[ActionBehaviour]:
+        """Return the behaviours that lose their domains together with this one, including it."""
+
+    def preempt(self, behaviour: ActionBehaviour, why: str) -> None:
+        """Stop a behaviour whose domain another action has acquired."""
 
 
 class RuntimeContext:
@@ -95,10 +103,11 @@ class RuntimeContext:
         """Background traffic; None before its first instance starts."""
         self.completes_this_step = False
         """Whether an action reaches its goal in the current step."""
-        self.pending_actions: list[PendingAction] = []
-        """Elements with actions that have started at this instant for an absent entity."""
+        self.pending_actions: list[Callable[[], None]] = []
+        """Functions that stop actions that have started at this instant if their entity is still absent."""
         self.position_cache = PositionCache()
-        self._holders: list[tuple[str, Domain, PreemptableAction, DomainHolder]] = []
+        self._holders: list[tuple[str, Domain, PreemptableAction, ActionBehaviour]] = []
+        """Control domains with their actors, and the element and the behaviour that hold them."""
 
     @property
     def time(self) -> float:
@@ -329,7 +338,7 @@ class RuntimeContext:
         self.appearances = {**self.appearances, name: appearance}
 
     def acquire_domain(
-        self, actor: str | None, domains: Domain, occupant: PreemptableAction, holder: DomainHolder
+        self, actor: str | None, domains: Domain, occupant: PreemptableAction, holder: ActionBehaviour
     ) -> None:
         """Let a behaviour acquire domains of an actor; the previous holders of these domains are preempted.
 
@@ -344,6 +353,6 @@ class RuntimeContext:
                     other.preempt(preempted, f"{holder.name} acquired its domain")
         self._holders.append((actor, domains, occupant, holder))
 
-    def release_domains(self, holder: DomainHolder) -> None:
+    def release_domains(self, holder: ActionBehaviour) -> None:
         """Release all domains of a behaviour."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -15,7 +16,7 @@ from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import without_criteria
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition
-from eidrive_scenario.storyboard.context.protocols import DomainHolder, EntityAbsentError
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.tree.elements import (
@@ -78,17 +79,15 @@ class InitBlock(Composite):
             self.running.remove(behaviour)
         return True
 
-    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
+    def linked_behaviours(self, behaviour: ActionBehaviour) -> Sequence[ActionBehaviour]:
         """Return the behaviours of the same action, several for an entity selection."""
-        actions = [other.action for other in self.running if other is behaviour]
-        return [other for other in self.running if any(other.action is action for action in actions)]
+        return [other for other in self.running if other.action is behaviour.action]
 
-    def preempt(self, behaviour: DomainHolder, why: str) -> None:
+    def preempt(self, behaviour: ActionBehaviour, why: str) -> None:
         """Stop a behaviour whose domain another action acquired."""
-        for other in self.running:
-            if other is behaviour:
-                other.stop(Status.INVALID)
-        self.running = [other for other in self.running if other is not behaviour]
+        if behaviour in self.running:
+            behaviour.stop(Status.INVALID)
+            self.running.remove(behaviour)
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick once; the interface of py_trees."""
@@ -163,10 +162,8 @@ class Builder:
         stop = self._wait("stop", without_criteria(trigger) if trigger is not None else None)
         root = StoryboardElement(self._context, ("storyboard",), stories, stop=stop)
         for condition in self._built:
-            try:
+            with self._collecting_errors():
                 condition.bind(self._context)
-            except ScenarioError as error:
-                self._diagnostics += error.diagnostics
         self._diagnostics += self._context.signals.errors
         if self._diagnostics:
             raise ScenarioError(sorted(dict.fromkeys(self._diagnostics), key=lambda p: (p.source, p.line or 0)))
@@ -211,10 +208,8 @@ class Builder:
         bindings = ActorBindings(actors, [names for names in members if len(names) > 1], selected)
         maneuvers = list(group.maneuver)
         for reference in group.catalog_reference:
-            try:
+            with self._collecting_errors():
                 maneuvers.append(self._context.catalog_entry(reference, model.Maneuver, group))
-            except ScenarioError as error:
-                self._diagnostics += error.diagnostics
         children = [self._maneuver(maneuver, path, bindings) for maneuver in maneuvers]
         return ManeuverGroupElement(self._context, path, children, limit=group.maximum_execution_count)
 
@@ -250,25 +245,16 @@ class Builder:
     def _behaviours(self, wrapper: model.Element, actor: str | None) -> list[ActionBehaviour]:
         behaviours = []
         for leaf, parent in _leaves(wrapper, wrapper):
-            name = _registered_name(leaf, self._actions)
-            if not self._is_registered(name, self._actions, leaf, f"{name} is not supported"):
+            name = self._registered_name(leaf, self._actions)
+            if name is None:
                 continue
-            self.extensions.add((self._actions.kind, name))
-            try:
-                element = self._selections.single(leaf)
+            with self._collecting_errors():
+                make, element = self._actions.load(name, ActionBehaviour), self._selections.single(leaf)
                 for parent_element in [element] if parent is leaf else self._selections.alternatives(parent):
-                    behaviour = construct(
-                        self._actions.load(name, ActionBehaviour),
-                        element,
-                        self._context,
-                        actor=actor,
-                        parent=parent_element,
-                    )
+                    behaviour = construct(make, element, self._context, actor=actor, parent=parent_element)
                     if not isinstance(behaviour, ActionBehaviour):
                         raise RegistryError(f"{self._actions.describe(name)} is not a subclass of ActionBehaviour")
                     behaviours.append(behaviour)
-            except ScenarioError as error:
-                self._diagnostics += error.diagnostics
         return behaviours
 
     def _wait(self, name: str, trigger: model.Trigger | None) -> WaitForTrigger | None:
@@ -276,30 +262,25 @@ class Builder:
             return None
         groups = []
         for group in trigger.condition_group:
-            evaluators = [
-                evaluator for element in group.condition if (evaluator := self._build_evaluator(element)) is not None
-            ]
+            evaluators = []
+            for element in group.condition:
+                with self._collecting_errors():
+                    condition = self._build_condition(element)
+                    if condition is not None:
+                        self._built.append(condition)
+                        edge = element.condition_edge.value
+                        evaluators.append(
+                            ConditionEvaluator(condition, name=element.name, edge=edge, delay=element.delay)
+                        )
             groups.append(ConditionGroup(tuple(evaluators)))
         return WaitForTrigger(name, Trigger(groups), self._context)
-
-    def _build_evaluator(self, element: model.Condition) -> ConditionEvaluator | None:
-        try:
-            condition = self._build_condition(element)
-        except ScenarioError as error:
-            self._diagnostics += error.diagnostics
-            return None
-        if condition is None:
-            return None
-        self._built.append(condition)
-        return ConditionEvaluator(condition, name=element.name, edge=element.condition_edge.value, delay=element.delay)
 
     def _build_condition(self, element: model.Condition) -> Condition | None:
         by_entity = element.by_entity_condition
         leaf = (element.chosen() if by_entity is None else by_entity.entity_condition).chosen()
-        name = _registered_name(leaf, self._conditions)
-        if not self._is_registered(name, self._conditions, leaf, f"{name} is not supported"):
+        name = self._registered_name(leaf, self._conditions)
+        if name is None:
             return None
-        self.extensions.add((self._conditions.kind, name))
         make = self._conditions.load(name, Condition)
         base = Condition if by_entity is None else EntityCondition
         type_error = RegistryError(f"{self._conditions.describe(name)} is not a subclass of {base.__name__}")
@@ -316,21 +297,36 @@ class Builder:
             raise type_error
         return conditions[0] if len(conditions) == 1 else AnyMemberCondition(leaf, entities, rule, conditions)
 
-    def _is_registered(self, name: str, registry: Registry, leaf: model.Element, otherwise: str) -> bool:
-        """Whether this name is registered; if not, add a diagnostic."""
+    def _registered_name(self, leaf: model.Element, registry: Registry) -> str | None:
+        """Return the registered name of an action or condition: its type, or the name of a user-defined one.
+
+        Add a diagnostic and return None if it is not registered.
+        """
+        own_name = {model.CustomCommandAction: "type", model.UserDefinedValueCondition: "name"}.get(type(leaf))
+        name = getattr(leaf, own_name) if own_name is not None else None
+        if name is None or name not in registry:
+            name = type(leaf).__name__
         if name in registry:
-            return True
+            self.extensions.add((registry.kind, name))
+            return str(name)
         hint = f"remove it, or install a package that registers it; {suggestion(name, registry)}"
-        self._diagnostics.append(Diagnostic.at(leaf, otherwise, hint))
-        return False
+        self._diagnostics.append(Diagnostic.at(leaf, f"{name} is not supported", hint))
+        return None
 
     def _entities(self, name: str) -> list[str]:
         """Return the entity of this name, or the members of the selection of this name."""
+        members: list[str] = []
+        with self._collecting_errors():
+            members = self._selections.members(name)
+        return members
+
+    @contextmanager
+    def _collecting_errors(self) -> Iterator[None]:
+        """Store the diagnostics of a ScenarioError, which ends the block."""
         try:
-            return self._selections.members(name)
+            yield
         except ScenarioError as error:
             self._diagnostics += error.diagnostics
-            return []
 
 
 def _leaves(element: model.Element, parent: model.Element) -> Iterator[tuple[model.Element, model.Element]]:
@@ -340,10 +336,3 @@ def _leaves(element: model.Element, parent: model.Element) -> Iterator[tuple[mod
         return
     for child in element.children():
         yield from _leaves(child, element)
-
-
-def _registered_name(leaf: model.Element, registry: Registry) -> str:
-    """Return the registered name of an action or condition: its type, or the name of a user-defined one."""
-    name_attribute = {model.CustomCommandAction: "type", model.UserDefinedValueCondition: "name"}.get(type(leaf))
-    name = getattr(leaf, name_attribute) if name_attribute is not None else None
-    return name if name is not None and name in registry else type(leaf).__name__

@@ -214,8 +214,8 @@ class StoryboardElement(StoryElement):
             self.update_children()
             if seen == len(progress.changes):
                 pending, self.context.pending_actions = self.context.pending_actions, []
-                for action in pending:
-                    action.abort()
+                for abort in pending:
+                    abort()
 
     def update_children(self) -> None:
         """Update the running actions. From the first change of a state on, other elements may be complete as well."""

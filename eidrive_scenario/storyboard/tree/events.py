@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from py_trees.common import Status
 
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.context.protocols import DomainHolder, EntityAbsentError
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.elements import StoryElement, TriggeringEntities
@@ -37,6 +37,7 @@ class EventElement(StoryElement):
         limit: int = 1,
     ) -> None:
         super().__init__(context, path, actions, start=start, limit=limit)
+        self._actions = tuple(actions)
         self.priority = priority
         self._running: dict[EventElement, None] = {}
         """Running events of the maneuver, in order of their starts."""
@@ -56,7 +57,8 @@ class EventElement(StoryElement):
                 event.stop_element(f"overridden by {self.name}")
         self.executions += 1
         self._change(ElementTransition.START, ElementState.RUNNING, why)
-        for action in sorted(self.elements, key=_takes_time):
+        # Those that take no time are executed first
+        for action in sorted(self._actions, key=lambda action: action.takes_time):
             action.start()
 
     def _change(self, transition: ElementTransition | None, after: ElementState, why: str = "") -> None:
@@ -102,7 +104,7 @@ class ActionElement(StoryElement):
         self.running: list[ActionBehaviour] = []
         self._completing: list[ActionBehaviour] = []
         """Behaviours that reach their goals in the current step; they hold their domains until its end."""
-        self._awaiting: dict[DomainHolder, tuple[ActionBehaviour, EntityAbsentError]] = {}
+        self._awaiting: dict[ActionBehaviour, EntityAbsentError] = {}
         """Behaviours that start at this instant and await an entity that may enter the world at this instant."""
         self._decided_at: int | None = None
         for actor in self.actors:
@@ -136,9 +138,9 @@ class ActionElement(StoryElement):
         if not self.running and not actors:
             self._change(ElementTransition.END, ElementState.COMPLETE)
 
-    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
+    def linked_behaviours(self, behaviour: ActionBehaviour) -> Sequence[ActionBehaviour]:
         """Return the behaviours of the actor and of the entity selections that contain it."""
-        names = {other.actor_name for other in self.running if other is behaviour}
+        names = {behaviour.actor_name}
         for members in self._selections:
             if not names.isdisjoint(members):
                 names |= set(members)
@@ -149,15 +151,14 @@ class ActionElement(StoryElement):
         """Whether one of its behaviours does not end at its start."""
         return not all(other.at_once for actor in self.actors for other in self.behaviours(actor))
 
-    def preempt(self, behaviour: DomainHolder, why: str) -> None:
+    def preempt(self, behaviour: ActionBehaviour, why: str) -> None:
         """Stop a behaviour whose domain another action acquired. A behaviour that takes no time is executed before."""
         done = False
-        for other in self.running:
-            if other is behaviour:
-                if other.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
-                    self._update_behaviour(other)
-                    done = other.status is Status.SUCCESS
-                other.stop(Status.INVALID)
+        if behaviour in self.running:
+            if behaviour.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
+                self._update_behaviour(behaviour)
+                done = behaviour.status is Status.SUCCESS
+            behaviour.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
         self._completing = [other for other in self._completing if other is not behaviour]
         self._awaiting.pop(behaviour, None)
@@ -195,7 +196,7 @@ class ActionElement(StoryElement):
             self._decided_at = now
             self._update_all(self.running)
         elif self._awaiting:
-            self._update_all([behaviour for behaviour, _ in self._awaiting.values()])
+            self._update_all(list(self._awaiting))
         if self.state is ElementState.COMPLETE:
             self.status = Status.SUCCESS
 
@@ -219,15 +220,15 @@ class ActionElement(StoryElement):
         except EntityAbsentError as absent:
             if self._tried_at == self.context.progress.tick:
                 behaviour.stop(Status.INVALID)
-                self._awaiting[behaviour] = behaviour, absent
-                self.context.pending_actions.append(self)
+                self._awaiting[behaviour] = absent
+                self.context.pending_actions.append(self.abort)
             else:
                 self._abort_behaviour(behaviour, absent)
 
     def abort(self) -> None:
         """Stop the behaviours whose entity has not entered the world at this instant."""
         awaiting, self._awaiting = self._awaiting, {}
-        for behaviour, absent in awaiting.values():
+        for behaviour, absent in awaiting.items():
             self._abort_behaviour(behaviour, absent)
 
     def _abort_behaviour(self, behaviour: ActionBehaviour, absent: EntityAbsentError) -> None:
@@ -241,8 +242,3 @@ class ActionElement(StoryElement):
             self.context.release_domains(behaviour)
         if not self.running and self.state is ElementState.RUNNING:
             self._change(ElementTransition.END, ElementState.COMPLETE)
-
-
-def _takes_time(action: StoryElement) -> bool:
-    """Sort key: of the actions of one event, those that take no time are executed first."""
-    return isinstance(action, ActionElement) and action.takes_time
