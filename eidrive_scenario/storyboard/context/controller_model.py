@@ -80,7 +80,9 @@ def build_controller_models(
 
 def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Mapping[str, str]) -> list[Diagnostic]:
     """Return warnings of controllers of other tools without a model, and of assignments without effect."""
-    names = {controller.name for actor in actors.values() for controller in actor.controllers}
+    assigned = [(actor, controller) for actor in actors.values() for controller in actor.controllers]
+    names = {controller.name for _, controller in assigned}
+    ours = {controller.name for _, controller in assigned if is_agent_controller(controller)}
     unmatched = sorted(name for name in assignments if name not in names)
     hint = "add the property module=eidrive, or assign a controller model (--controller NAME=MODEL)"
     if unmatched:
@@ -91,16 +93,9 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Map
             f"actor {actor.name!r} keeps lane and speed: its controller {controller.name!r} is not executed",
             hint,
         )
-        for actor in actors.values()
-        for controller in actor.controllers
+        for actor, controller in assigned
         if not is_agent_controller(controller) and controller.name not in assignments
     ]
-    ours = {
-        controller.name
-        for actor in actors.values()
-        for controller in actor.controllers
-        if is_agent_controller(controller)
-    }
     diagnostics = [
         Diagnostic(
             f"--controller: controller {name!r} belongs to a station",

@@ -45,8 +45,10 @@ class Coupling(NamedTuple):
     @classmethod
     def of(cls, front: Actor, back: Actor) -> Coupling:
         """Return the connection of two actors."""
-        reach = _coupler(back)
-        return cls(front, back, _hitch(front), reach, bar(back.entity, reach))
+        hitch = front.entity.trailer_hitch if isinstance(front.entity, model.Vehicle) else None
+        coupler = back.entity.trailer_coupler if isinstance(back.entity, model.Vehicle) else None
+        reach = coupler.dx if coupler is not None else 0.0
+        return cls(front, back, hitch.dx if hitch is not None else 0.0, reach, bar(back.entity, reach))
 
     def next_pose(self, displacement: Displacement = NO_DISPLACEMENT, *, straight: bool = False) -> Pose:
         """Return the pose of the trailer behind its towing vehicle after a displacement of the vehicle.
@@ -73,11 +75,10 @@ class Coupling(NamedTuple):
 
 def declared_trailer(entity: model.Element) -> str | None:
     """Return the name of the trailer that an entity has from the start; None without one."""
-    if not isinstance(entity, model.Vehicle) or entity.trailer is None:
-        return None
-    if entity.trailer.trailer is not None:
-        return entity.trailer.trailer.name
-    return entity.trailer.trailer_ref.entity_ref or None if entity.trailer.trailer_ref is not None else None
+    trailer = entity.trailer if isinstance(entity, model.Vehicle) else None
+    if trailer is not None and trailer.trailer is not None:
+        return trailer.trailer.name
+    return (trailer.trailer_ref.entity_ref or None) if trailer is not None and trailer.trailer_ref is not None else None
 
 
 def couplings(actors: Mapping[str, Actor]) -> Iterator[Coupling]:
@@ -156,18 +157,6 @@ def bar(entity: model.Element, reach: float) -> float:
     distances = [reach - x for x in (entity.axles.rear_axle.position_x, *extra)]
     total = sum(distances)
     return sum(d * d for d in distances) / total if total > 0.0 else reach
-
-
-def _hitch(actor: Actor) -> float:
-    entity = actor.entity
-    return entity.trailer_hitch.dx if isinstance(entity, model.Vehicle) and entity.trailer_hitch is not None else 0.0
-
-
-def _coupler(actor: Actor) -> float:
-    entity = actor.entity
-    return (
-        entity.trailer_coupler.dx if isinstance(entity, model.Vehicle) and entity.trailer_coupler is not None else 0.0
-    )
 
 
 def disconnect(actors: Mapping[str, Actor], name: str) -> None:

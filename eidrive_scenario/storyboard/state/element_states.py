@@ -107,15 +107,11 @@ class ElementStates:
             StateChange(self.time, record.path[-1], "/".join(record.path), record.kind, before, transition, after, why)
         )
 
-    def find(self, kind: str, reference: str) -> list[ElementRecord]:
-        """Return the records of the elements of one type that a reference matches."""
+    def observe_element(self, kind: str, reference: str) -> ElementStateObserver | None:
+        """Return an observer of the elements of one type that a reference matches, None without one."""
         if self._matches is None:
             self._matches = ReferenceMatch((record.path, record) for record in self.records)
-        return [record for record in self._matches.by(reference) if record.kind == kind]
-
-    def observe_element(self, kind: str, reference: str) -> ElementStateObserver | None:
-        """Return an observer of the elements that a reference matches, None without one."""
-        records = self.find(kind, reference)
+        records = [record for record in self._matches.by(reference) if record.kind == kind]
         return ElementStateObserver(self, records) if records else None
 
     def names(self, kind: str) -> list[str]:

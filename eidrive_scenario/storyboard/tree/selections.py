@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.storyboard.context.condition import EntityCondition, Measure
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
@@ -22,13 +22,8 @@ EMPTY_MEMBER = ""
 """Entry of a list of entities for a selection without members, as an empty list refers to all entities."""
 
 
-class Selections:
-    """Entity selections of one scenario."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        selections = EntitySelections(scenario)
-        self._groups = selections.declared
-        self.members = selections.members
+class Selections(EntitySelections):
+    """Entity selections of one scenario, and their substitution in elements."""
 
     def alternatives(self, element: E) -> list[E]:
         """Return the element once per combination of members of the selections that it refers to.
@@ -45,27 +40,20 @@ class Selections:
         alternatives = self.alternatives(element)
         if len(alternatives) == 1:
             return alternatives[0]
-        group = sorted(self._named_groups(element))[0]
-        raise ScenarioError(
-            Diagnostic.at(
-                element,
-                f"{type(element).__name__} refers to selection {group!r}",
-                f"got a selection of {len(self.members(group))} entities; expected one entity",
-            )
-        )
+        group = min(self._named_groups(element))
+        hint = f"got a selection of {len(self.members(group))} entities; expected one entity"
+        raise ScenarioError(Diagnostic.at(element, f"{type(element).__name__} refers to selection {group!r}", hint))
 
     def _named_groups(self, element: model.Element) -> set[str]:
-        if not self._groups:
+        if not self.declared:
             return set()
         named = (getattr(child, name, None) for child in element.walk() for name in REFERENCES)
-        return {name for name in named if isinstance(name, str) and name in self._groups}
+        return {name for name in named if isinstance(name, str) and name in self.declared}
 
     def _with_expanded_lists(self, element: E) -> E:
         """Return the element with selections in its lists of entities replaced by their members."""
-        if not self._groups:
-            return element
         references = getattr(element, "entity_ref", None)
-        if not isinstance(references, tuple):
+        if not self.declared or not isinstance(references, tuple):
             return element
         refs = [
             replace(ref, entity_ref=member)

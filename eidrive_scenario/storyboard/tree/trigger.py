@@ -6,7 +6,6 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import py_trees
 from py_trees.common import Status
@@ -138,13 +137,6 @@ class ConditionGroup:
         return holds
 
 
-class TriggerObserver(Protocol):
-    """Observer of the evaluations of one trigger."""
-
-    def on_evaluated(self, context: RuntimeContext) -> None:
-        """Observe an evaluation of the trigger."""
-
-
 class Trigger:
     """Disjunction of condition groups.
 
@@ -160,13 +152,13 @@ class Trigger:
         self.groups = tuple(groups)
         self._evaluators = tuple(evaluator for group in self.groups for evaluator in group.monitors)
         reads = [evaluator.condition.reads for evaluator in self._evaluators]
-        is_known = all(is_built_in(type(evaluator.condition)) for evaluator in self._evaluators) and None not in reads
-        self._can_rest = is_known
+        are_built_in = all(is_built_in(type(evaluator.condition)) for evaluator in self._evaluators)
+        self._can_rest = are_built_in and None not in reads
         self.reads = frozenset(name for names in reads if names for name in names)
         self.version = -1
         self.rests_until = -math.inf
         self.why = ""
-        self.observer: TriggerObserver | None = None
+        self.observer: TriggerHistory | None = None
         self.triggering: tuple[str, ...] = ()
         """Entities that fulfilled the conditions of the groups that fired."""
 
@@ -175,10 +167,7 @@ class Trigger:
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Whether the trigger fires; `why` then describes the reason."""
-        fired = []
-        for group in self.groups:
-            if group.evaluate(context):
-                fired.append(group)
+        fired = [group for group in self.groups if group.evaluate(context)]
         if fired:
             self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
             names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
@@ -308,18 +297,13 @@ class ConditionHistory:
         self._before = value
         measures = self.monitor.condition.measures(context)
         for measure in measures:
-            self._compare(measure, time)
+            gap, closest = gap_of(measure), self.nearest.get(measure.of)
+            if not math.isfinite(gap):
+                self.undefined.add(measure.of)
+            elif closest is None or gap < closest.gap:
+                self.nearest[measure.of] = ClosestMiss(measure, time, gap)
         if not measures:
             self.words = self.monitor.condition.explain(context)
-
-    def _compare(self, measure: Measure, time: float) -> None:
-        gap = gap_of(measure)
-        if not math.isfinite(gap):
-            self.undefined.add(measure.of)
-            return
-        closest = self.nearest.get(measure.of)
-        if closest is None or gap < closest.gap:
-            self.nearest[measure.of] = ClosestMiss(measure, time, gap)
 
 
 def gap_of(measure: Measure) -> float:
@@ -365,7 +349,9 @@ class TriggerHistory:
 
     def __init__(self, trigger: Trigger) -> None:
         self.trigger = trigger
-        self.groups = tuple(_history(group) for group in trigger.groups)
+        self.groups = tuple(
+            GroupHistory(tuple(ConditionHistory(evaluator) for evaluator in group.monitors)) for group in trigger.groups
+        )
         trigger.observer = self
 
     def on_evaluated(self, context: RuntimeContext) -> None:
@@ -377,7 +363,3 @@ class TriggerHistory:
     def asked(self) -> int:
         """Number of evaluations of the trigger."""
         return max((condition.asked for group in self.groups for condition in group.conditions), default=0)
-
-
-def _history(group: ConditionGroup) -> GroupHistory:
-    return GroupHistory(tuple(ConditionHistory(monitor) for monitor in group.monitors))
