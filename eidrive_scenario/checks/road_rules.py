@@ -26,7 +26,6 @@ from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traf
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position
-from eidrive_scenario.storyboard.storyboard import empty_view
 
 
 class RoadLintContext(LintContext):
@@ -35,7 +34,7 @@ class RoadLintContext(LintContext):
     def __init__(self, scenario: Scenario, roads: RoadNetwork | None, added: tuple[str | Path, ...] = ()) -> None:
         super().__init__(scenario, added)
         self.roads = roads
-        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=empty_view())
+        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0)
 
     def resolve(self, position: model.Position) -> ResolvedPosition | None:
         """Return the resolved position; None if it depends on an entity. Raise InputError if it does not exist."""

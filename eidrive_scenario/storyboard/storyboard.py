@@ -95,7 +95,7 @@ class Storyboard:
     ) -> None:
         self.scenario = scenario
         self.dt = dt
-        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=empty_view())
+        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed)
         builder = Builder(scenario, self.context, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
         self.extensions = frozenset(builder.extensions)
@@ -244,28 +244,6 @@ def _check_placements(placements: Mapping[str, Placement]) -> None:
     for name, placement in placements.items():
         if not all(map(math.isfinite, (placement.x, placement.y, placement.z, placement.yaw, placement.speed))):
             raise SimulationError(f"actor {name!r}: invalid placement (got {placement}; expected finite numbers)")
-
-
-def empty_view() -> WorldView:
-    """Return a view without actors, before the first tick."""
-    none = np.empty(0)
-    points = np.empty((0, 3))
-    return WorldView(
-        time=0.0,
-        tick=-1,
-        names=(),
-        categories=(),
-        position=points,
-        yaw=none,
-        pitch=none,
-        roll=none,
-        velocity=points,
-        acceleration=points,
-        yaw_rate=none,
-        speed=none,
-        size=points,
-        offset=points,
-    )
 
 
 POINTS_APART = 2.0

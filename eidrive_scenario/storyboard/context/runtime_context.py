@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.base.requests import Override
@@ -62,16 +63,14 @@ class RuntimeContext:
     commands     commands of this tick
     """
 
-    def __init__(
-        self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int, empty_view: WorldView
-    ) -> None:
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int) -> None:
         self.scenario = scenario
         self.roads = roads
         self.step = dt
         """Time step of the run [s]."""
         self.dt = 0.0
         self.seed = seed
-        self.view = empty_view
+        self.view = _empty_view()
         self.moved: set[MotionChange] = set()
         self.progress = ElementStates()
         self.parameters: dict[str, str] = dict(scenario.parameters)
@@ -356,3 +355,25 @@ class RuntimeContext:
     def release_domains(self, holder: ActionBehaviour) -> None:
         """Release all domains of a behaviour."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]
+
+
+def _empty_view() -> WorldView:
+    """Return a view without actors, before the first tick."""
+    none = np.empty(0)
+    points = np.empty((0, 3))
+    return WorldView(
+        time=0.0,
+        tick=-1,
+        names=(),
+        categories=(),
+        position=points,
+        yaw=none,
+        pitch=none,
+        roll=none,
+        velocity=points,
+        acceleration=points,
+        yaw_rate=none,
+        speed=none,
+        size=points,
+        offset=points,
+    )

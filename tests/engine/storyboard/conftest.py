@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 from opendrive_xml import lanes_xml, map_xml, road_xml
@@ -22,15 +21,8 @@ from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.storyboard import Storyboard
-from eidrive_scenario.world.view import WorldView
 
 CARS = round_car_xml("A") + round_car_xml("B")
-
-
-def empty_view(time: float = 0.0, tick: int = 0) -> WorldView:
-    """Return a view without actors."""
-    none, points = np.empty(0), np.empty((0, 3))
-    return WorldView(time, tick, (), (), points, none, none, none, points, points, none, none, points, points)
 
 
 class Clock:
@@ -99,7 +91,7 @@ class Setting(Task):
 def context() -> RuntimeContext:
     """Runtime context with cars A and B, without roads."""
     scenario = load_scenario(scenario_xml(entities=CARS))
-    return RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
+    return RuntimeContext(scenario, None, dt=0.1, seed=0)
 
 
 @pytest.fixture
@@ -132,7 +124,7 @@ def fresh() -> Callable[[], tuple[RuntimeContext, Clock, type[Script], Callable[
     scenario = load_scenario(scenario_xml(entities=CARS))
 
     def made() -> tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]:
-        context = RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
+        context = RuntimeContext(scenario, None, dt=0.1, seed=0)
         return context, Clock(context, 0.1), Script, lambda ticks, **more: Task(context, ticks, **more)
 
     return made

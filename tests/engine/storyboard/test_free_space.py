@@ -33,7 +33,7 @@ HAIRPIN = map_xml(
 def on_hairpin(context: Any) -> Any:
     """A at s = 20 in lane -1, B at s = 80 + 20π in lane -1, 60 m + 20π ahead."""
     roads = RoadNetwork.parse(HAIRPIN)
-    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
     for name, lane, s in (("A", -1, 20.0), ("B", -1, 80.0 + BEND)):
         here = roads.location("1", lane, s)
         made.add_actor(name, ResolvedPosition(roads.pose(here), here))

@@ -32,7 +32,7 @@ def globe(context: RuntimeContext) -> RuntimeContext:
     roads = RoadNetwork.parse(
         map_xml(lower, upper, header=f'{reference}<offset x="499996" y="{NORTHING}" z="100" hdg="0"/>')
     )
-    return RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    return RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
 
 
 def at(context: Any, **frame: Any) -> tuple[Pose, Any]:

@@ -34,7 +34,7 @@ from eidrive_scenario.world.view import WorldView
 def on_street(context: Any, street: Any) -> Any:
     """A at x = 50 in lane -1, B at x = 80 in lane 1 (coming towards A)."""
     scenario = context.scenario
-    made = RuntimeContext(scenario, street, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(scenario, street, dt=0.1, seed=0)
     for name, lane, s in (("A", -1, 50.0), ("B", 1, 80.0)):
         here = street.location("1", lane, s)
         made.add_actor(name, ResolvedPosition(street.pose(here), here))
@@ -60,7 +60,7 @@ def test_relative_position_beyond_a_lane_section_without_the_lane_keeps_its_t(
     first = road_xml("1", length=200.0, link=successor_xml("2"), lanes=narrow + wide)
     second = road_xml("2", length=200.0, x=200.0, link=predecessor_xml("1"), lanes=beyond)
     roads = RoadNetwork.parse(map_xml(first, second))
-    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
     here = roads.location("1", -2, 80.0)
     made.add_actor("A", ResolvedPosition(roads.pose(here), here))
     key = {model.RelativeRoadPosition: "relative_road_position", model.RelativeLanePosition: "relative_lane_position"}
@@ -179,7 +179,7 @@ def test_unresolvable_position_is_rejected(on_street: Any, frame: Any, text: Any
 def test_positions_in_a_lane_section_without_lanes(context: Any) -> None:
     lanes = section_xml(right=lane_xml(-1, 4.0)) + section_xml(s=60.0)
     roads = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
-    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
     here = roads.location("1", -1, 50.0)
     made.add_actor("A", ResolvedPosition(roads.pose(here), here))
     with pytest.raises(ScenarioError, match="unknown lane -1 of road '1' at s = 70; the road has no lanes there"):
@@ -261,7 +261,7 @@ def test_euclidean_distance_is_three_dimensional(on_street: Any) -> None:
 
 def test_road_distance_in_bend_exceeds_euclidean_distance(context: Any, bend: Any) -> None:
     """A quarter circle of the reference line's 50 m lies between the two; both drive in lane -1, a circle of 52 m."""
-    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0)
     for name, s in (("A", 0.0), ("B", 25 * math.pi)):
         here = bend.location("1", -1, s)
         made.add_actor(name, ResolvedPosition(bend.pose(here), here))
@@ -285,7 +285,7 @@ def test_closing_speed_in_bend_follows_the_measured_distance(
     context: Any, bend: Any, frame: str, kind: str, expected: float
 ) -> None:
     """A drives 20 m/s at the start of the bend, B 8 m/s after 60 m of road (1.2 rad); 52 m of lane are 50 m of road."""
-    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0)
     for name, s in (("A", 0.0), ("B", 60.0)):
         here = bend.location("1", -1, s)
         made.add_actor(name, ResolvedPosition(bend.pose(here), here))
@@ -313,7 +313,7 @@ def test_closing_speed_in_bend_follows_the_measured_distance(
 def test_cars_in_one_lane_of_a_bend_have_no_lateral_closing_speed(context: Any, bend: Any, frame: str) -> None:
     """Both drive along the lane. Straight on, they would leave it to the outside."""
     for offset, s in ((0.0, 20.0), (0.0, 33.3), (0.4, 50.0), (-1.0, 11.0)):
-        made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
+        made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0)
         places = [bend.location("1", -1, 30.0), bend.location("1", -1, s, offset)]
         poses = [bend.pose(place) for place in places]
         for name, pose, place in zip("AB", poses, places, strict=True):
@@ -332,7 +332,7 @@ def test_cars_in_one_lane_of_a_bend_have_no_lateral_closing_speed(context: Any, 
 @pytest.mark.element("RoutePosition")
 @pytest.mark.parametrize("lane", [-1, -2])
 def test_route_position_is_measured_along_the_reference_line(context: Any, bend: Any, lane: int) -> None:
-    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0)
     route = model.Route(closed=False, name="way", waypoint=(waypoint(lane, 5.0), waypoint(lane, 75.0)))
     for within in (
         {"from_lane_coordinates": model.PositionInLaneCoordinates(lane_id=str(lane), path_s=69.5)},

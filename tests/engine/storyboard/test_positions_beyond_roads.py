@@ -42,7 +42,7 @@ def test_relative_position_on_the_next_road_is_measured_along_its_reference_line
     first = road_xml("1", length=100.0, link=successor_xml("2"), lanes=lanes)
     second = road_xml("2", length=80.0, x=100.0, curvature=1.0 / 30.0, link=predecessor_xml("1"), lanes=lanes)
     roads = RoadNetwork.parse(map_xml(first, second))
-    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
     here = roads.location("1", lane, 90.0) if ahead else roads.location("2", lane, 40.0)
     made.add_actor("A", ResolvedPosition(roads.pose(here), here))
     ds, expected = (50.0, ("2", 40.0)) if ahead else (-50.0, ("1", 90.0))
@@ -72,7 +72,7 @@ HALF = 50.0 * math.pi
 def test_relative_road_position_on_a_closed_track_is_the_driven_distance(
     context: Any, ring: RoadNetwork, ds: float, lane: int
 ) -> None:
-    made = RuntimeContext(context.scenario, ring, dt=0.1, seed=0, empty_view=context.view)
+    made = RuntimeContext(context.scenario, ring, dt=0.1, seed=0)
     here = ring.location("a", lane, HALF - 30.0)
     made.add_actor("A", ResolvedPosition(ring.pose(here), here))
     frame = model.RelativeRoadPosition(entity_ref="A", ds=ds, dt=0)
