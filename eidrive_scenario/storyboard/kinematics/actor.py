@@ -32,6 +32,8 @@ class Actor:
     traveled   distance covered without teleports [m]
     standing_since, end_of_road_since, off_road_since  start of the state [s], None outside of it; `off_road_since`, and
                `end_of_road_since` of a driven vehicle, are updated after `track_off_road` or `track_end_of_road` only
+    tracks_off_road, tracks_end_of_road  whether they are updated
+    last_state  state in the last view that it was in; None before
     """
 
     def __init__(
@@ -60,8 +62,8 @@ class Actor:
         self.standing_since: float | None = None
         self.end_of_road_since: float | None = None
         self.off_road_since: float | None = None
-        self._tracks_off_road = self._tracks_end_of_road = False
-        self._last_state: ActorState | None = None
+        self.tracks_off_road = self.tracks_end_of_road = False
+        self.last_state: ActorState | None = None
         self._location: LaneLocation | None = None
         self._location_tick = -1
 
@@ -129,18 +131,18 @@ class Actor:
 
     def limits(self) -> tuple[float, float, float]:
         """Return maximum speed [m/s], acceleration and deceleration [m/s²]; infinite without Performance."""
-        if isinstance(self.entity, model.Vehicle):
-            performance = self.entity.performance
-            return performance.max_speed, performance.max_acceleration, performance.max_deceleration
-        return math.inf, math.inf, math.inf
+        if not isinstance(self.entity, model.Vehicle):
+            return math.inf, math.inf, math.inf
+        performance = self.entity.performance
+        return performance.max_speed, performance.max_acceleration, performance.max_deceleration
 
     def observe(self, view: WorldView, row: int) -> bool:
         """Update the histories by a new view. Return whether its state differs from that in the last one."""
-        state, last, motion = view.states[row], self._last_state, self.motion
+        state, last, motion = view.states[row], self.last_state, self.motion
         teleported, end_of_road = motion.teleported, motion.end_of_road
         if state is last and not teleported and not end_of_road:
             return False  # a standing actor whose histories are up to date
-        self._last_state = state
+        self.last_state = state
         if teleported:
             motion.clear_teleported()
         elif last is not None:
@@ -156,19 +158,9 @@ class Actor:
             self._set_at_end_of_road(end_of_road, view.time)
         return True
 
-    @property
-    def last_state(self) -> ActorState | None:
-        """State in the last view that it was in; None before."""
-        return self._last_state
-
-    @property
-    def tracks_off_road(self) -> bool:
-        """Whether a condition reads `off_road_since`."""
-        return self._tracks_off_road
-
     def track_off_road(self) -> None:
         """Update `off_road_since` in every tick from now on."""
-        self._tracks_off_road = True
+        self.tracks_off_road = True
 
     def update_off_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
         """Update `off_road_since` by the reference point. Lanes of type `none` are not part of the road."""
@@ -178,14 +170,9 @@ class Actor:
         elif self.off_road_since is None:
             self.off_road_since = view.time
 
-    @property
-    def tracks_end_of_road(self) -> bool:
-        """Whether a condition reads `end_of_road_since`."""
-        return self._tracks_end_of_road
-
     def track_end_of_road(self) -> None:
         """Update `end_of_road_since` of a driven vehicle in every tick from now on."""
-        self._tracks_end_of_road = True
+        self.tracks_end_of_road = True
 
     def update_end_of_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
         """Update `end_of_road_since` of a driven vehicle: its reference point is at most END_REACH before the end."""

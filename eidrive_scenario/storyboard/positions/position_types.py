@@ -63,16 +63,14 @@ CARLA_PREFIX = "CARLA:"
 """Prefix of the description of a scenario in the axes of CARLA."""
 
 
-def world_position(frame: model.WorldPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
+def world_position(frame: model.WorldPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a WorldPosition; without z it is on the road."""
     side = -1.0 if left_handed(context) else 1.0
     h, p, r = side * (frame.h or 0.0), side * (frame.p or 0.0), frame.r or 0.0
     return on_ground(context, Pose(frame.x, side * frame.y, frame.z or 0.0, h, p, r), z_given=frame.z is not None)
 
 
-def relative_world_position(
-    frame: model.RelativeWorldPosition, context: ConditionContext, actor: str | None
-) -> ResolvedPosition:
+def relative_world_position(frame: model.RelativeWorldPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a position relative to an entity, along the axes of the world."""
     origin, side = context.pose(frame.entity_ref), -1.0 if left_handed(context) else 1.0
     x, y, z = origin.x + frame.dx, origin.y + side * frame.dy, origin.z + (frame.dz or 0.0)
@@ -80,9 +78,7 @@ def relative_world_position(
     return on_ground(context, Pose(x, y, z, h, p, r), z_given=bool(frame.dz), near=frame.entity_ref)
 
 
-def relative_object_position(
-    frame: model.RelativeObjectPosition, context: ConditionContext, actor: str | None
-) -> ResolvedPosition:
+def relative_object_position(frame: model.RelativeObjectPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a position relative to an entity, along its heading."""
     origin, side = context.pose(frame.entity_ref), -1.0 if left_handed(context) else 1.0
     cos, sin, dy = math.cos(origin.h), math.sin(origin.h), side * frame.dy
@@ -130,7 +126,7 @@ LEVEL_SEPARATION = 0.5
 """Maximum difference in height of roads on one level [m]."""
 
 
-def geo_position(frame: model.GeoPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
+def geo_position(frame: model.GeoPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a GeoPosition by the projection of the road network.
 
     Relative and missing angles refer to the lane at the position. `altitude` is above the surface of the selected road,
@@ -211,15 +207,13 @@ def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float,
     return latitude, longitude
 
 
-def road_position(frame: model.RoadPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
+def road_position(frame: model.RoadPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a RoadPosition. Raise ScenarioError if the road does not exist."""
     roads = roads_of(frame, context)
     return in_road(roads, frame.road_id, _s_on_road(frame, context, roads), frame.t, frame.orientation)
 
 
-def relative_road_position(
-    frame: model.RelativeRoadPosition, context: ConditionContext, actor: str | None
-) -> ResolvedPosition:
+def relative_road_position(frame: model.RelativeRoadPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a position in the frame of the road of an entity: `ds` along the reference line, `dt` along t."""
     roads, origin = roads_of(frame, context), road_origin(frame, context)
     here = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
@@ -229,7 +223,7 @@ def relative_road_position(
     return in_road(roads, here.road, here.s, here.t + frame.dt * sign, frame.orientation)
 
 
-def lane_position(frame: model.LanePosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
+def lane_position(frame: model.LanePosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a LanePosition. Raise ScenarioError if the road or lane does not exist there."""
     roads = roads_of(frame, context)
     s = _s_on_road(frame, context, roads)
@@ -242,9 +236,7 @@ def lane_position(frame: model.LanePosition, context: ConditionContext, actor: s
     return in_lane(roads, frame.road_id, lane, s, frame.offset or 0.0, frame.orientation)
 
 
-def relative_lane_position(
-    frame: model.RelativeLanePosition, context: ConditionContext, actor: str | None
-) -> ResolvedPosition:
+def relative_lane_position(frame: model.RelativeLanePosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a position relative to the lane of an entity, with all offsets in one frame.
 
     With `dsLane` it is that of the entity: ahead in its lane, lanes and lateral offset to its left. With `ds` it is

@@ -38,8 +38,6 @@ from eidrive_scenario.storyboard.positions.position_types import (
 
 STATIC = (model.WorldPosition, model.RoadPosition, model.LanePosition, model.GeoPosition)
 """Types of static positions."""
-NESTED = (model.RoutePosition, model.TrajectoryPosition)
-"""Types of positions along a route or trajectory, whose points are positions."""
 MAX_DEPTH = 10
 """Maximum depth of nested positions."""
 MAX_POSITIONS = 2000
@@ -57,17 +55,18 @@ def resolve_position(position: model.Position, context: ConditionContext, actor:
     if cached is not None and cached[0] is position:
         return cached[1]
     frame = position.chosen()
-    is_nested = isinstance(frame, NESTED)
+    along_curve = ALONG_CURVES.get(type(frame))
     try:
-        if is_nested:
+        if along_curve is None:
+            resolved = RESOLVERS[type(frame)](frame, context)
+        else:
             _enter(frame, cache)
-        resolved = RESOLVERS[type(frame)](frame, context, actor)
+            resolved = along_curve(frame, context, actor)
     except PositionError as error:
-        raise position_error(
-            frame, f"not resolvable: {error.diagnostics[0].message}", error.diagnostics[0].hint
-        ) from error
+        reason = error.diagnostics[0]
+        raise position_error(frame, f"not resolvable: {reason.message}", reason.hint) from error
     finally:
-        if is_nested:
+        if along_curve is not None:
             cache.depth -= 1
     if _is_static(frame, context):
         cache.static[id(position)] = (position, resolved)
@@ -149,7 +148,12 @@ def _is_static(frame: model.Element, context: ConditionContext) -> bool:
     return all(_is_static(nested.chosen(), context) for nested in inner)
 
 
-RESOLVERS: dict[type[model.Element], Callable[[Any, ConditionContext, str | None], ResolvedPosition]] = {
+ALONG_CURVES: dict[type[model.Element], Callable[[Any, ConditionContext, str | None], ResolvedPosition]] = {
+    model.RoutePosition: _route,
+    model.TrajectoryPosition: _trajectory,
+}
+"""Resolvers of positions along a route or trajectory, whose points are positions that may depend on the actor."""
+RESOLVERS: dict[type[model.Element], Callable[[Any, ConditionContext], ResolvedPosition]] = {
     model.WorldPosition: world_position,
     model.RelativeWorldPosition: relative_world_position,
     model.RelativeObjectPosition: relative_object_position,
@@ -157,7 +161,5 @@ RESOLVERS: dict[type[model.Element], Callable[[Any, ConditionContext, str | None
     model.RelativeRoadPosition: relative_road_position,
     model.LanePosition: lane_position,
     model.RelativeLanePosition: relative_lane_position,
-    model.RoutePosition: _route,
-    model.TrajectoryPosition: _trajectory,
     model.GeoPosition: geo_position,
 }
