@@ -10,7 +10,6 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.routing import POINTS_APART
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
-    ActionContext,
     Actor,
     Goal,
     Override,
@@ -74,15 +73,8 @@ class AssignControllerAction(ActionBehaviour):
 
     action: model.AssignControllerAction
 
-    def __init__(
-        self,
-        action: model.AssignControllerAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
+    def configure(self) -> None:
+        """Resolve the controller."""
         self._controller = self._resolve_controller()
         if self._controller is not None and is_agent_controller(self._controller):
             raise self.error(
@@ -129,7 +121,7 @@ class OverrideControllerValueAction(ActionBehaviour):
             if percent is not None and percent.value > 0.0 and _full_brake(percent) == 1.0:
                 share = f"{100.0 * percent.value:g}"
                 what = f"BrakePercent {percent.value:g} is read as {share} %"
-                self.context.warn(*self.error(what, f"write {share}, as its unit is %").diagnostics)
+                self.warn(what, f"write {share}, as its unit is %")
         for override in self._overrides():
             self.context.set_override(self.actor.name, override)
         return Status.SUCCESS
@@ -181,7 +173,7 @@ def _full_brake(percent: model.Brake) -> float:
 def _without_effect(behaviour: ActionBehaviour) -> Status:
     """Warn that the settings of the run determine the controller of the actor."""
     what = f"no effect: the driving stack of the run drives {behaviour.actor.name!r} from its start to its end"
-    behaviour.context.warn(*behaviour.error(what, "remove --drive for it, if the scenario shall drive it").diagnostics)
+    behaviour.warn(what, "remove --drive for it, if the scenario shall drive it")
     return Status.SUCCESS
 
 

@@ -19,7 +19,7 @@ class AddEntityAction(ActionBehaviour):
         name = self.parent_element.entity_ref
         if self.context.actors[name].present:
             message = f"no effect: entity {name!r} is present"
-            self.context.warn(*self.error(message, "delete it first, or use a TeleportAction").diagnostics)
+            self.warn(message, "delete it first, or use a TeleportAction")
             return Status.SUCCESS
         self.context.add_actor(name, resolve_position(self.action.position, self.context, name))
         return Status.SUCCESS
@@ -40,7 +40,7 @@ class DeleteEntityAction(ActionBehaviour):
         name = self.parent_element.entity_ref
         if not self.context.actors[name].present:
             message = f"no effect: entity {name!r} is absent"
-            self.context.warn(*self.error(message, "add it first").diagnostics)
+            self.warn(message, "add it first")
         self.context.remove_actor(name)
         return Status.SUCCESS
 

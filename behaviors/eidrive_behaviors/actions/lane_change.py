@@ -16,7 +16,6 @@ from eidrive_behaviors.actions.speed import describe_dynamics
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
-    ActionContext,
     Domain,
     Goal,
     LateralStep,
@@ -115,18 +114,11 @@ class LaneChangeAction(ActionBehaviour):
     domains = Domain.LATERAL
     action: model.LaneChangeAction
 
-    def __init__(
-        self,
-        action: model.LaneChangeAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
-        self._dynamics = action.lane_change_action_dynamics
+    def configure(self) -> None:
+        """Check the target and require a road network."""
+        self._dynamics = self.action.lane_change_action_dynamics
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
-        target = action.lane_change_target.absolute_target_lane
+        target = self.action.lane_change_target.absolute_target_lane
         if target is not None and not target.value.removeprefix("-").isdecimal():
             raise self.error(f"the target lane is not a number (got {target.value!r}; expected the id of a lane)")
         self._roads = self.require_roads()

@@ -14,7 +14,6 @@ from eidrive_behaviors.actions.teleport import describe_position
 from eidrive_scenario.api.actions import (
     LONGEST_WAY,
     ActionBehaviour,
-    ActionContext,
     Goal,
     ResolvedPosition,
     build_route,
@@ -59,7 +58,7 @@ class AssignRouteAction(ActionBehaviour):
             if here is not None and (path_of_waypoints := self._attempt(build)) is not None:
                 path = path_of_waypoints
                 message = f"no way leads from {self.actor.name!r} to route {route.name!r}"
-                self.context.warn(*self.error(message, "start the action on the way to its first waypoint").diagnostics)
+                self.warn(message, "start the action on the way to its first waypoint")
             else:
                 wrong_way = self._attempt(partial(build, here, against_traffic=True))
                 if wrong_way is None or not self._may_drive_against_traffic(resolve(route.waypoint[0].position)):
@@ -114,7 +113,7 @@ class AcquirePositionAction(ActionBehaviour):
             raise self.error("the position is not on a road", "move it onto a lane")
         else:
             message = f"{self.actor.name!r} is not on a road: it does not turn to the position"
-            self.context.warn(*self.error(message, "place the entity on a lane").diagnostics)
+            self.warn(message, "place the entity on a lane")
         return Status.SUCCESS
 
     def _route(self, roads: RoadNetwork, here: LaneLocation, there: LaneLocation) -> Route:
@@ -143,15 +142,8 @@ class RandomRouteAction(ActionBehaviour):
     immediate = True
     action: model.RandomRouteAction
 
-    def __init__(
-        self,
-        action: model.RandomRouteAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
+    def configure(self) -> None:
+        """Require a road network."""
         self._starts = 0
         self._roads = self.require_roads()
 
@@ -199,11 +191,9 @@ def moves_against_traffic(behaviour: ActionBehaviour) -> bool:
 
 def warn_of_wrong_way(behaviour: ActionBehaviour, way: str) -> None:
     """Add a warning to the result: a route leads against the driving direction of its lanes."""
-    what = (
-        f"{way} leads against the driving direction: {behaviour.actor.name!r} drives it in the lanes of its waypoints"
-    )
+    effect = f"{behaviour.actor.name!r} drives it in the lanes of its waypoints"
     hint = "for a drive with the traffic, reverse the waypoints or move them to other lanes"
-    behaviour.context.warn(*behaviour.error(what, hint).diagnostics)
+    behaviour.warn(f"{way} leads against the driving direction: {effect}", hint)
 
 
 def assign_route(behaviour: ActionBehaviour, route: Route) -> None:
@@ -221,6 +211,5 @@ def check_way(behaviour: ActionBehaviour, length: float) -> None:
     """Raise ScenarioError if a way that is requested of a driven vehicle is longer than LONGEST_WAY [m]."""
     if not length <= LONGEST_WAY:
         message = f"the way to the destination has a length of {length / 1000.0:,.0f} km"
-        raise behaviour.error(
-            message, f"a driven vehicle accepts at most {LONGEST_WAY / 1000.0:.0f} km: check the position"
-        )
+        hint = f"a driven vehicle accepts at most {LONGEST_WAY / 1000.0:.0f} km: check the position"
+        raise behaviour.error(message, hint)

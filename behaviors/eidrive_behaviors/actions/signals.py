@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, model
+from eidrive_scenario.api.actions import ActionBehaviour, model
 
 
 class TrafficSignalStateAction(ActionBehaviour):
@@ -16,18 +16,11 @@ class TrafficSignalStateAction(ActionBehaviour):
     immediate = True
     action: model.TrafficSignalStateAction
 
-    def __init__(
-        self,
-        action: model.TrafficSignalStateAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
-        warning = context.signals.unknown(action.name, action)
+    def configure(self) -> None:
+        """Warn of an unknown signal."""
+        warning = self.context.signals.unknown(self.action.name, self.action)
         if warning is not None:
-            context.warn(warning)
+            self.context.warn(warning)
 
     def update(self) -> Status:
         """Set the state."""
@@ -48,16 +41,9 @@ class TrafficSignalControllerAction(ActionBehaviour):
     immediate = True
     action: model.TrafficSignalControllerAction
 
-    def __init__(
-        self,
-        action: model.TrafficSignalControllerAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
-        context.signals.check_phase(action.traffic_signal_controller_ref, action.phase, action)
+    def configure(self) -> None:
+        """Check the phase. Raise ScenarioError if the controller does not have it."""
+        self.context.signals.check_phase(self.action.traffic_signal_controller_ref, self.action.phase, self.action)
 
     def update(self) -> Status:
         """Start the phase."""

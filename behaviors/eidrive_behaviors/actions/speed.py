@@ -15,7 +15,7 @@ from eidrive_behaviors.actions.following import (
     speed_limiter,
     warn_of_reverse,
 )
-from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
+from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
 
 REACHED = 0.2
@@ -37,18 +37,11 @@ class SpeedAction(ActionBehaviour):
     domains = Domain.LONGITUDINAL
     action: model.SpeedAction
 
-    def __init__(
-        self,
-        action: model.SpeedAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
-        self._dynamics = action.speed_action_dynamics
-        self._absolute = action.speed_action_target.absolute_target_speed
-        self._relative = action.speed_action_target.relative_target_speed
+    def configure(self) -> None:
+        """Read target and dynamics."""
+        self._dynamics = self.action.speed_action_dynamics
+        self._absolute = self.action.speed_action_target.absolute_target_speed
+        self._relative = self.action.speed_action_target.relative_target_speed
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         self._limiter: RateLimitedValue | None = None
         self._start = 0.0
@@ -105,7 +98,7 @@ class SpeedAction(ActionBehaviour):
             self._delay_warning.add(late, describe_slope_limit(start, target, faster, slower))
         if self._absolute is not None and abs(self._absolute.value) > top:
             message = f"the target speed is reduced to {top:g} m/s (got {self._absolute.value:g} m/s)"
-            self.context.warn(*self.error(message, "increase maxSpeed of the Performance").diagnostics)
+            self.warn(message, "increase maxSpeed of the Performance")
 
     def update(self) -> Status:
         """Set the speed at the end of the step."""

@@ -12,7 +12,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, check_presence, warn_of_reverse
 from eidrive_behaviors.actions.speed import describe_slope_limit, slope_limit
-from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, model
+from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, model
 from eidrive_scenario.api.common import EPSILON
 
 
@@ -49,15 +49,8 @@ class SpeedProfileAction(ActionBehaviour):
     domains = Domain.LONGITUDINAL
     action: model.SpeedProfileAction
 
-    def __init__(
-        self,
-        action: model.SpeedProfileAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
+    def configure(self) -> None:
+        """Prepare the warning of delays, at most one per action."""
         self._delay_warning = DelayWarning(self)
 
     @property

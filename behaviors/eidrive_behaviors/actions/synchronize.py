@@ -130,7 +130,7 @@ class SynchronizeAction(ActionBehaviour):
         top = self.actor.limits()[0]
         if way > top * (time + dt) and not self.actor.driven:
             message = f"{self.actor.name} cannot arrive in time: this takes more than its maximum speed, {top:g} m/s"
-            self.context.warn(*self.error(message, "specify a shorter distance or more time").diagnostics)
+            self.warn(message, "specify a shorter distance or more time")
         if final is not None:
             motion.set_speed(sense * min(self._next_speed(present, way, time, final, dt), top))
         elif math.isfinite(time):
@@ -142,7 +142,7 @@ class SynchronizeAction(ActionBehaviour):
         if final * sense < -EPSILON:
             way, bound = ("forwards", "at least") if sense > 0.0 else ("backwards", "at most")
             message = f"the speed changes to {final:g} m/s at once at the target, which the actor reaches {way}"
-            self.context.warn(*self.error(message, f"specify a final speed of {bound} 0 m/s").diagnostics)
+            self.warn(message, f"specify a final speed of {bound} 0 m/s")
 
     def _next_speed(self, speed: float, way: float, time: float, final: float, dt: float) -> float:
         """Return the speed at the end of the step, as all speeds in the direction of motion [m/s]."""

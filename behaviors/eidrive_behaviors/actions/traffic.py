@@ -8,7 +8,6 @@ from py_trees.common import Status
 
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
-    ActionContext,
     ResolvedPosition,
     model,
     resolve_position,
@@ -28,15 +27,8 @@ class TrafficInstanceAction(ActionBehaviour):
 
     immediate = True
 
-    def __init__(
-        self,
-        action: model.Element,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
+    def configure(self) -> None:
+        """Require a road network and check the settings."""
         self._generator: traffic.TrafficGenerator | None = None
         self._roads = self.require_roads()
         self.check()

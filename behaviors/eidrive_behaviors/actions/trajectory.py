@@ -21,7 +21,6 @@ from eidrive_behaviors.actions.routing import POINTS_APART, check_way
 from eidrive_scenario.api.actions import (
     TIME_ATTRIBUTES,
     ActionBehaviour,
-    ActionContext,
     Domain,
     EntityAbsentError,
     Goal,
@@ -115,34 +114,27 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     action: model.FollowTrajectoryAction
 
-    def __init__(
-        self,
-        action: model.FollowTrajectoryAction,
-        context: ActionContext,
-        *,
-        actor: str | None = None,
-        parent: model.Element | None = None,
-    ) -> None:
-        super().__init__(action, context, actor=actor, parent=parent)
+    def configure(self) -> None:
+        """Resolve the trajectory, and warn of times and motions without effect."""
         self._pursuit: PathPursuit | None = None
         self._run: RateLimitedValue | None = None
         self._followed: TrajectoryProgress | None = None
         self._trajectory = self._resolve_trajectory()
-        self._timing = action.time_reference.timing
+        self._timing = self.action.time_reference.timing
         shape = self._trajectory.shape.chosen()
         if self._timing is not None and not has_times(shape):
             self._timing = None
             what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or <None/> as the TimeReference"
-            context.warn(*self.error(what, hint).diagnostics)
+            self.warn(what, hint)
         if self._timing is not None and self._trajectory.closed and not self._is_relative:
             self._trajectory = dataclasses.replace(self._trajectory, closed=False)
             what = "closed has no effect on a trajectory with absolute times, which ends at its last point"
-            context.warn(*self.error(what, "write closed='false', or relative as the domain").diagnostics)
+            self.warn(what, "write closed='false', or relative as the domain")
         if self._timing is None and any(isinstance(part, model.Motion) for part in shape.walk()):
             what = "the actor keeps its own speed: Motion has no effect on a trajectory without times"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]} with Timing, or the speed by another action"
-            context.warn(*self.error(what, hint).diagnostics)
+            self.warn(what, hint)
 
     @property
     def _is_relative(self) -> bool:
@@ -312,7 +304,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         if at_start:
             what = f"ends at the start of the trajectory, not at its end: {self.actor.name!r} moves back on it"
             hint = "with a negative speed, place the actor facing against the trajectory to reverse to its end"
-            self.context.warn(*self.error(what, hint).diagnostics)
+            self.warn(what, hint)
         return at_start or after > max(before, self._layout.length - EPSILON)
 
     def _pose_after_distance(self, before: float, distance: float) -> Pose:

@@ -24,7 +24,7 @@ MOTION = Domain.LONGITUDINAL | Domain.LATERAL
 class ActionBehaviour(py_trees.behaviour.Behaviour):
     """Base class of actions, for one actor (none for global actions).
 
-    - The constructor configures the action. It raises ScenarioError if the action is not executable.
+    - `configure` prepares the action once. It raises ScenarioError if the action is not executable.
     - `initialise` resets the action when it starts.
     - `update` decides on one step of `context.dt` [s]. It returns SUCCESS in the step that reaches the goal: the action
       ends at the end of that step. In Init the step is 0 s long.
@@ -55,6 +55,10 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         self.actor_name = actor
         self.parent_element = parent
         """Parent element of the action, which has attributes of older or shared types (EntityAction)."""
+        self.configure()
+
+    def configure(self) -> None:
+        """Prepare the action before the run, as the last step of the constructor."""
 
     @property
     def error_subject(self) -> str:
@@ -129,7 +133,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         """Stop the action, as an entity that it requires is absent. Add a warning and return the reason."""
         self.stop(Status.INVALID)
         why = f"{absent} is absent"
-        self.context.warn(*self.error(f"not executed, as {why}", "start it after the entity is added").diagnostics)
+        self.warn(f"not executed, as {why}", "start it after the entity is added")
         return why
 
     def check_decision(self) -> None:
@@ -153,10 +157,13 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
             raise self.error("the scenario has no road network", "specify one in RoadNetwork/LogicFile")
         return self.context.roads
 
+    def warn(self, message: str, hint: str = "") -> None:
+        """Add a warning with file and line of this action to the result of the run."""
+        self.context.warn(*self.error(message, hint).diagnostics)
+
     def error(self, message: str, hint: str = "") -> ScenarioError:
         """Return an error with file and line of this action."""
-        where = self.action
-        return ScenarioError(Diagnostic.at(where, f"{type(where).__name__}: {message}", hint))
+        return ScenarioError(Diagnostic.at(self.action, f"{type(self.action).__name__}: {message}", hint))
 
 
 def _is_finite(value: object) -> bool:
