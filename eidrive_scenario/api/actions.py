@@ -22,12 +22,12 @@ from eidrive_scenario.storyboard.context.condition import describe_rule as descr
 from eidrive_scenario.storyboard.context.condition import next_change as next_change
 from eidrive_scenario.storyboard.context.condition import relation as relation
 from eidrive_scenario.storyboard.context.condition import satisfies_rule as satisfies_rule
+from eidrive_scenario.storyboard.context.contexts import ActionContext as ActionContext
+from eidrive_scenario.storyboard.context.contexts import ConditionContext as ConditionContext
+from eidrive_scenario.storyboard.context.contexts import ControllerContext as ControllerContext
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError as EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import speed_change as speed_change
 from eidrive_scenario.storyboard.context.controller_model import ControllerModel as ControllerModel
-from eidrive_scenario.storyboard.context.protocols import ActionContext as ActionContext
-from eidrive_scenario.storyboard.context.protocols import ConditionContext as ConditionContext
-from eidrive_scenario.storyboard.context.protocols import ControllerContext as ControllerContext
-from eidrive_scenario.storyboard.context.protocols import EntityAbsentError as EntityAbsentError
-from eidrive_scenario.storyboard.context.protocols import speed_change as speed_change
 from eidrive_scenario.storyboard.kinematics.actor import Actor as Actor
 from eidrive_scenario.storyboard.kinematics.motion import STEEPEST as STEEPEST
 from eidrive_scenario.storyboard.kinematics.motion import LateralStep as LateralStep

@@ -19,7 +19,7 @@ from eidrive_scenario.errors import Diagnostic, InputError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import Pose, PositionError, RoadNetwork
 from eidrive_scenario.roads.model.map_warnings import MAP_RULES
-from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic

@@ -14,7 +14,7 @@ from eidrive_scenario.errors import Diagnostic, InvalidResult, ScenarioError
 from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.context.protocols import ActionContext, EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import ActionContext, EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.state.element_states import Domain
 

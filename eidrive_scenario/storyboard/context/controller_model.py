@@ -11,7 +11,7 @@ from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, su
 from eidrive_scenario.extensions.registry import Registry, construct
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
-from eidrive_scenario.storyboard.context.protocols import ControllerContext
+from eidrive_scenario.storyboard.context.contexts import ControllerContext
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 
 

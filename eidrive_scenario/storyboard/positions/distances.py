@@ -8,7 +8,7 @@ from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.context.contexts import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 

@@ -10,7 +10,7 @@ from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
-from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.context.contexts import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 

@@ -12,7 +12,7 @@ from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.roads.model.location import PositionError
-from eidrive_scenario.storyboard.context.protocols import ConditionContext, PositionCache
+from eidrive_scenario.storyboard.context.contexts import ConditionContext, PositionCache
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route, faces_traffic
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve

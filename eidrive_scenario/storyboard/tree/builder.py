@@ -16,7 +16,7 @@ from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import without_criteria
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition
-from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.tree.elements import (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from py_trees.common import Status
 
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.elements import StoryElement, TriggeringEntities

@@ -11,7 +11,7 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.storyboard.context.condition import EntityCondition, Measure
-from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.context.contexts import ConditionContext
 
 E = TypeVar("E", bound=model.Element)
 

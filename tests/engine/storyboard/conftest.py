@@ -17,7 +17,7 @@ from eidrive_scenario.openscenario import load_scenario, model
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition
-from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.context.contexts import ConditionContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.storyboard import Storyboard

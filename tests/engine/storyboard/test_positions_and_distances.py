@@ -21,7 +21,7 @@ from opendrive_xml import (
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.distances import closing_speed, distance

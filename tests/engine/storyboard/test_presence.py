@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 

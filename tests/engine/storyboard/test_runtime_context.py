@@ -10,20 +10,23 @@ from eidrive_scenario.base.requests import Override
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.context.protocols import ActionContext, ConditionContext, ControllerContext
+from eidrive_scenario.storyboard.context.contexts import ActionContext, ConditionContext, ControllerContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion import Motion
 from eidrive_scenario.storyboard.state.commands import ExternalPose
 from eidrive_scenario.world.environment import Environment
 
 
-def test_runtime_context_implements_the_narrow_contexts(context: RuntimeContext) -> None:
-    """Each protocol has members that the context has too, and none of the domain holders of the tree."""
-    for protocol in (ConditionContext, ActionContext, ControllerContext):
-        members = {name for kind in protocol.__mro__[:-3] for name in vars(kind) if not name.startswith("_")}
-        assert members
-        assert members <= set(dir(context))
-        assert not members & {"acquire_domain", "release_domains", "pending_actions", "begin_tick", "commands"}
+def test_contexts_of_extensions_lack_requests_of_others_and_of_the_tree() -> None:
+    tree = {"acquire_domain", "release_domains", "begin_tick", "step_traffic"}
+    requests = {"add_actor", "remove_actor", "set_variable", "set_signal_state", "request_command"}
+    poses = {"take_external_pose"}
+    assert tree | requests | poses <= set(dir(RuntimeContext))
+    assert requests <= set(dir(ActionContext))
+    assert poses <= set(dir(ControllerContext))
+    assert not (tree | requests | poses) & set(dir(ConditionContext))
+    assert not (tree | poses) & set(dir(ActionContext))
+    assert not (tree | requests) & set(dir(ControllerContext))
 
 
 @pytest.mark.parametrize("name", ["pose", "location", "heading", "speed", "route", "end_of_road", "teleported"])

@@ -1,0 +1,331 @@
+"""Contexts of a run for conditions, actions and controller models; `RuntimeContext` is all three.
+
+A condition reads the state of the run. An action also requests changes: those of its actor by methods of `Actor` and
+`Motion`, all others by methods of `ActionContext`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from eidrive_scenario.base.requests import Override
+from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
+from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.kinematics.actor import Actor
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.trailers import disconnect
+from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand, ExternalPose
+from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
+from eidrive_scenario.storyboard.state.signals import Signals
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.view import WorldView
+
+if TYPE_CHECKING:
+    from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
+    from eidrive_scenario.traffic.spawning.population import CentralObject
+
+
+E = TypeVar("E", bound=model.Element)
+
+
+MotionChange = str | tuple[str, str]
+"""Change of the state of an entity, by its name, or of its speed, by its name and `speed`."""
+
+
+def speed_change(name: str) -> MotionChange:
+    """Return the change of the speed of an entity."""
+    return name, "speed"
+
+
+class EntityAbsentError(LookupError):
+    """The position of an entity is required, and the entity is absent."""
+
+
+@dataclass
+class PositionCache:
+    """State of `resolve_position`: resolved static positions, and the nesting of the position that is resolved now."""
+
+    static: dict[int, tuple[model.Position, ResolvedPosition]] = field(default_factory=dict)
+    """Resolved static positions, by `id` of the position."""
+    depth: int = 0
+    """Number of positions along curves that are being resolved within each other."""
+    nested: int = 0
+    """Number of positions along curves within the outermost one so far."""
+
+
+class ConditionContext:
+    """State of the run at one instant: what conditions and the functions on positions read. They do not change it.
+
+    view         ground truth at this instant; it has no actors in Init
+    scenario     the scenario of the run
+    roads        the road network; None without one
+    seed         seed of the run
+    dt           length of the step that begins now [s]; 0 in Init
+    step         time step of the run [s]
+    actors       all entities of the scenario by name, present or absent
+    parameters, variables  values by name, as text
+    user_values  user-defined values that are set, by name
+    environment  time of day, weather and road condition
+    signals      traffic signals and their controllers
+    position_cache  state of `resolve_position`; only that function uses it
+    progress     states of the storyboard elements; `observe_element` returns those of one
+    warnings     warnings of the scenario; `warn` adds to them
+    """
+
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int) -> None:
+        self.scenario = scenario
+        self.roads = roads
+        self.step = dt
+        self.dt = 0.0
+        self.seed = seed
+        self.view = _empty_view()
+        self.progress = ElementStates()
+        self.parameters: Mapping[str, str] = scenario.parameters
+        self.variables: Mapping[str, str] = scenario.variables
+        network = scenario.document.road_network
+        self.signals = Signals(network.traffic_signals if network is not None else None, roads)
+        self.warnings: list[Diagnostic] = list(self.signals.warnings)
+        self.environment = Environment()
+        self.user_values: Mapping[str, str] = {}
+        self.requested_user_values: dict[str, model.Element] = {}
+        """First condition that requests each user-defined value, by the name of the value."""
+        self.actors: Mapping[str, Actor] = {
+            name: Actor(
+                name, entity, scenario.controllers.get(name, ()), roads, keeps_controller=name in scenario.driven
+            )
+            for name, entity in scenario.entities.items()
+        }
+        self.traffic: BackgroundTraffic | None = None
+        """Background traffic; None before its first instance starts."""
+        self.position_cache = PositionCache()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.view.time
+
+    @property
+    def traffic_names(self) -> tuple[str, ...]:
+        """Names of the vehicles of background traffic."""
+        return () if self.traffic is None else self.traffic.names
+
+    def pose(self, name: str) -> Pose:
+        """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""
+        return self._present_actor(name).motion.pose
+
+    def location(self, name: str) -> LaneLocation | None:
+        """Return the lane location of an actor, None without a road nearby. Raise EntityAbsentError if it is absent."""
+        actor = self._present_actor(name)
+        return None if self.roads is None else actor.location(self.roads, self.view.tick)
+
+    def _present_actor(self, name: str) -> Actor:
+        """Return a present actor; an actor that is removed in this step is present until the end of the step."""
+        actor = self.actors[name]
+        if not actor.present and name not in self.view:
+            raise EntityAbsentError(name)
+        return actor
+
+    def speed(self, name: str) -> float:
+        """Return the speed along the heading in this view [m/s]; of an actor outside of the view, its set speed."""
+        row = self.view.rows.get(name)
+        return self.view.states[row].speed if row is not None else self.actors[name].motion.speed_along_heading
+
+    def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E], within: model.Element) -> E:
+        """Return the catalog entry that `within` refers to, with its parameters.
+
+        Raise ScenarioError if it is missing or not of type `kind`.
+        """
+        if reference is None:
+            message = f"{type(within).__name__}: {kind.__name__} is missing"
+            raise ScenarioError(Diagnostic.at(within, message, "define it in place or by a CatalogReference"))
+        entry = self.scenario.resolved(reference)
+        if not isinstance(entry, kind):
+            raise ScenarioError(
+                Diagnostic.at(
+                    reference,
+                    f"CatalogReference {reference.catalog_name}/{reference.entry_name} has the wrong type",
+                    f"got {type(entry).__name__}; expected {kind.__name__}",
+                )
+            )
+        return entry
+
+    def observe_element(self, kind: str, name: str) -> ElementStateObserver | None:
+        """Return an observer of a storyboard element; None if there is no element of this type and name."""
+        return self.progress.observe_element(kind, name)
+
+    def element_names(self, kind: str) -> list[str]:
+        """Return the names of all storyboard elements of a type."""
+        return self.progress.names(kind)
+
+    def request_user_value(self, element: model.UserDefinedValueCondition) -> None:
+        """Declare that a condition reads a user-defined value."""
+        self.requested_user_values.setdefault(element.name, element)
+
+    def warn(self, *diagnostics: Diagnostic) -> None:
+        """Add warnings to the result of the run, each once."""
+        self.warnings += [diagnostic for diagnostic in diagnostics if diagnostic not in self.warnings]
+
+
+class ActionContext(ConditionContext):
+    """State of the run at one instant, and the changes that actions request.
+
+    commands     commands of this tick; requests write to them
+    monitors     values by name
+    appearances  appearances of the actors that differ from the default
+    overrides    controls that are held, by actor
+    """
+
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int) -> None:
+        super().__init__(scenario, roads, dt=dt, seed=seed)
+        declarations = scenario.document.monitor_declarations
+        monitors = declarations.monitor_declaration if declarations is not None else ()
+        self.monitors: Mapping[str, bool] = {monitor.name: monitor.value for monitor in monitors}
+        self.appearances: Mapping[str, Appearance] = {}
+        self.overrides: dict[str, dict[str, Override]] = {}
+        self.commands = Commands()
+
+    def add_actor(self, name: str, place: ResolvedPosition) -> None:
+        """Teleport an actor to a position; an absent actor enters the world."""
+        actor = self.actors[name]
+        actor.motion.teleport(place)
+        actor.invalidate_location()
+        if not actor.present:
+            actor.enter_world()
+            self.commands.spawns[name] = actor.motion.placement()
+
+    def remove_actor(self, name: str) -> None:
+        """Remove an actor from the world, disconnected from trailers; the actions that control it end."""
+        actor = self.actors[name]
+        disconnect(self.actors, name)
+        if actor.present:
+            actor.leave_world()
+            if self.commands.spawns.pop(name, None) is None:
+                self.commands.removals.add(name)
+
+    @property
+    def background_traffic(self) -> BackgroundTraffic:
+        """Background traffic of the run, built on first access. Raise SimulationError without a road network."""
+        if self.traffic is not None:
+            return self.traffic
+        if self.roads is None:
+            raise SimulationError("background traffic: the scenario has no road network")
+        from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic
+        from eidrive_scenario.traffic.spawning.population import Population
+
+        population = Population(
+            self.roads,
+            seed=self.seed,
+            center=self._center,
+            taken=frozenset(self.actors),
+            must_stop=self.signals.must_stop,
+        )
+        self.traffic = BackgroundTraffic(population)
+        return self.traffic
+
+    def _center(self, name: str) -> CentralObject | None:
+        """Return pose and speed of an entity for the traffic around it; None while it is absent."""
+        actor = self.actors.get(name)
+        if actor is None or not actor.present:
+            return None
+        from eidrive_scenario.traffic.spawning.population import CentralObject
+
+        row = self.view.rows.get(name)
+        if row is None:
+            pose = actor.motion.pose
+            return CentralObject(pose.x, pose.y, pose.h, actor.motion.speed_along_heading)
+        state = self.view.states[row]
+        return CentralObject(state.x, state.y, state.yaw, state.speed)
+
+    def start_traffic(self, instance: TrafficGenerator) -> None:
+        """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
+        self.background_traffic.start(instance)
+
+    def stop_traffic(self, name: str | None) -> None:
+        """Stop all instances of background traffic of this name; all instances without a name."""
+        if self.traffic is not None:
+            self.traffic.stop(name)
+
+    def set_parameter(self, name: str, value: str) -> None:
+        """Set the value of a parameter."""
+        self.parameters = {**self.parameters, name: value}
+
+    def set_variable(self, name: str, value: str) -> None:
+        """Set the value of a variable."""
+        self.variables = {**self.variables, name: value}
+
+    def set_monitor(self, name: str, value: bool) -> None:
+        """Set the value of a monitor."""
+        self.monitors = {**self.monitors, name: value}
+
+    def set_environment(self, environment: Environment) -> None:
+        """Set time of day, weather and road condition."""
+        self.environment = self.commands.environment = environment
+
+    def set_signal_state(self, name: str, state: str) -> None:
+        """Set the state of a traffic signal."""
+        self.signals.set_state(name, state)
+
+    def set_signal_phase(self, controller: str, phase: str) -> None:
+        """Start a phase of a signal controller now."""
+        self.signals.set_phase(controller, phase, max(self.time, 0.0))
+
+    def set_override(self, name: str, override: Override) -> None:
+        """Hold a control of a driven actor at a value, or release it."""
+        held = self.overrides.setdefault(name, {})
+        if override.active:
+            held[override.control] = override
+        else:
+            held.pop(override.control, None)
+
+    def appearance(self, name: str) -> Appearance:
+        """Return the appearance of an actor."""
+        return self.appearances.get(name) or Appearance()
+
+    def set_appearance(self, name: str, appearance: Appearance) -> None:
+        """Set the appearance of an actor."""
+        self.appearances = {**self.appearances, name: appearance}
+
+    def request_command(self, command: CustomCommand) -> None:
+        """Request the execution of a custom command."""
+        self.commands.custom.append(command)
+
+
+class ControllerContext(ConditionContext):
+    """State of the run at one instant, and the inputs of controller models."""
+
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int) -> None:
+        super().__init__(scenario, roads, dt=dt, seed=seed)
+        self.external_poses: dict[str, ExternalPose] = {}
+        """Poses that were set from outside and not applied so far, by entity."""
+
+    def take_external_pose(self, name: str) -> ExternalPose | None:
+        """Return and discard the pose that was set from outside for an entity; None without one."""
+        return self.external_poses.pop(name, None)
+
+
+def _empty_view() -> WorldView:
+    """Return a view without actors, before the first tick."""
+    none = np.empty(0)
+    points = np.empty((0, 3))
+    return WorldView(
+        time=0.0,
+        tick=-1,
+        names=(),
+        categories=(),
+        position=points,
+        yaw=none,
+        pitch=none,
+        roll=none,
+        velocity=points,
+        acceleration=points,
+        yaw_rate=none,
+        speed=none,
+        size=points,
+        offset=points,
+    )
