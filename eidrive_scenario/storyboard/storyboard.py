@@ -28,7 +28,7 @@ from eidrive_scenario.storyboard.kinematics.trailers import (
 from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.builder import Builder
-from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
@@ -36,43 +36,9 @@ STOPPED = "stop trigger"
 COMPLETE = "storyboard complete"
 
 
-class ExternalObjects:
-    """External objects of one scenario."""
-
-    def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
-        self._scenario = scenario
-        self._objects: Mapping[str, PlacedObject | None] = {
-            name: _find(reference.name, roads) for name, reference in scenario.external.items()
-        }
-        self.warnings = tuple(
-            Diagnostic.at(
-                scenario.external[name],
-                f"entity {name!r} is represented by a box of 0.5 m: the external object "
-                f"{scenario.external[name].name!r} is unknown",
-                "define a Vehicle, Pedestrian or MiscObject",
-            )
-            for name, placed in self._objects.items()
-            if placed is None
-        )
-
-    def in_road_network(self) -> Mapping[str, PlacedObject]:
-        """Return the external objects that are objects of the road network, by entity."""
-        return {name: placed for name, placed in self._objects.items() if placed is not None}
-
-    def body(self, name: str) -> ActorSpec | None:
-        """Return the body of an entity that is an object of the road network; None for other entities."""
-        placed = self._objects.get(name)
-        if placed is None:
-            return None
-        default = actor_spec(name, self._scenario.entities[name])
-        size = (placed.length or default.size[0], placed.width or default.size[1], placed.height or default.size[2])
-        return replace(default, size=size, offset=(0.0, 0.0, size[2] / 2.0))
-
-
-def _find(name: str, roads: RoadNetwork | None) -> PlacedObject | None:
-    if roads is None:
-        return None
-    placed = list(placed_objects(roads)) if name else []
+def _road_object(name: str, roads: RoadNetwork | None) -> PlacedObject | None:
+    """Return the object of the road network with this id, otherwise with this name; None without one."""
+    placed = list(placed_objects(roads)) if name and roads is not None else []
     return next((entry for key in ("id", "name") for entry in placed if getattr(entry.object, key) == name), None)
 
 
@@ -103,8 +69,17 @@ class Storyboard:
         for name, actor in self.context.actors.items():
             actor.set_trailer(declared_trailer(scenario.entities[name]))
         check_acyclic(self.context.actors)
-        self._external = ExternalObjects(scenario, roads)
-        self.context.warnings += self._external.warnings
+        self._road_objects: dict[str, PlacedObject] = {}
+        """Objects of the road network that are entities, by entity."""
+        for name, reference in scenario.external.items():
+            placed = _road_object(reference.name, roads)
+            if placed is not None:
+                self._road_objects[name] = placed
+            else:
+                box = f"entity {name!r} is represented by a box of 0.5 m"
+                message = f"{box}: the external object {reference.name!r} is unknown"
+                hint = "define a Vehicle, Pedestrian or MiscObject"
+                self.context.warnings.append(Diagnostic.at(reference, message, hint))
         self._controller_models = build_controller_models(
             self.context.actors, self.context, controllers or {}, registry("controllers")
         )
@@ -121,7 +96,7 @@ class Storyboard:
     @property
     def road_objects(self) -> frozenset[str]:
         """Ids of the objects of the road network that are entities of the scenario."""
-        return frozenset(placed.object.id for placed in self._external.in_road_network().values())
+        return frozenset(placed.object.id for placed in self._road_objects.values())
 
     @property
     def changes(self) -> tuple[StateChange, ...]:
@@ -139,7 +114,7 @@ class Storyboard:
         """Execute Init and return its commands, before the first view. Call once."""
         self.context.signals.advance(0.0)
         self.init.start()
-        for name, placed in self._external.in_road_network().items():
+        for name, placed in self._road_objects.items():
             if not self.context.actors[name].present:
                 self.context.add_actor(name, ResolvedPosition(placed.pose))
         self._add_trailers()
@@ -217,9 +192,11 @@ class Storyboard:
     def _update_spawns(self, commands: Commands) -> None:
         """Update the spawns of this tick, whose speeds later actions of the tick may have set."""
         for name in commands.spawns:
-            spec = self._external.body(name)
-            if spec is not None:
-                commands.actor_specs[name] = spec
+            if (placed := self._road_objects.get(name)) is not None:
+                default = actor_spec(name, self.scenario.entities[name])
+                length, width, height = default.size
+                size = (placed.length or length, placed.width or width, placed.height or height)
+                commands.actor_specs[name] = replace(default, size=size, offset=(0.0, 0.0, size[2] / 2.0))
             commands.spawns[name] = self.context.actors[name].motion.placement()
 
     def _completed_commands(self, commands: Commands, driven: Sequence[Actor]) -> Commands:

@@ -54,9 +54,8 @@ def build_route(
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
         if here is None:
-            raise ScenarioError(
-                Diagnostic.at(waypoint, "Waypoint: the position is not on a road", "move it onto a lane")
-            )
+            message = "Waypoint: the position is not on a road"
+            raise ScenarioError(Diagnostic.at(waypoint, message, "move it onto a lane"))
         waypoints.append(here)
     costs = [_cost(route, number, roads, seed) for number in range(len(waypoints))]
     try:
@@ -118,10 +117,9 @@ def uniform_branch_selector(generator: np.random.Generator) -> BranchSelector:
 
 def random_route(roads: RoadNetwork, start: LaneLocation, length: float, select_branch: BranchSelector) -> Route:
     """Return a route from a location, at least `length` [m] long unless the road ends before."""
-    road = roads.road(start.road)
     direction = roads.driving_direction(start.road, start.lane)
-    key = LaneKey(start.road, road.section_at(start.s).index, start.lane)
-    section = road.section_at(start.s)
+    section = roads.road(start.road).section_at(start.s)
+    key = LaneKey(start.road, section.index, start.lane)
     remaining = length - ((section.end - start.s) if direction > 0 else (start.s - section.s))
     lanes = [key]
     while remaining > 0.0:
@@ -133,8 +131,7 @@ def random_route(roads: RoadNetwork, start: LaneLocation, length: float, select_
             break
         key, direction = branch.lane, branch.direction
         lanes.append(key)
-        remaining -= roads.road(key.road).sections[key.section].length
-    road = roads.road(key.road)
-    section = road.sections[key.section]
+        section = roads.road(key.road).sections[key.section]
+        remaining -= section.length
     end = section.end if direction > 0 else section.s
     return Route(roads.tables, tuple(lanes), start, LaneLocation(key.road, key.lane, end, 0.0, 0.0))

@@ -52,11 +52,6 @@ class TrajectoryCurve:
         return self.s[-1]
 
     @property
-    def start_time(self) -> float:
-        """Time of the first point [s]; 0 without times."""
-        return self.times[0] if self.times is not None else 0.0
-
-    @property
     def end_time(self) -> float:
         """Time of the last point [s]; 0 without times, infinite for a closed trajectory, which is followed in laps."""
         if self.times is None:

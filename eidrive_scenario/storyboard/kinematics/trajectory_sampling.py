@@ -21,24 +21,26 @@ SPACING = 0.1
 MAX_POINTS = 20_000
 """Maximum number of samples of a curve, besides one per segment; beyond 2 km their distance is larger."""
 
-Course = tuple[list[float], list[Pose], tuple[float, ...] | None]
-"""Samples of a curve: arc lengths [m], poses, and times [s] or None."""
+Resolve = Callable[[model.Position], Pose]
+"""Returns the current pose of a position."""
 
 
-def clothoid(shape: model.Clothoid, start: Pose) -> Course:
-    """Return the samples of a clothoid from its start pose."""
+def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> TrajectoryCurve:
     change = shape.curvature_prime if shape.curvature_prime is not None else shape.curvature_dot or 0.0
-    s, poses = _spiral(start, shape.curvature, shape.curvature + change * shape.length, shape.length)
-    times = None
-    if shape.start_time is not None and shape.stop_time is not None:
-        times = _linear_times(s, shape.start_time, shape.stop_time)
-    return s, poses, times
+    last = shape.curvature + change * shape.length
+    s, poses = _spiral(resolve(shape.position), shape.curvature, last, shape.length)
+    times, start, stop = None, shape.start_time, shape.stop_time
+    if start is not None and stop is not None:
+        length = s[-1] if s[-1] > 0.0 else 1.0
+        times = [start + (stop - start) * distance / length for distance in s]
+    return _curve_of(s, poses, times, closed)
 
 
-def clothoid_spline(
-    shape: model.ClothoidSpline, resolve: Callable[[model.Position], Pose], here: Pose | None
-) -> Course:
-    """Return the samples of consecutive clothoids; `here` is the start if the first segment has no position."""
+def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve, here: Pose | None) -> TrajectoryCurve:
+    """Return consecutive clothoids; `here` is the start if the first segment has no position.
+
+    The speed is constant between segments with a start time; the first one starts at 0.
+    """
     s: list[float] = [0.0]
     poses: list[Pose] = []
     spacing = max(SPACING, sum(segment.length for segment in shape.clothoid_spline_segment) / MAX_POINTS)
@@ -53,20 +55,23 @@ def clothoid_spline(
         s += [base + distance for distance in distances]
         poses += samples
         here = samples[-1]
-    return s[1:], poses, _spline_times(shape, s[1:])
-
-
-def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[float, ...] | None:
-    """Return the times at the samples [s]: constant speed between segments with a start time; the first starts at 0."""
     if shape.time_end is None:
-        return None
+        return _curve_of(s[1:], poses, None, closed)
     times, begin = {0.0: 0.0}, 0.0
     for segment in shape.clothoid_spline_segment:
         if segment.time_start is not None:
             times[begin] = segment.time_start
         begin += segment.length
     times[begin] = shape.time_end
-    return tuple(np.interp(s, list(times), list(times.values())).tolist())
+    return _curve_of(s[1:], poses, np.interp(s[1:], list(times), list(times.values())).tolist(), closed)
+
+
+def _curve_of(
+    s: Sequence[float], poses: Sequence[Pose], times: Sequence[float] | None, closed: bool
+) -> TrajectoryCurve:
+    """Return a curve with the headings of its poses as tangents."""
+    tangents = tuple(pose.h for pose in poses)
+    return TrajectoryCurve(tuple(s), tuple(poses), None if times is None else tuple(times), closed, tangents=tangents)
 
 
 def _spiral(
@@ -101,11 +106,6 @@ def _pitch_in_plane(start: Pose, turn: float) -> float:
         return 0.0
     rise = -math.tan(start.p) * math.cos(turn) + math.tan(start.r) / math.cos(start.p) * math.sin(turn)
     return -math.atan(rise)
-
-
-def _linear_times(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:
-    length = s[-1] if s[-1] > 0.0 else 1.0
-    return tuple(first + (last - first) * distance / length for distance in s)
 
 
 @dataclass(frozen=True)
@@ -200,9 +200,6 @@ def _unwrapped(poses: Sequence[Pose]) -> list[Pose]:
 ROUNDING = 2.0
 """Maximum distance from a corner of a polyline at which the heading turns [m]."""
 
-Resolve = Callable[[model.Position], Pose]
-"""Returns the current pose of a position."""
-
 
 def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> TrajectoryCurve:
     """Sample a trajectory in world coordinates. `resolve` returns the current pose of a position.
@@ -213,16 +210,11 @@ def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pos
     if isinstance(shape, model.Polyline):
         return _polyline(shape, trajectory.closed, resolve)
     if isinstance(shape, model.Clothoid):
-        return _curve_of(clothoid(shape, resolve(shape.position)), trajectory.closed)
+        return _clothoid(shape, trajectory.closed, resolve)
     if isinstance(shape, model.ClothoidSpline):
-        return _curve_of(clothoid_spline(shape, resolve, start), trajectory.closed)
+        return _clothoid_spline(shape, trajectory.closed, resolve, start)
     assert isinstance(shape, model.Nurbs)
     return _nurbs(shape, trajectory.closed, resolve)
-
-
-def _curve_of(course: Course, closed: bool) -> TrajectoryCurve:
-    s, poses, times = course
-    return TrajectoryCurve(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,8 @@ def test_clothoid_spline_has_the_times_of_its_segments() -> None:
     )
     shape = model.ClothoidSpline(clothoid_spline_segment=pieces, time_end=11.0)
     way = sample_trajectory(trajectory(clothoid_spline=shape), resolve)
-    assert (way.start_time, way.end_time) == (0.0, 11.0)
+    assert way.times is not None
+    assert (way.times[0], way.end_time) == (0.0, 11.0)
     assert [way.at_time(time) for time in (2.5, 5.0, 7.0, 11.0)] == pytest.approx([5.0, 10.0, 20.0, 40.0])
     without = sample_trajectory(trajectory(clothoid_spline=replace(shape, time_end=None)), resolve)
     assert without.times is None
