@@ -126,7 +126,8 @@ class AnimationAction(ActionBehaviour):
     @property
     def resource(self) -> str:
         """Animated component, or `motion` for a pedestrian."""
-        return self._kind_and_target()[1] if self._kind_and_target()[0] != MOTION else MOTION
+        kind, target = self._kind_and_target()
+        return MOTION if kind == MOTION else target
 
     def initialise(self) -> None:
         """Start the animation."""

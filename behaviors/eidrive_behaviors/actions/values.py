@@ -59,13 +59,26 @@ class ModifyAction(ValueAction):
     action: model.ParameterModifyAction | model.VariableModifyAction
 
     def update(self) -> Status:
-        """Modify the value."""
-        self.set_value(modify_value(self, self.value, self.ref, self.action.rule))
+        """Modify the value, in the notation of XML. Raise ScenarioError if it is not a number."""
+        rule = self.action.rule
+        try:
+            value = float(self.value)
+        except ValueError:
+            raise self.error(f"{self.ref} is not a number (got {self.value!r}; expected a number)") from None
+        if rule.add_value is not None:
+            value += rule.add_value.value
+        elif rule.multiply_by_value is not None:
+            value *= rule.multiply_by_value.value
+        self.set_value(f"{value:.15g}".replace("inf", "INF"))
         return Status.SUCCESS
 
     def describe(self) -> str:
         """Describe name and rule."""
-        return f"{describe_modification(self.action.rule)} {self.kind} {self.ref}"
+        rule = self.action.rule
+        if rule.add_value is not None:
+            return f"add {rule.add_value.value:g} to {self.kind} {self.ref}"
+        assert rule.multiply_by_value is not None
+        return f"multiply by {rule.multiply_by_value.value:g} {self.kind} {self.ref}"
 
 
 class ParameterSetAction(SetAction):
@@ -82,26 +95,3 @@ class VariableSetAction(SetAction):
 
 class VariableModifyAction(ModifyAction):
     """Addition to a variable, or its multiplication."""
-
-
-def modify_value(
-    behaviour: ActionBehaviour, text: str, name: str, rule: model.ModifyRule | model.VariableModifyRule
-) -> str:
-    """Return the number in `text` after the rule, in the notation of XML. Raise ScenarioError if it is not a number."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise behaviour.error(f"{name} is not a number (got {text!r}; expected a number)") from None
-    if rule.add_value is not None:
-        value += rule.add_value.value
-    elif rule.multiply_by_value is not None:
-        value *= rule.multiply_by_value.value
-    return f"{value:.15g}".replace("inf", "INF")
-
-
-def describe_modification(rule: model.ModifyRule | model.VariableModifyRule) -> str:
-    """Describe a rule."""
-    if rule.add_value is not None:
-        return f"add {rule.add_value.value:g} to"
-    assert rule.multiply_by_value is not None
-    return f"multiply by {rule.multiply_by_value.value:g}"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 
 from eidrive_scenario.api.actions import (
@@ -18,6 +20,14 @@ from eidrive_scenario.api.actions import (
 
 BOOLEANS = {"true": 1.0, "false": 0.0}
 """Numeric values of booleans."""
+ALPHABETICAL: Mapping[model.Rule, Callable[[str, str], bool]] = {
+    model.Rule.EQUAL_TO: operator.eq,
+    model.Rule.NOT_EQUAL_TO: operator.ne,
+    model.Rule.GREATER_THAN: operator.gt,
+    model.Rule.GREATER_OR_EQUAL: operator.ge,
+    model.Rule.LESS_THAN: operator.lt,
+    model.Rule.LESS_OR_EQUAL: operator.le,
+}
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?INF", re.ASCII)
 DATE_TIME = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|[+-]\d\d:\d\d)?", re.ASCII)
 
@@ -30,24 +40,7 @@ def satisfies(text: str | None, rule: model.Rule, limit: str) -> bool:
         first, second = convert(text), convert(limit)
         if first is not None and second is not None:
             return satisfies_rule(first, rule, second)
-    match rule.value:
-        case "equalTo":
-            return text == limit
-        case "notEqualTo":
-            return text != limit
-        case "greaterThan":
-            return text > limit
-        case "lessThan":
-            return text < limit
-        case "greaterOrEqual":
-            return text >= limit
-    return text <= limit
-
-
-def numeric_measures(text: str | None, rule: model.Rule, limit: str) -> tuple[Measure, ...]:
-    """Return the compared numbers; empty if one of the texts is not a number."""
-    first, second = _number(text or ""), _number(limit)
-    return () if first is None or second is None else (Measure("", first, rule, second, ""),)
+    return ALPHABETICAL[rule](text, limit)
 
 
 def _number(text: str) -> float | None:
@@ -96,7 +89,8 @@ class TextCondition(Condition):
 
     def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the value if it and the limit are numbers."""
-        return numeric_measures(self.current(context), self.element.rule, self.element.value)
+        value, limit = _number(self.current(context) or ""), _number(self.element.value)
+        return () if value is None or limit is None else (Measure("", value, self.element.rule, limit, ""),)
 
 
 class ParameterCondition(TextCondition):

@@ -75,16 +75,9 @@ class MemorylessModel(SafetyModel):
     def decide(self, ego: EgoKinematics, seen: list[LeadObject]) -> float | None:
         """Return the braking acceleration after the reaction time [m/s²]; None if the situation is not critical."""
         self._lead = next((candidate for candidate in seen if self.matters(ego, candidate)), None)
-        held = self._critical and self.full_stop and ego.speed > 0.0
-        before, self._critical = (
-            self._critical,
-            held
-            or (
-                self._lead is not None
-                and self._lead.closing > 0.0
-                and self._lead.gap > 0.0
-                and self.critical(ego, self._lead)
-            ),
+        before, lead = self._critical, self._lead
+        self._critical = (before and self.full_stop and ego.speed > 0.0) or (
+            lead is not None and lead.closing > 0.0 and lead.gap > 0.0 and self.critical(ego, lead)
         )
         if not self._critical:
             return None
