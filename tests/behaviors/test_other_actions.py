@@ -152,6 +152,16 @@ def test_variable_modify_of_text_is_rejected(scene: RunScene) -> None:
         scene(0.2, ("Ego", global_xml(add)))
 
 
+@pytest.mark.parametrize("text", ["1_0", "infinity", "true"])
+def test_variable_modify_of_other_than_xml_numbers_is_rejected(scene: RunScene, text: str) -> None:
+    """XML Schema, double: digits without separators, and INF; Python reads the first two as numbers."""
+    change = '<VariableAction variableRef="Mood">{}</VariableAction>'
+    add = "<ModifyAction><Rule><AddValue value='3'/></Rule></ModifyAction>"
+    steps = [(change.format(f'<SetAction value="{text}"/>'), 0.15), (change.format(add), 0.35)]
+    with pytest.raises(ScenarioError, match=rf"Mood is not a number \(got '{text}'; expected a number\)"):
+        scene(1, *(("Ego", global_xml(action), after(time)) for action, time in steps))
+
+
 @pytest.mark.element("TrafficSignalStateAction", "TrafficSignalCondition")
 def test_signal_state_applies_to_conditions_in_the_same_tick(scene: RunScene) -> None:
     change = global_xml(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
+from eidrive_behaviors.conditions.values import NUMBER
 from eidrive_scenario.api.actions import ActionBehaviour, model
 
 
@@ -61,10 +62,9 @@ class ModifyAction(ValueAction):
     def update(self) -> Status:
         """Modify the value, in the notation of XML. Raise ScenarioError if it is not a number."""
         rule = self.action.rule
-        try:
-            value = float(self.value)
-        except ValueError:
-            raise self.error(f"{self.ref} is not a number (got {self.value!r}; expected a number)") from None
+        if not NUMBER.fullmatch(self.value.strip()):
+            raise self.error(f"{self.ref} is not a number (got {self.value!r}; expected a number)")
+        value = float(self.value)
         if rule.add_value is not None:
             value += rule.add_value.value
         elif rule.multiply_by_value is not None:

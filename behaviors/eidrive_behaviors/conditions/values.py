@@ -29,6 +29,7 @@ ALPHABETICAL: Mapping[model.Rule, Callable[[str, str], bool]] = {
     model.Rule.LESS_OR_EQUAL: operator.le,
 }
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?INF", re.ASCII)
+"""Number in XML notation, which excludes Python's own ones, such as 1_000."""
 DATE_TIME = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|[+-]\d\d:\d\d)?", re.ASCII)
 
 
