@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -225,7 +224,6 @@ def _check_placements(placements: Mapping[str, Placement]) -> None:
 
 POINTS_APART = 2.0
 """Maximum spacing of the points of a route [m]."""
-NO_ROUTES: Mapping[str, Array] = MappingProxyType({})
 
 
 class RequestedRoutes:
@@ -258,4 +256,4 @@ class RequestedRoutes:
                     routes[name] = request.polyline(POINTS_APART)
             else:
                 routes[name] = np.concatenate([np.array([actor.motion.pose[:3]]), request])
-        return routes or NO_ROUTES
+        return routes or NONE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass
 
@@ -24,7 +23,7 @@ from eidrive_scenario.api.actions import (
     facing,
     model,
 )
-from eidrive_scenario.api.common import EPSILON, LaneLocation, Pose, RoadNetwork, Route, ScenarioError
+from eidrive_scenario.api.common import EPSILON, LaneLocation, Pose, ScenarioError
 
 SPACING = 2.0
 """Spacing of the points of a path [m]."""
@@ -50,39 +49,6 @@ class LanePath:
         length = math.hypot(*along.tolist())
         across = abs(float(along[0] * apart[first, 1] - along[1] * apart[first, 0])) / length
         return across, nearest >= self.end
-
-
-def lane_path(
-    roads: RoadNetwork,
-    start: LaneLocation,
-    transition: TransitionProfile,
-    *,
-    per_meter: float,
-    heading: float,
-    length: float,
-    route: Route | None,
-) -> LanePath | None:
-    """Return the path from a location on the center of the target lane; None if the lane ends at once.
-
-    transition  of the offset, positive to the left in driving direction [m]
-    per_meter   progress of the transition per distance along the lane
-    heading     of the vehicle [rad]; against it the path leads along the lane backwards
-    length      of the path [m]
-    """
-    transition = copy.copy(transition)
-    step = SPACING if math.cos(roads.pose(start).h - heading) >= 0.0 else -SPACING
-    location: LaneLocation | None = start
-    points: list[tuple[float, float, float]] = []
-    end: int | None = None
-    while location is not None and SPACING * len(points) <= length:
-        end = len(points) if end is None and transition.done else end
-        side = roads.driving_direction(location.road, location.lane)
-        points.append(roads.pose(location._replace(offset=transition.value * side))[:3])
-        transition.advance(SPACING * per_meter)
-        location = roads.advance(location, step, route=route)
-    if len(points) < 2:
-        return None
-    return LanePath(np.array(points), len(points) - 1 if end is None else end)
 
 
 STANDING = 1e-6
@@ -290,20 +256,25 @@ class LaneChangeAction(ActionBehaviour):
         goal, pose, route = self.actor.goal, self.actor.motion.pose, self.actor.motion.route
         speed = max(self.context.speed(self.actor.name), (goal.speed if goal is not None else None) or 0.0, SLOWEST)
         by_distance = self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE
-        per_meter = 1.0 if by_distance else 1.0 / speed
+        per_meter = 1.0 if by_distance else 1.0 / speed  # Progress of the transition along the lane
         if route is None:
             length = transition.extent / per_meter + LOOKOUT + LOOKOUT_TIME * speed
         else:
             length = route.length - route.project(pose.x, pose.y)[0]
-        return lane_path(
-            self._roads,
-            center,
-            transition,
-            per_meter=per_meter,
-            heading=pose.h,
-            length=length,
-            route=route,
-        )
+        # Against its heading the path leads along the lane backwards
+        step = SPACING if math.cos(self._roads.pose(center).h - pose.h) >= 0.0 else -SPACING
+        location: LaneLocation | None = center
+        points: list[tuple[float, float, float]] = []
+        end: int | None = None
+        while location is not None and SPACING * len(points) <= length:
+            end = len(points) if end is None and transition.done else end
+            side = self._roads.driving_direction(location.road, location.lane)
+            points.append(self._roads.pose(location._replace(offset=transition.value * side))[:3])
+            transition.advance(SPACING * per_meter)
+            location = self._roads.advance(location, step, route=route)
+        if len(points) < 2:
+            return None
+        return LanePath(np.array(points), len(points) - 1 if end is None else end)
 
     def _needs_path(self, here: LaneLocation) -> bool:
         """Whether the vehicle cannot follow its lane from now on: a route, an offset, or an oncoming lane."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from eidrive_scenario.openscenario.model.element import Element, children, text, visible_parameters
+from eidrive_scenario.openscenario.model.element import Element, about, children, text
 from eidrive_scenario.openscenario.model.enumerations import ParameterType, Rule
 
 
@@ -43,7 +43,7 @@ class Property(Element):
 
     name: str
     value: str
-    scope: Any = visible_parameters()
+    scope: Any = about(None)
 
 
 class File(Element):

@@ -8,10 +8,10 @@ from eidrive_scenario.openscenario.model.element import (
     CHOICE,
     Choice,
     Element,
+    about,
     child,
     choice,
     sequence,
-    sibling_index,
     text,
 )
 
@@ -56,7 +56,7 @@ class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     distribution_set: DistributionSet | None = None
     distribution_range: DistributionRange | None = None
     user_defined_distribution: UserDefinedDistribution | None = None
-    sibling_index: int = sibling_index()
+    sibling_index: int = about(0)
 
 
 class ParameterValueSet(Element):
@@ -75,7 +75,7 @@ class DeterministicMultiParameterDistribution(Element):
     """Deterministic values of several parameters together."""
 
     value_set_distribution: ValueSetDistribution
-    sibling_index: int = sibling_index()
+    sibling_index: int = about(0)
 
 
 class Deterministic(Element, content=Choice(minimum=0, maximum=None)):

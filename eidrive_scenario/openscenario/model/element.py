@@ -73,7 +73,13 @@ def choice(*parts: Part, empty_until: str = "") -> Choice:
 USAGE = "usage"
 
 ABOUT = frozenset({"line", "source", "scope", "sibling_index"})
-"""Fields with the location of an element, not with its content."""
+"""Fields with the location of an element, not with its content.
+
+line, source   line and file
+scope          parameters (a Scope) that are visible to references inside a text of the element; None for a property
+               without a reference, or with a single reference, which the reader resolves
+sibling_index  place among the children of the parent, where elements of several classes are ordered
+"""
 
 
 class Usage(msgspec.Struct, frozen=True):
@@ -111,17 +117,9 @@ def text() -> Any:
     return field(default="", metadata={USAGE: Usage(text=True)})
 
 
-def visible_parameters() -> Any:
-    """Define a field for the parameters (a Scope) that are visible to references inside a text of the element.
-
-    It is None for a property without a reference, or with a single reference, which the reader resolves.
-    """
-    return field(default=None, compare=False, repr=False)
-
-
-def sibling_index() -> Any:
-    """Define a field for the place among the children of the parent, where elements of several classes are ordered."""
-    return field(default=0, compare=False, repr=False)
+def about(default: Any) -> Any:
+    """Define a field of `ABOUT`, which comparisons ignore."""
+    return field(default=default, compare=False, repr=False)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
@@ -155,8 +153,8 @@ class _FrozenRecord:
 class Element(_FrozenRecord):
     """Element of a file. Comparisons ignore its location `line` and `source`."""
 
-    line: int = field(default=0, compare=False, repr=False)
-    source: str = field(default="", compare=False, repr=False)
+    line: int = about(0)
+    source: str = about("")
 
     def __init__(self, **values: Any) -> None:
         """Set the fields. Raise TypeError for an unknown field, or if a field without a default is missing."""

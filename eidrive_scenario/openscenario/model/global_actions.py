@@ -16,7 +16,7 @@ from eidrive_scenario.openscenario.model.declarations import (
     SignalControllerName,
     VariableName,
 )
-from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child, text, visible_parameters
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, about, attribute, child, text
 from eidrive_scenario.openscenario.model.entities import BoundingBox
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     CloudState,
@@ -313,7 +313,7 @@ class CustomCommandAction(Element):
 
     type: str
     content: str = text()
-    scope: Any = visible_parameters()
+    scope: Any = about(None)
 
 
 class UserDefinedAction(Element):
