@@ -134,21 +134,20 @@ def unusable(element: model.Element, version: Version) -> str:
     for name, value in vars(element).items():
         if not isinstance(value, float):
             continue
-        message = ""
+        expected = ""
         if math.isnan(value):
-            message = "is NaN; a number is expected"
+            expected = "a number"
         elif abs(value) > MAX_ABSOLUTE and not _may_be_immense(element, name):
-            message = f"is {_format(value)}; a number within {MAX_ABSOLUTE:g} is expected"
+            expected = f"a number within {MAX_ABSOLUTE:g}"
         elif value < 0.0 and name in NOT_NEGATIVE.get(kind, ()):
-            message = f"is {_format(value)}; a number of at least 0 is expected"
-        elif value <= 0.0 and name in POSITIVE.get(kind, ()):
-            message = f"is {_format(value)}; a number above 0 is expected"
+            expected = "a number of at least 0"
         elif value < MIN_POSITIVE and name in POSITIVE.get(kind, ()):
-            message = f"is {_format(value)}; a number of at least {MIN_POSITIVE:g} is expected"
-        if message:
+            expected = "a number above 0" if value <= 0.0 else f"a number of at least {MIN_POSITIVE:g}"
+        if expected:
             attributes = rules(kind, version).attributes.items()
             spelling = next((spelling for spelling, rule in attributes if rule.field == name), name)
-            return f"{spelling} of {kind.__name__} {message}"
+            number = f"{value:g}".replace("inf", "INF").replace("nan", "NaN")
+            return f"{spelling} of {kind.__name__} is {number}; {expected} is expected"
     return ""
 
 
@@ -161,12 +160,6 @@ def _may_be_immense(element: model.Element, name: str) -> bool:
     kind = type(element)
     is_compared = kind.__name__.endswith("Condition") and kind is not model.RoadCondition
     return is_compared or isinstance(element, UNLIMITED) or name.startswith("max_")
-
-
-def _format(value: float) -> str:
-    if math.isinf(value):
-        return "INF" if value > 0.0 else "-INF"
-    return f"{value:g}"
 
 
 MAX_NURBS_ORDER = 20

@@ -97,7 +97,9 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
         operators=dict(_OPERATORS), functions=dict(FUNCTIONS), names=names | dict(CONSTANTS)
     )
     try:
-        tree = _parse(source)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # Warnings of Python, such as for `1if`, are errors of the expression
+            tree = ast.parse(source, mode="eval")
         _check(tree, text)
         result = evaluator.eval(source, previously_parsed=tree.body)
         if not isinstance(result, int | float) or not math.isfinite(result):
@@ -127,13 +129,6 @@ def _number(name: str, value: Value) -> float | int | bool:
     if isinstance(value, str):
         raise ExpressionError(f"${name} is {value!r}, which is not a number")
     return value
-
-
-def _parse(source: str) -> ast.Expression:
-    """Return the syntax tree. Warnings of Python, such as for `1if`, are errors of the expression."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        return ast.parse(source, mode="eval")
 
 
 def _check(tree: ast.Expression, text: str) -> None:

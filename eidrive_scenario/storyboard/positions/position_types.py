@@ -188,8 +188,7 @@ def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float,
     Older values beyond the range of radians are read as degrees, with a warning.
     """
     if frame.latitude_deg is not None and frame.longitude_deg is not None:
-        latitude, longitude = frame.latitude_deg, frame.longitude_deg
-        in_degrees = True
+        latitude, longitude, in_degrees = frame.latitude_deg, frame.longitude_deg, True
     elif frame.latitude is not None and frame.longitude is not None:
         latitude, longitude = frame.latitude, frame.longitude
         in_degrees = abs(latitude) > math.pi / 2.0 or abs(longitude) > math.pi
