@@ -158,7 +158,10 @@ def distance(
     heading.
     """
     if kind == "euclidianDistance":
-        return _euclidean(context, a, b, freespace)
+        if not freespace:
+            return math.dist(context.pose(a)[:3], _pose(context, b)[:3])
+        box = entity_box(context, b) if isinstance(b, str) else (*b.pose[:3], 0.0, 0.0, 0.0, 0.0)
+        return box_distance(entity_box(context, a), box)
     here = ResolvedPosition(context.pose(a), context.location(a) if frame in ("lane", "road") else None)
     along, across = _offsets(context, a, here, b, frame, algorithm)
     value = along if kind == "longitudinal" else across
@@ -197,7 +200,7 @@ def closing_speed(
     trajectories; a position does not move.
     """
     mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
-    here, there = ResolvedPosition(context.pose(a), context.location(a)), _resolved(context, b)
+    here, there = (ResolvedPosition(_pose(context, target), _location(context, target)) for target in (a, b))
     if kind == "euclidianDistance":
         gap = math.dist(here.pose[:3], there.pose[:3])
         axes = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
@@ -228,19 +231,6 @@ def _moved(
     x, y = position.pose.x + velocity[0] * duration, position.pose.y + velocity[1] * duration
     location = context.roads.locate_at(x, y, position.location) if context.roads is not None else None
     return ResolvedPosition(position.pose._replace(x=x, y=y), location)
-
-
-def _resolved(context: ConditionContext, target: str | ResolvedPosition) -> ResolvedPosition:
-    return ResolvedPosition(_pose(context, target), _location(context, target))
-
-
-def _euclidean(context: ConditionContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
-    if not freespace:
-        return math.dist(context.pose(a)[:3], _pose(context, b)[:3])
-    if isinstance(b, str):
-        return box_distance(entity_box(context, a), entity_box(context, b))
-    point: Box = (b.pose.x, b.pose.y, b.pose.z, 0.0, 0.0, 0.0, 0.0)
-    return box_distance(entity_box(context, a), point)
 
 
 def _offsets(
