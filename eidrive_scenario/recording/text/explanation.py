@@ -31,9 +31,9 @@ def describe_history(history: ConditionHistory) -> Iterator[str]:
     yield _truth(history)
     if not history.true.count:
         yield from _nearest(history)
-    elif history.monitor.edge != "none":
+    elif history.evaluator.edge != "none":
         yield _edge(history)
-    if history.monitor.delay > 0.0 and (history.counted.count or history.true.count):
+    if history.evaluator.delay > 0.0 and (history.counted.count or history.true.count):
         yield _delay(history)
 
 
@@ -68,7 +68,7 @@ def _nearest(history: ConditionHistory) -> Iterator[str]:
         yield f"{subject}closest value {_number(measure.value)}{unit}, at {nearest.time:.2f} s"
     for name in sorted(history.undefined - history.nearest.keys()):
         yield f"{f'{name}: ' if name else ''}undefined or infinite at all evaluations"
-    condition = history.monitor.condition
+    condition = history.evaluator.condition
     if isinstance(condition, EntityCondition):
         for name in condition.entities:
             if name not in history.nearest and name not in history.undefined and not history.words:
@@ -82,7 +82,7 @@ def _number(value: float) -> str:
 
 
 def _edge(history: ConditionHistory) -> str:
-    edge = history.monitor.edge
+    edge = history.evaluator.edge
     if history.edges.count:
         return f"{_CHANGES[edge]} {_moments(history.edges)}"
     effect = f"so edge {edge!r} never occurred"
@@ -92,10 +92,10 @@ def _edge(history: ConditionHistory) -> str:
 
 
 def _delay(history: ConditionHistory) -> str:
-    delay = history.monitor.delay
+    delay = history.evaluator.delay
     if history.counted.count:
         return f"fulfilled after its delay of {delay:g} s, {_moments(history.counted)}"
-    undelayed = history.true if history.monitor.edge == "none" else history.edges
+    undelayed = history.true if history.evaluator.edge == "none" else history.edges
     if not undelayed.count:
         return f"delay of {delay:g} s without effect"
     due = undelayed.first[0] + delay
@@ -262,9 +262,9 @@ def _group_lines(group: GroupHistory, title: str) -> Iterator[str]:
     elif len(group.conditions) > 1:
         yield f"{indent}{_verdict(group)}"
     for condition in group.conditions:
-        monitor = condition.monitor
-        where = monitor.condition.element
-        yield f"{indent}{monitor.describe()}  [{monitor.name!r}, {where.source}:{where.line}]"
+        evaluator = condition.evaluator
+        where = evaluator.condition.element
+        yield f"{indent}{evaluator.describe()}  [{evaluator.name!r}, {where.source}:{where.line}]"
         yield from (f"{indent}  {fact}" for fact in describe_history(condition))
 
 
@@ -278,7 +278,7 @@ def _verdict(group: GroupHistory) -> str:
         return f"each condition was fulfilled at some time, but never all {total} at once"
     if group.most <= 0:
         return f"none of the {total} conditions was ever fulfilled"
-    missing = " and ".join(condition.monitor.describe() for condition in group.missing)
+    missing = " and ".join(condition.evaluator.describe() for condition in group.missing)
     return f"{group.most} of {total} conditions at most, first at {group.most_at:.2f} s, without: {missing}"
 
 

@@ -178,16 +178,16 @@ def _remark(element: StoryElement) -> str:
 
 def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[BoxLine]:
     for number, group in enumerate(trigger.groups):
-        for index, monitor in enumerate(group.monitors):
+        for index, evaluator in enumerate(group.evaluators):
             first = lead if number == 0 else f"or {lead.removeprefix('stops ')}"
-            yield BoxLine(role, first if index == 0 else "and", monitor.describe())
+            yield BoxLine(role, first if index == 0 else "and", evaluator.describe())
 
 
 def _waits(trigger: Trigger, elements: ReferenceMatch[StoryElement]) -> Iterator[Path]:
     """Yield the paths of elements whose state a trigger evaluates, with the event instead of an action."""
     for group in trigger.groups:
-        for monitor in group.monitors:
-            condition = monitor.condition.element
+        for evaluator in group.evaluators:
+            condition = evaluator.condition.element
             if not isinstance(condition, StoryboardElementStateCondition):
                 continue
             for element in elements.by(condition.storyboard_element_ref):

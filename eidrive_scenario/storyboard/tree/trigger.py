@@ -127,13 +127,13 @@ class ConditionEvaluator:
 class ConditionGroup:
     """Conjunction of conditions at one instant."""
 
-    monitors: tuple[ConditionEvaluator, ...]
+    evaluators: tuple[ConditionEvaluator, ...]
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Whether all conditions are true. Each is evaluated, as edges and delays depend on earlier values."""
-        holds = bool(self.monitors)
-        for monitor in self.monitors:
-            holds = monitor.evaluate(context) and holds
+        holds = bool(self.evaluators)
+        for evaluator in self.evaluators:
+            holds = evaluator.evaluate(context) and holds
         return holds
 
 
@@ -150,7 +150,7 @@ class Trigger:
 
     def __init__(self, groups: Sequence[ConditionGroup]) -> None:
         self.groups = tuple(groups)
-        self._evaluators = tuple(evaluator for group in self.groups for evaluator in group.monitors)
+        self._evaluators = tuple(evaluator for group in self.groups for evaluator in group.evaluators)
         reads = [evaluator.condition.reads for evaluator in self._evaluators]
         are_built_in = all(is_built_in(type(evaluator.condition)) for evaluator in self._evaluators)
         self._can_rest = are_built_in and None not in reads
@@ -169,8 +169,8 @@ class Trigger:
         """Whether the trigger fires; `why` then describes the reason."""
         fired = [group for group in self.groups if group.evaluate(context)]
         if fired:
-            self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
-            names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
+            self.why = " and ".join(evaluator.why(context) for evaluator in fired[0].evaluators)
+            names = [name for group in fired for evaluator in group.evaluators for name in evaluator.triggering]
             self.triggering = tuple(dict.fromkeys(names))
         if self.observer is not None:
             self.observer.on_evaluated(context)
@@ -194,7 +194,9 @@ class Trigger:
 
     def describe(self) -> str:
         """Describe the trigger."""
-        return " or ".join(" and ".join(m.describe() for m in group.monitors) for group in self.groups)
+        return " or ".join(
+            " and ".join(evaluator.describe() for evaluator in group.evaluators) for group in self.groups
+        )
 
 
 class WaitForTrigger(py_trees.behaviour.Behaviour):
@@ -264,7 +266,7 @@ class ConditionHistory:
     nearest  closest misses, by entity
     """
 
-    monitor: ConditionEvaluator
+    evaluator: ConditionEvaluator
     asked: int = 0
     first_asked: float = math.nan
     last_asked: float = math.nan
@@ -281,21 +283,21 @@ class ConditionHistory:
 
     def record(self, context: RuntimeContext) -> None:
         """Record the last evaluation, unless it is recorded already."""
-        if self.monitor.evaluations == self._evaluations:
+        if self.evaluator.evaluations == self._evaluations:
             return
-        self._evaluations = self.monitor.evaluations
-        time, value = context.time, bool(self.monitor.value)
+        self._evaluations = self.evaluator.evaluations
+        time, value = context.time, bool(self.evaluator.value)
         if not self.asked:
             self.first_asked = time
         self.asked += 1
         self.last_asked = time
         self.true.record(value, time)
         changed = self._before is not None and self._before != value
-        is_edge = self.monitor.edge == "risingOrFalling" or (self.monitor.edge == "rising") == value
+        is_edge = self.evaluator.edge == "risingOrFalling" or (self.evaluator.edge == "rising") == value
         self.edges.record(changed and is_edge, time)
-        self.counted.record(self.monitor.result, time)
+        self.counted.record(self.evaluator.result, time)
         self._before = value
-        measures = self.monitor.condition.measures(context)
+        measures = self.evaluator.condition.measures(context)
         for measure in measures:
             gap, closest = gap_of(measure), self.nearest.get(measure.of)
             if not math.isfinite(gap):
@@ -303,7 +305,7 @@ class ConditionHistory:
             elif closest is None or gap < closest.gap:
                 self.nearest[measure.of] = ClosestMiss(measure, time, gap)
         if not measures:
-            self.words = self.monitor.condition.explain(context)
+            self.words = self.evaluator.condition.explain(context)
 
 
 def gap_of(measure: Measure) -> float:
@@ -337,7 +339,7 @@ class GroupHistory:
         """Record an evaluation of the group."""
         for condition in self.conditions:
             condition.record(context)
-        missing = tuple(condition for condition in self.conditions if not condition.monitor.result)
+        missing = tuple(condition for condition in self.conditions if not condition.evaluator.result)
         count = len(self.conditions) - len(missing)
         self.held.record(not missing, context.time)
         if count > self.most:
@@ -350,7 +352,8 @@ class TriggerHistory:
     def __init__(self, trigger: Trigger) -> None:
         self.trigger = trigger
         self.groups = tuple(
-            GroupHistory(tuple(ConditionHistory(evaluator) for evaluator in group.monitors)) for group in trigger.groups
+            GroupHistory(tuple(ConditionHistory(evaluator) for evaluator in group.evaluators))
+            for group in trigger.groups
         )
         trigger.observer = self
 

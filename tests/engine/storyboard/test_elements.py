@@ -102,7 +102,7 @@ def test_events_are_evaluated_after_the_act_starts(clock: Any, make: Any, task: 
     ticks = play(clock, root, 3)
     assert ticks[1] == []
     assert ticks[2][:5] == ["act start", "group start", "maneuver start", "event start", "event.0 start"]
-    assert event.start_leaf.trigger.groups[0].monitors[0].condition.asked == 1
+    assert event.start_leaf.trigger.groups[0].evaluators[0].condition.asked == 1
 
 
 @pytest.mark.element("Storyboard StopTrigger")
