@@ -122,19 +122,19 @@ def _read(cls: type[Element], version: Version) -> Rules:
         kind, extras, many = _kind(hints[field.name])
         is_child = isinstance(kind, type) and issubclass(kind, Element)
         name = usage.name or _xml_name(field.name, capital=is_child)
+        required = _required(field, usage, version)
+        deprecated = usage.deprecated if is_deprecated(usage, version) else ""
         if not is_known(usage, version):
             (other_children if is_child else other_attributes)[name] = usage
         elif is_child:
-            children[name] = _child(field, usage, kind, many, version)
+            minimum = usage.minimum if required else 0
+            single = not many or (bool(usage.single_until) and version <= parse_version(usage.single_until))
+            children[name] = ChildRule(field.name, kind, minimum, many, single, deprecated)
             spelling[field.name] = name
         else:
-            attributes[name] = AttributeRule(
-                field.name,
-                _scalar(kind, extras, version),
-                _required(field, usage, version),
-                _deprecated(usage, version),
-                next((extra.kind for extra in extras if isinstance(extra, NameOf)), ""),
-            )
+            points_to = next((extra.kind for extra in extras if isinstance(extra, NameOf)), "")
+            scalar = _scalar(kind, extras, version)
+            attributes[name] = AttributeRule(field.name, scalar, required, deprecated, points_to)
     content = cls.content_model
     if isinstance(content, Changed):
         content = content.before if version < parse_version(content.since) else content.after
@@ -173,12 +173,6 @@ def _scalar(kind: Any, extras: tuple[Any, ...], version: Version) -> Scalar:
     return scalars.whole_number(limits) if limits else _SCALARS[kind]
 
 
-def _child(field: Field[Any], usage: Usage, kind: type[Element], many: bool, version: Version) -> ChildRule:
-    minimum = usage.minimum if _required(field, usage, version) else 0
-    single = many and bool(usage.single_until) and version <= parse_version(usage.single_until)
-    return ChildRule(field.name, kind, minimum, many, single or not many, _deprecated(usage, version))
-
-
 def _required(field: Field[Any], usage: Usage, version: Version) -> bool:
     without_default = field.default is MISSING and field.default_factory is MISSING
     return (
@@ -187,10 +181,6 @@ def _required(field: Field[Any], usage: Usage, version: Version) -> bool:
         or (bool(usage.required_until) and version <= parse_version(usage.required_until))
         or (bool(usage.required_since) and version >= parse_version(usage.required_since))
     )
-
-
-def _deprecated(usage: Usage, version: Version) -> str:
-    return usage.deprecated if is_deprecated(usage, version) else ""
 
 
 def _xml_name(field_name: str, *, capital: bool) -> str:
@@ -231,14 +221,11 @@ def _required_choice(cls: type[Element], spelling: dict[str, str], version: Vers
 
 
 def _describe_group(group: Group) -> str:
-    def describe(part: Leaf | Group) -> str:
-        if isinstance(part, Group):
-            return f"({_describe_group(part)})"
-        return part.name + ("…" if part.maximum is None else "")
-
-    if not group.parts:
-        return "nothing"
-    return (" or " if group.exclusive else ", ").join(describe(part) for part in group.parts)
+    parts = [
+        f"({_describe_group(part)})" if isinstance(part, Group) else part.name + "…" * (part.maximum is None)
+        for part in group.parts
+    ]
+    return (" or " if group.exclusive else ", ").join(parts) or "nothing"
 
 
 _RULES: dict[tuple[type[Element], Version], Rules] = {}
