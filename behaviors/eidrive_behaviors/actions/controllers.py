@@ -92,12 +92,10 @@ class AssignControllerAction(ActionBehaviour):
         return Status.SUCCESS
 
     def _resolve_controller(self) -> model.Controller | None:
-        holder = self.action if self.action.object_controller is None else self.action.object_controller
-        if holder.controller is not None:
-            return holder.controller
-        if holder.catalog_reference is not None:
+        holder = self.action.object_controller or self.action
+        if holder.controller is None and holder.catalog_reference is not None:
             return self.context.catalog_entry(holder.catalog_reference, model.Controller, self.action)
-        return None
+        return holder.controller
 
     def describe(self) -> str:
         """Describe the controller."""

@@ -21,9 +21,8 @@ class EnvironmentAction(ActionBehaviour):
         return Status.SUCCESS
 
     def _environment(self) -> model.Environment:
-        if self.action.environment is not None:
-            return self.action.environment
-        return self.context.catalog_entry(self.action.catalog_reference, model.Environment, self.action)
+        action = self.action
+        return action.environment or self.context.catalog_entry(action.catalog_reference, model.Environment, action)
 
     def describe(self) -> str:
         """Describe the environment by its name."""

@@ -131,9 +131,8 @@ class SpeedAction(ActionBehaviour):
         speed = transition.advance(self.context.dt)
         slope = 0.0 if transition.done or self.context.dt == 0.0 else (speed - before) / self.context.dt
         self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=slope))
-        starts = (
-            self.actor.motion.teleported or not self.actor.present
-        )  # Init may command its speed before its position
+        # Init may command its speed before its position
+        starts = self.actor.motion.teleported or not self.actor.present
         if starts and transition.done:
             self.actor.motion.set_speed(speed)
             return Status.RUNNING if self._continuous else Status.SUCCESS
@@ -145,13 +144,12 @@ class SpeedAction(ActionBehaviour):
 
     def _approach(self, wanted: float) -> float:
         """Return the next speed toward a moving target, within the limits of the vehicle and a given rate [m/s]."""
-        present, most = self.actor.motion.speed, slope_limit(self.actor.motion.speed, wanted, *self.actor.limits()[1:])
+        present = self.actor.motion.speed
+        slope = slope_limit(present, wanted, *self.actor.limits()[1:])
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
-            most = min(most, abs(self._dynamics.value))
-        change = wanted - present
-        return (
-            present + math.copysign(most * self.context.dt, change) if abs(change) > most * self.context.dt else wanted
-        )
+            slope = min(slope, abs(self._dynamics.value))
+        change, most = wanted - present, slope * self.context.dt  # NaN for no limit in a step of 0 s
+        return present + math.copysign(most, change) if abs(change) > most else wanted
 
     def _target(self) -> float:
         top = self.actor.limits()[0]
@@ -171,10 +169,9 @@ class SpeedAction(ActionBehaviour):
             target = f"{self._absolute.value:g} m/s"
         else:
             assert self._relative is not None
-            sign = (
-                "times" if self._relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR else "m/s above"
-            )
-            target = f"{self._relative.value:g} {sign} the speed of {self._relative.entity_ref}"
+            is_factor = self._relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
+            unit = "times" if is_factor else "m/s above"
+            target = f"{self._relative.value:g} {unit} the speed of {self._relative.entity_ref}"
             target += ", kept up" if self._continuous else ""
         return f"speed to {target}, {describe_dynamics(self._dynamics, 'm/s²')}"
 

@@ -403,14 +403,9 @@ class FollowTrajectoryAction(ActionBehaviour):
         return resolve_position(position, self.context, self.actor.name).pose
 
     def _resolve_trajectory(self) -> model.Trajectory:
-        if self.action.trajectory is not None:
-            return self.action.trajectory
-        reference = self.action.catalog_reference
-        if self.action.trajectory_ref is not None:
-            if self.action.trajectory_ref.trajectory is not None:
-                return self.action.trajectory_ref.trajectory
-            reference = self.action.trajectory_ref.catalog_reference
-        return self.context.catalog_entry(reference, model.Trajectory, self.action)
+        action, holder = self.action, self.action.trajectory_ref or self.action
+        given = action.trajectory or holder.trajectory
+        return given or self.context.catalog_entry(holder.catalog_reference, model.Trajectory, action)
 
     def describe(self) -> str:
         """Describe trajectory and timing."""

@@ -96,11 +96,7 @@ class RelativeDistanceCondition(GapCondition):
     def what(self) -> str:
         """Describe the distance and the other entity."""
         gap = " free" if self.element.freespace else ""
-        kind = (
-            resolve_distance_type(self.element.relative_distance_type)
-            .removesuffix("Distance")
-            .replace("euclidian", "straight")
-        )
+        kind = "straight" if self.kind == "euclidianDistance" else self.kind
         return f"{kind}{gap} distance to {self.element.entity_ref}"
 
 

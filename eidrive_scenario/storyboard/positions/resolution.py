@@ -135,9 +135,8 @@ def trajectory_of(
 
 
 def _trajectory_element(frame: model.TrajectoryPosition, context: ConditionContext) -> model.Trajectory:
-    if frame.trajectory_ref.trajectory is not None:
-        return frame.trajectory_ref.trajectory
-    return context.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory, frame)
+    holder = frame.trajectory_ref
+    return holder.trajectory or context.catalog_entry(holder.catalog_reference, model.Trajectory, frame)
 
 
 def _is_static(frame: model.Element, context: ConditionContext) -> bool:
