@@ -39,7 +39,7 @@ def milliseconds(name: str, device: str, batch: int, repeats: int) -> float:
         for _ in range(WARM_UP + repeats):
             started = time.perf_counter()
             pixels = torch.from_numpy(images).to(device).permute(0, 3, 1, 2)
-            outputs = network.raw_outputs(pixels.to(torch.float32).div_(255.0))
+            outputs = network(pixels.to(torch.float32).div_(255.0))
             for output in outputs:
                 output.cpu()
             times.append(time.perf_counter() - started)

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import affine_grid, avg_pool2d, grid_sample
 
-from eidrive_scenario.perception.learned.networks.boxes import IGNORED, PADDING, Targets, centered
+from training.boxes import IGNORED, PADDING, Targets, centered
 
 SMALLEST_SIDE = 3.0
 """Minimum side of a box after augmentation [px]; objects with smaller boxes are ignored."""

@@ -12,7 +12,7 @@ import datetime
 import json
 import math
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +23,17 @@ from torch import nn
 
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, best_confidence, match
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, suppression_groups
-from eidrive_scenario.perception.learned.networks.boxes import IGNORED, PADDING, Targets, centered
-from eidrive_scenario.perception.learned.networks.ssd import Ssd, SsdLoss, default_boxes
+from eidrive_scenario.perception.learned.networks.ssd import Ssd
 from eidrive_scenario.perception.learned.networks.suppression import suppress
-from eidrive_scenario.perception.learned.networks.yolov5 import YoloLoss, YoloV5
+from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES, Anchors
 from eidrive_scenario.perception.learned.own_network import ssd_candidates, ssd_scales, yolo_candidates, yolo_scales
-from eidrive_scenario.perception.learned.torch_network import save, untrained
-from eidrive_scenario.perception.learned.weights import Description
+from eidrive_scenario.perception.learned.torch_network import untrained
+from eidrive_scenario.perception.learned.weights import DESCRIPTION, Description
 from training.augment import change_colors, transform_images
+from training.boxes import IGNORED, PADDING, Targets, centered
 from training.dataset import Dataset
+from training.losses import SsdLoss, YoloLoss, default_boxes, state_rare_objects
 
 INPUT_SIZE = (512, 384)
 MOST_OBJECTS = 48
@@ -131,7 +132,7 @@ def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dic
     for start in range(0, len(samples), 64):
         pixels = samples.images[start : start + 64].float().div(255.0)
         with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
-            outputs = network.raw_outputs(pixels.contiguous(memory_format=torch.channels_last))
+            outputs = network(pixels.contiguous(memory_format=torch.channels_last))
         arrays = [output.float().cpu().numpy() for output in outputs]
         for index in range(len(pixels)):
             single = [array[index : index + 1] for array in arrays]
@@ -175,7 +176,10 @@ def train(options: argparse.Namespace) -> None:
     print(f"{len(samples)} + {len(checks)} images on {device} after {time.perf_counter() - started:.0f} s", flush=True)
     anchors = fit_anchors(dataset, options.seed) if options.network == "yolov5" else None
     description = Description(options.network, IMAGE_CLASSES, INPUT_SIZE, anchors)
-    network = untrained(description).to(device)
+    network = untrained(description)
+    if isinstance(network, YoloV5):
+        state_rare_objects(network)
+    network.to(device)
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     defaults = default_boxes(INPUT_SIZE[1], INPUT_SIZE[0]).to(device)
     loss_of: Any = YoloLoss(network) if isinstance(network, YoloV5) else SsdLoss(defaults)
@@ -236,6 +240,17 @@ def train(options: argparse.Namespace) -> None:
         if is_over:
             break
     print(json.dumps(results, indent=1))
+
+
+def save(path: Path, network: nn.Module, description: Description, card: dict[str, Any]) -> None:
+    """Write weights and metadata. Convolutions are stored in half precision, other tensors in single precision."""
+    arrays: dict[str, Any] = {}
+    for name, value in network.state_dict().items():
+        array = value.detach().cpu().numpy()
+        arrays[name] = array.astype(np.float16) if array.ndim == 4 else array
+    arrays[DESCRIPTION] = np.array(json.dumps(asdict(description)))
+    np.savez_compressed(path, **arrays)
+    path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
 
 
 def metadata_of(

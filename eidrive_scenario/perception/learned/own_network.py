@@ -39,7 +39,7 @@ def ssd_scales(outputs: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
 def yolo_candidates(anchors: Floats, scales: Iterable[Floats], confidence: float) -> Candidates:
     """Return the boxes of at least the minimum confidence; score = objectness · class.
 
-    Decodes like `YoloV5.decode`, but only the cells whose objectness alone reaches the confidence.
+    Only cells are decoded whose objectness alone reaches the confidence.
 
     anchors  width and height (S, A, 2) [px];  scales  raw outputs (A, H, W, 5 + C) of each scale
     """

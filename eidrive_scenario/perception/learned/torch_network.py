@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import nn
 
 from eidrive_scenario.base.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.perception.learned.networks.blocks import fold
 from eidrive_scenario.perception.learned.networks.ssd import Ssd
 from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5
-from eidrive_scenario.perception.learned.weights import DESCRIPTION, Description, Weights, read, suitable
+from eidrive_scenario.perception.learned.weights import Description, Weights
 
 
 def prepare(threads: int, device: str) -> None:
@@ -36,24 +31,6 @@ def prepare(threads: int, device: str) -> None:
     torch.backends.cudnn.deterministic = True
     torch.backends.cudnn.allow_tf32 = False
     torch.backends.cuda.matmul.allow_tf32 = False
-
-
-def save(path: Path, network: nn.Module, description: Description, card: dict[str, Any]) -> None:
-    """Write weights and metadata. Convolutions are stored in half precision, other tensors in single precision."""
-    arrays: dict[str, Any] = {}
-    for name, value in network.state_dict().items():
-        array = value.detach().cpu().numpy()
-        arrays[name] = array.astype(np.float16) if array.ndim == 4 else array
-    arrays[DESCRIPTION] = np.array(json.dumps(asdict(description)))
-    np.savez_compressed(path, **arrays)
-    path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
-
-
-def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
-    """Return the network with its weights, trainable. Raise SettingError if the file does not contain weights."""
-    weights = read(path)
-    with suitable(path):
-        return weights.description, trainable(weights)
 
 
 def untrained(description: Description) -> YoloV5 | Ssd:
@@ -108,7 +85,7 @@ class TorchNetwork:
             batch[: len(part)] = part
             with torch.inference_mode():
                 pixels = torch.from_numpy(batch).to(self._device).permute(0, 3, 1, 2)
-                raw = self._network.raw_outputs(pixels.to(torch.float32).div_(255.0))
+                raw = self._network(pixels.to(torch.float32).div_(255.0))
                 together = [output.cpu().numpy() for output in raw]
             outputs += [[output[row : row + 1] for output in together] for row in range(len(part))]
         return outputs

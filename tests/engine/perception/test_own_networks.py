@@ -69,14 +69,14 @@ def test_onnx_model_passes_the_checker_of_onnx(name: str, precision: Precision) 
 def test_runtime_outputs_equal_trained_network_of_torch(name: str, runtime: Runtime) -> None:
     """The reference has separate batch normalizations, as in training."""
     torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
-    from eidrive_scenario.perception.learned.torch_network import load
+    from eidrive_scenario.perception.learned.torch_network import trainable
 
     need(runtime)
     path = SHIPPED / f"{name}.npz"
-    _, trained = load(path)
+    trained = trainable(read(path))
     with torch.inference_mode():
         pixels = torch.from_numpy(noise().transpose(2, 0, 1)[None] / np.float32(255.0))
-        expected = [output.numpy() for output in trained.eval().raw_outputs(pixels)]
+        expected = [output.numpy() for output in trained.eval()(pixels)]
     outputs = OwnNetwork(path, runtime)._infer([noise()])[0]
     for found, wanted in zip(outputs, expected, strict=True):
         np.testing.assert_allclose(found, wanted, atol=1e-3)

@@ -1,1 +1,1 @@
-"""Network architectures, their losses and box operations."""
+"""Network architectures, their sizes, and suppression of overlapping boxes."""

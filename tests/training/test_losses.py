@@ -1,4 +1,4 @@
-"""Networks: shapes, encoding, assignment, folding, and training."""
+"""Networks and their losses: shapes, encoding, assignment, folding, and training."""
 
 from __future__ import annotations
 
@@ -16,7 +16,21 @@ from eidrive_scenario.perception.learned.image_network import (  # noqa: E402
     Candidates,
 )
 from eidrive_scenario.perception.learned.networks.blocks import fold  # noqa: E402
-from eidrive_scenario.perception.learned.networks.boxes import (  # noqa: E402
+from eidrive_scenario.perception.learned.networks.ssd import Ssd  # noqa: E402
+from eidrive_scenario.perception.learned.networks.ssd_sizes import (  # noqa: E402
+    BOXES_PER_CELL,
+    MAX_LOG_SIZE,
+    STRIDES,
+    VARIANCES,
+)
+from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5  # noqa: E402
+from eidrive_scenario.perception.learned.own_network import (  # noqa: E402
+    ssd_candidates,
+    ssd_scales,
+    yolo_candidates,
+    yolo_scales,
+)
+from training.boxes import (  # noqa: E402
     IGNORED,
     PADDING,
     Targets,
@@ -25,28 +39,20 @@ from eidrive_scenario.perception.learned.networks.boxes import (  # noqa: E402
     corners,
     pairwise_iou,
 )
-from eidrive_scenario.perception.learned.networks.ssd import (  # noqa: E402
+from training.losses import (  # noqa: E402
     BACKGROUND,
     UNLABELED,
-    Ssd,
     SsdLoss,
-    decode,
+    YoloLoss,
+    assign,
+    cell_corners,
     default_boxes,
     encode,
     hardest,
     match,
-)
-from eidrive_scenario.perception.learned.networks.ssd_sizes import BOXES_PER_CELL, STRIDES  # noqa: E402
-from eidrive_scenario.perception.learned.networks.yolov5 import (  # noqa: E402
-    YoloLoss,
-    YoloV5,
-    assign,
-)
-from eidrive_scenario.perception.learned.own_network import (  # noqa: E402
-    ssd_candidates,
-    ssd_scales,
-    yolo_candidates,
-    yolo_scales,
+    ssd_rows,
+    state_rare_objects,
+    yolo_cells,
 )
 
 ANCHORS = (
@@ -66,12 +72,32 @@ def one_thread() -> Iterator[None]:
 
 def yolo() -> YoloV5:
     torch.manual_seed(0)
-    return YoloV5(len(IMAGE_CLASSES), ANCHORS)
+    network = YoloV5(len(IMAGE_CLASSES), ANCHORS)
+    state_rare_objects(network)
+    return network
 
 
 def ssd() -> Ssd:
     torch.manual_seed(0)
     return Ssd(len(IMAGE_CLASSES))
+
+
+def ssd_decode(encoded: Any, defaults: Any) -> Any:
+    """Return boxes (…, N, 4) in center form: the inverse of `encode`."""
+    center = encoded[..., :2] * VARIANCES[0] * defaults[..., 2:] + defaults[..., :2]
+    size = torch.exp((encoded[..., 2:] * VARIANCES[1]).clamp(max=MAX_LOG_SIZE)) * defaults[..., 2:]
+    return torch.cat([center, size], dim=-1)
+
+
+def yolo_decode(network: YoloV5, scales: list[Any]) -> Any:
+    """Return (B, N, 5 + C) of outputs (B, A, H, W, 5 + C): cx cy w h [px], objectness, probability of each class."""
+    predictions = []
+    for scale, (raw, stride) in enumerate(zip(scales, (8, 16, 32), strict=True)):
+        share = raw.sigmoid()
+        center = (2.0 * share[..., :2] - 0.5 + cell_corners(raw.shape[2], raw.shape[3], raw.device)) * stride
+        size = (2.0 * share[..., 2:4]).square() * network.anchors[scale][None, :, None, None, :]
+        predictions.append(torch.cat([center, size, share[..., 4:]], dim=-1).flatten(1, 3))
+    return torch.cat(predictions, dim=1)
 
 
 def two_objects(boxes: list[list[float]], classes: list[int]) -> Targets:
@@ -80,14 +106,13 @@ def two_objects(boxes: list[list[float]], classes: list[int]) -> Targets:
 
 def test_networks_have_documented_output_shapes_and_sizes() -> None:
     images = torch.zeros(2, 3, 128, 256)
-    outputs = yolo()(images)
+    outputs = yolo_cells(yolo()(images))
     assert [tuple(output.shape) for output in outputs] == [
         (2, 3, 16, 32, 16),
         (2, 3, 8, 16, 16),
         (2, 3, 4, 8, 16),
     ]
-    assert yolo().decode(outputs).shape == (2, 3 * (16 * 32 + 8 * 16 + 4 * 8), 16)
-    encoded, logits = ssd()(images)
+    encoded, logits = ssd_rows(ssd()(images))
     count = BOXES_PER_CELL * sum((128 // stride) * (256 // stride) for stride in STRIDES)
     assert encoded.shape == (2, count, 4)
     assert logits.shape == (2, count, 12)
@@ -113,7 +138,7 @@ def test_iou_and_ciou_equal_hand_calculation() -> None:
 def test_decode_inverts_encode() -> None:
     defaults = default_boxes(128, 256)
     boxes = defaults * torch.tensor([1.0, 1.0, 1.3, 0.7]) + torch.tensor([3.0, -2.0, 0.0, 0.0])
-    torch.testing.assert_close(decode(encode(boxes, defaults), defaults), boxes)
+    torch.testing.assert_close(ssd_decode(encode(boxes, defaults), defaults), boxes)
     by_hand = encode(torch.tensor([[14.0, 10.0, 40.0, 20.0]]), torch.tensor([[10.0, 10.0, 20.0, 20.0]]))
     torch.testing.assert_close(by_hand, torch.tensor([[2.0, 0.0, math.log(2.0) / 0.2, 0.0]]))
 
@@ -139,7 +164,7 @@ def test_yolo_assigned_cells_can_represent_box() -> None:
             np.testing.assert_allclose(candidates.boxes, corners(target.boxes[0]).numpy(), atol=1e-3)
             assert candidates.scores.item() == pytest.approx(1.0, abs=1e-6)
             assert candidates.classes.item() == 2
-            decoded = network.decode(raw)[0]
+            decoded = yolo_decode(network, raw)[0]
             torch.testing.assert_close(decoded[decoded[:, 4] > 0.5][0, :4], target.boxes[0, 0], atol=1e-3, rtol=0.0)
     # Center 7.625, 5.625 in cells of 8: its cell and those to the right and below, for all anchors of similar size
     fine = assign(target, network.anchors[0], 8, 16, 32)
@@ -175,7 +200,7 @@ def test_ssd_hardest_selects_three_negatives_per_positive() -> None:
 
 def test_yolo_loss_excludes_cells_of_ignored_objects() -> None:
     network = yolo()
-    outputs = [torch.zeros(1, 3, 128 // s, 256 // s, 16) for s in (8, 16, 32)]
+    outputs = [torch.zeros(1, 48, 128 // s, 256 // s) for s in (8, 16, 32)]
     none_ignored = YoloLoss(network)(outputs, two_objects([[0.0, 0.0, 0.0, 0.0]], [PADDING]))[1]["object"]
     all_ignored = YoloLoss(network)(outputs, two_objects([[128.0, 64.0, 256.0, 128.0]], [IGNORED]))[1]["object"]
     half_ignored = YoloLoss(network)(outputs, two_objects([[64.0, 64.0, 128.0, 128.0]], [IGNORED]))[1]["object"]
@@ -219,7 +244,7 @@ def test_network_overfits_single_image_and_fold_preserves_outputs(name: str) -> 
         after = network(image)
         for first, second in zip(before, after, strict=True):
             torch.testing.assert_close(first, second, atol=2e-3, rtol=1e-3)
-        arrays = [output[:1].numpy() for output in network.raw_outputs(image)]
+        arrays = [output[:1].numpy() for output in network(image)]
     found = (
         yolo_candidates(network.anchors.numpy(), yolo_scales(arrays), 0.05)
         if isinstance(network, YoloV5)
@@ -238,15 +263,14 @@ def test_candidates_equal_boxes_that_networks_decode() -> None:
     detector = yolo().eval()
     outputs = [3.0 * torch.randn(1, 48, 128 // s, 256 // s, generator=draws) for s in (8, 16, 32)]
     shaped = [raw.view(1, 3, 16, *raw.shape[2:]).permute(0, 1, 3, 4, 2) for raw in outputs]
-    decoded = detector.decode(shaped)[0]
+    decoded = yolo_decode(detector, shaped)[0]
     scores, numbers = (decoded[:, 4:5] * decoded[:, 5:]).max(dim=1)
     found = yolo_candidates(detector.anchors.numpy(), yolo_scales([raw.numpy() for raw in outputs]), 0.3)
     assert_candidates_equal(found, corners(decoded[:, :4]), scores, numbers)
 
     outputs = [3.0 * torch.randn(1, 6 * each, 128 // s, 256 // s, generator=draws) for each in (4, 12) for s in STRIDES]
-    network = ssd().eval()
-    network.raw_outputs = lambda images: outputs  # type: ignore[method-assign]
-    boxes, probabilities = network.decode(network(torch.zeros(1)), default_boxes(128, 256))
+    encoded, logits = ssd_rows(outputs)
+    boxes, probabilities = corners(ssd_decode(encoded, default_boxes(128, 256))), logits.softmax(dim=-1)[..., 1:]
     scores, numbers = probabilities[0].max(dim=1)
     found = ssd_candidates(ssd_scales([raw.numpy() for raw in outputs]), 0.3)
     assert_candidates_equal(found, boxes[0], scores, numbers)
