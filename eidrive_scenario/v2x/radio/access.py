@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,8 @@ class MediumAccess(ABC):
         """Index of the current period of congestion control; None before the first message."""
         self.fading: FadingDraws | None = None
         """Fading of each message at each station; None: power of the link budget."""
+        self.power = np.zeros((0, 0))
+        """Received power (N, N) of the last `advance` [dBm]."""
         self.active: list[Transmission] = []
         """Transmissions that may overlap with unfinished ones."""
 
@@ -103,16 +105,44 @@ class MediumAccess(ABC):
         """Transmissions that have not started."""
         return [*self._arrivals, *(transmission for queue in self._waiting for transmission in queue)]
 
-    @abstractmethod
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
         """Simulate the medium up to `until` [s]; return started and dropped transmissions.
 
         power  (N, N) received power by sender (row) and receiver (column) [dBm]
         """
+        started: list[Transmission] = []
+        dropped: list[Transmission] = []
+        self.power = power
+        while self.names:
+            row, event = self.next_event()
+            if self._arrivals and self._arrivals[0].ready <= min(event, until - TIME_TOLERANCE):
+                dropped += self._arrive(self._arrivals.popleft())
+                continue
+            if not event < until - TIME_TOLERANCE:
+                break
+            self._measure(event)
+            transmission = self.process(row, event)
+            if transmission is not None:
+                started.append(transmission)
+        self.rest(until)
+        self.receive(started, until)
+        return started, dropped
 
     @abstractmethod
-    def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
-        """Reset the predicted start after a new first message of a queue; None: the queue is empty."""
+    def next_event(self) -> tuple[int, float]:
+        """Return the row and the time [s] of the next event of a station; infinity without one."""
+
+    @abstractmethod
+    def process(self, row: int, time: float) -> Transmission | None:
+        """Process the event of a station; return the transmission that it starts."""
+
+    @abstractmethod
+    def receive(self, started: Sequence[Transmission], until: float) -> None:
+        """Determine which started transmissions the stations detect up to `until` [s]."""
+
+    @abstractmethod
+    def reset_event(self, row: int) -> None:
+        """Reset the event of a station, whose queue has a new first message or is empty."""
 
     def share(self, transmission: Transmission) -> float:
         """Return the share of the channel that a transmission occupies."""
@@ -161,7 +191,7 @@ class MediumAccess(ABC):
             if transmission.gain is not None:
                 transmission.gain = reorder_rows(transmission.gain, rows, 0.0)
             if transmission.busy is not None:
-                transmission.busy = reorder_rows(transmission.busy, rows, False) > 0.0
+                transmission.busy = reorder_rows(transmission.busy, rows, False)
         self.gate = self.gate.reorder(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
@@ -198,14 +228,10 @@ class MediumAccess(ABC):
         """Let the first message in the queue of a station contend as soon as the DCC gate opens."""
         queue = self._waiting[row]
         self.contending += bool(queue) - (self._head[row] is not None)
-        if not queue:
-            self._head[row], self.ready[row] = None, math.inf
-            self.predicted_starts(row, None)
-            return
-        first = queue[0]
+        self._head[row] = first = queue[0] if queue else None
         opens = self._last_start[row] + self.interval(row)
-        self._head[row], self.ready[row] = first, max(first.ready, opens)
-        self.predicted_starts(row, first)
+        self.ready[row] = math.inf if first is None else max(first.ready, opens)
+        self.reset_event(row)
 
     def _begin(self, row: int, transmission: Transmission, start: float) -> None:
         """Start the transmission of the first message in the queue of a station."""
@@ -232,9 +258,15 @@ class MediumAccess(ABC):
         return self._period_busy / period
 
 
-def reorder_rows(values: NDArray[Any], rows: Sequence[int | None], fresh: float) -> Array:
-    """Return an array for reordered stations: the value of the former row, or `fresh` for new stations."""
-    return np.array([fresh if old is None else values[old] for old in rows], dtype=float)
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def reorder_rows(values: NDArray[Scalar], rows: Sequence[int | None], fresh: float) -> NDArray[Scalar]:
+    """Return an array whose last axis are reordered stations: the value of the former row, `fresh` for new ones."""
+    reordered = np.full((*values.shape[:-1], len(rows)), fresh, dtype=values.dtype)
+    kept = [new for new, old in enumerate(rows) if old is not None]
+    reordered[..., kept] = values[..., [old for old in rows if old is not None]]
+    return reordered
 
 
 def _is_outdated(transmission: Transmission, *, by: Transmission) -> bool:

@@ -126,13 +126,8 @@ class DccGate:
     def reorder(self, rows: list[int | None]) -> DccGate:
         """Return the gate for reordered stations, each with the state of its former row or a new state."""
         gate = DccGate(self.control, len(rows), self.background)
-        for row, old in enumerate(rows):
-            if old is not None:
-                for values, former in (
-                    (gate.share, self.share),
-                    (gate.filtered, self.filtered),
-                    (gate.before, self.before),
-                    (gate.reactive, self.reactive),
-                ):
-                    values[row] = former[old]
+        kept = [new for new, old in enumerate(rows) if old is not None]
+        former = [old for old in rows if old is not None]
+        for field in ("share", "filtered", "before", "reactive"):
+            getattr(gate, field)[kept] = getattr(self, field)[former]
         return gate

@@ -98,34 +98,24 @@ class Sidelink(MediumAccess):
         self._unmeasured_time, self._period_unmeasured = np.zeros(len(names)), np.zeros(len(names))
         """Time in which each station could not measure because it transmitted [s]."""
         self._keys = self._sci_keys()
-        self._power = np.zeros((len(names), len(names)))
 
-    def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
-        started: list[Transmission] = []
-        dropped: list[Transmission] = []
-        if not self.names:
-            return started, dropped
-        self._power = power
-        while True:
-            row = int(np.argmin(self._next_event))
-            event = float(self._next_event[row])
-            if self._arrivals and self._arrivals[0].ready <= min(event, until - TIME_TOLERANCE):
-                dropped += self._arrive(self._arrivals.popleft())
-                continue
-            if not event < until - TIME_TOLERANCE:
-                break
-            self._measure(event)
-            if not self._scheduled[row]:
-                self._next_event[row] = self._occasion(row) * SUBFRAME
-                self._scheduled[row] = True
-                continue
-            started.append(self._start(row))
-        if math.isfinite(until):
-            self._measure(until)
+    def next_event(self) -> tuple[int, float]:
+        row = int(np.argmin(self._next_event))
+        return row, float(self._next_event[row])
+
+    def process(self, row: int, time: float) -> Transmission | None:
+        """Select the resource of the first message of a station, or transmit the message on it."""
+        if self._scheduled[row]:
+            return self._start(row)
+        self._next_event[row] = self._occasion(row) * SUBFRAME
+        self._scheduled[row] = True
+        return None
+
+    def receive(self, started: Sequence[Transmission], until: float) -> None:
+        """Evaluate sensing up to `until` [s]."""
         self._sense(until)
-        return started, dropped
 
-    def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
+    def reset_event(self, row: int) -> None:
         self._next_event[row] = self.ready[row]
         self._scheduled[row] = False
 
@@ -141,7 +131,7 @@ class Sidelink(MediumAccess):
         former = {old: row for row, old in enumerate(rows) if old is not None}
         self._grants = [None if old is None else self._grants[old] for old in rows]
         self._sent = [deque() if old is None else self._sent[old] for old in rows]
-        self._scheduled = reorder_rows(self._scheduled, rows, 0.0).astype(np.bool_)
+        self._scheduled = reorder_rows(self._scheduled, rows, False)
         for field, fresh in (("_next_event", math.inf), ("_unmeasured_time", 0.0), ("_period_unmeasured", 0.0)):
             setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
         self._sending = [sending for sending in self._sending if sending.row in former]
@@ -149,7 +139,7 @@ class Sidelink(MediumAccess):
             sending.row = former[sending.row]
         for transmission in self.active:
             if transmission.control is not None:
-                transmission.control = reorder_rows(transmission.control, rows, PROPAGATION).astype(np.int8)
+                transmission.control = reorder_rows(transmission.control, rows, PROPAGATION)
         self._history.rearrange(rows)
         self._keys = self._sci_keys()
 
@@ -237,9 +227,9 @@ class Sidelink(MediumAccess):
             first = min(sending.subframe for sending in self._sending)
             if first >= ended:
                 return
-            self._receive(int(min(ended, first + WINDOW)))
+            self._sense_window(int(min(ended, first + WINDOW)))
 
-    def _receive(self, ended: int) -> None:
+    def _sense_window(self, ended: int) -> None:
         """Evaluate sensing of transmissions before subframe `ended`, at most one sensing window."""
         due = [
             Pdu(subframe, sending.row, sending.transmission)
@@ -253,7 +243,7 @@ class Sidelink(MediumAccess):
         rows = np.array([pdu.row for pdu in due])
         widths = np.array([pdu.transmission.bands for pdu in due])
         blocks = np.array([self._settings.pssch_blocks(width) for width in widths.tolist()])[:, None]
-        power = self._power[rows]
+        power = self.power[rows]
         for index, pdu in enumerate(due):
             if pdu.transmission.gain is not None:
                 power[index] += pdu.transmission.gain

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
-from eidrive_scenario.v2x.radio.access import Transmission
+from eidrive_scenario.v2x.radio.access import Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
 from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATION, Codes
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Sensed
@@ -76,8 +75,6 @@ def _decibels(ratio: Array) -> Array:
     return level
 
 
-Scalar = TypeVar("Scalar", bound=np.generic)
-
 NOT_DECODED = -np.inf
 CAPACITY = 256
 """Initial capacity for reservations."""
@@ -122,7 +119,7 @@ class Reservations:
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
-        self.rsrp = _columns(self.rsrp, rows, NOT_DECODED)
+        self.rsrp = reorder_rows(self.rsrp, rows, NOT_DECODED)
         self.stations = len(rows)
 
     def _grow(self, count: int, now: int) -> None:
@@ -208,14 +205,6 @@ class SensingHistory:
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
-        self.rssi = _columns(self.rssi, rows, 0.0)
-        self.monitored = _columns(self.monitored, rows, False)
+        self.rssi = reorder_rows(self.rssi, rows, 0.0)
+        self.monitored = reorder_rows(self.monitored, rows, False)
         self.reservations.rearrange(rows)
-
-
-def _columns(values: NDArray[Scalar], rows: Sequence[int | None], fresh: float) -> NDArray[Scalar]:
-    """Return an array for reordered stations, which are its last axis."""
-    columns = np.full((*values.shape[:-1], len(rows)), fresh, dtype=values.dtype)
-    kept = [(new, old) for new, old in enumerate(rows) if old is not None]
-    columns[..., [new for new, _ in kept]] = values[..., [old for _, old in kept]]
-    return columns
