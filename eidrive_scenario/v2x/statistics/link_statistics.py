@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from numbers import Real
 from typing import Any
 
@@ -82,23 +84,14 @@ class LinkCounters:
         self.outcomes_by_distance[distance_class] = self.outcomes_by_distance.get(distance_class, 0) + outcomes
         self.deliveries_by_distance[distance_class] = self.deliveries_by_distance.get(distance_class, 0) + deliveries
 
-    def statistics(
-        self, now: float, receptions: ReceptionStatistics | None, channel_busy_ratio: float | None = None
-    ) -> LinkStatistics:
-        """Return the statistics at `now` [s]; `receptions` is None before the first reception."""
-        received = 0 if receptions is None else receptions.received
+    def statistics(self, receptions: ReceptionStatistics, channel_busy_ratio: float | None) -> LinkStatistics:
+        """Return the statistics of the link with these receptions."""
         return LinkStatistics(
+            **receptions._asdict(),
             sent=self.sent,
-            received=received,
             lost=self.lost,
-            in_flight=self.sent - received - self.lost,
+            in_flight=self.sent - receptions.received - self.lost,
             bytes_sent=self.bytes_sent,
-            mean_delay=None if receptions is None else receptions.delay_sum / received,
-            max_delay=None if receptions is None else receptions.delay_max,
-            age=None if receptions is None else now - receptions.newest_generation_time,
-            mean_age=None if receptions is None else receptions.mean_age,
-            peak_age=None if receptions is None else receptions.peak_age,
-            p95_age=None if receptions is None else receptions.p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
             reception=tuple(
                 (DISTANCE_BIN * distance_class, outcomes, self.deliveries_by_distance[distance_class])
@@ -139,8 +132,10 @@ class Links:
     """
 
     def __init__(self) -> None:
-        self._queues: dict[str, list[Entry]] = {}
-        self._counters: dict[str, dict[str, LinkCounters]] = {}
+        self._queues: defaultdict[str, list[Entry]] = defaultdict(list)
+        self._counters: defaultdict[str, defaultdict[str, LinkCounters]] = defaultdict(
+            partial(defaultdict, LinkCounters)
+        )
         """By receiver and sender."""
         self._reception_log = ReceptionLog()
         self._now = -math.inf
@@ -148,13 +143,7 @@ class Links:
 
     def counters(self, sender: str, receiver: str) -> LinkCounters:
         """Return the counters of a link; create them if the link is new."""
-        by_sender = self._counters.get(receiver)
-        if by_sender is None:
-            by_sender = self._counters[receiver] = {}
-        counters = by_sender.get(sender)
-        if counters is None:
-            counters = by_sender[sender] = LinkCounters()
-        return counters
+        return self._counters[receiver][sender]
 
     def enqueue_delivery(
         self, message: Message, receiver: str, now: float, delay: float, distance: float | None = None
@@ -188,12 +177,8 @@ class Links:
 
     def enqueue(self, entry: Entry, *receivers: str) -> None:
         """Add a message in flight that is already counted as sent."""
-        queues = self._queues
         for receiver in receivers:
-            if receiver in queues:
-                queues[receiver].append(entry)
-            else:
-                queues[receiver] = [entry]
+            self._queues[receiver].append(entry)
 
     def _count_sent(self, message: Message, receiver: str) -> LinkCounters:
         counters = self.counters(message.sender, receiver)
@@ -241,7 +226,7 @@ class Links:
         busy = {receiver: channel_busy_ratio(receiver) for receiver in self._counters}
         return {
             (sender, receiver): self._counters[receiver][sender].statistics(
-                now, receptions.get((sender, receiver)), busy[receiver]
+                receptions.get((sender, receiver), ReceptionStatistics()), busy[receiver]
             )
             for sender, receiver in links
         }

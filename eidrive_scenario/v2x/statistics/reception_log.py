@@ -22,17 +22,6 @@ LEAST = 1e-6
 """Maximum age that is compacted to 0 [s]."""
 
 
-class AgeStatistics(NamedTuple):
-    """Age of information of L links [s]: mean and 95th percentile over time, and mean peak age; NaN if undefined.
-
-    The peak age is the age immediately before an update. The first update of a link has none.
-    """
-
-    mean: Array
-    p95: Array
-    peak: Array
-
-
 class AgeOfInformation:
     """Accumulated age of information. The age rises with slope 1 from a floor, the age at an update, to a peak.
 
@@ -93,8 +82,13 @@ class AgeOfInformation:
         if self._number > self._limit:
             self._compact()
 
-    def statistics(self, now: float, newest: Array, order: Integers) -> AgeStatistics:
-        """Return the statistics at `now` of the links in `order`; `newest` (L,) are the newest generation times [s]."""
+    def statistics(self, now: float, newest: Array, order: Integers) -> tuple[Array, Array, Array]:
+        """Return mean and 95th percentile over time, and the mean peak age (L,) at `now` of the links in `order` [s].
+
+        NaN if undefined. The peak age is that immediately before an update; the first update of a link has none.
+
+        newest  (L,) newest generation times [s]
+        """
         running = ~np.isnan(self._floor)
         low = np.where(running, self._floor, 0.0)
         high = np.where(running, np.maximum(now - newest, low), 0.0)
@@ -102,7 +96,7 @@ class AgeOfInformation:
         defined = time > 0.0
         mean = np.divide(area, time, out=np.full(len(low), np.nan), where=defined)
         peak = np.divide(self._peaks, self._updates, out=np.full(len(low), np.nan), where=self._updates > 0)
-        return AgeStatistics(mean[order], self._percentile(0.95, low, high, defined, order), peak[order])
+        return mean[order], self._percentile(0.95, low, high, defined, order), peak[order]
 
     def _percentile(self, share: float, low: Array, high: Array, defined: NDArray[np.bool_], order: Integers) -> Array:
         """Return the age below which each link spent this share of the time (L,) [s]."""
@@ -169,18 +163,15 @@ def queue_entry(message: Message, sent: float, arrives: float) -> Entry:
 
 
 class ReceptionStatistics(NamedTuple):
-    """Receptions on one link: number, delays [s], and generation time of the newest message [s].
+    """Receptions on one link, with the fields of LinkStatistics; by default before the first one."""
 
-    mean_age, p95_age, peak_age  see LinkStatistics; None while undefined
-    """
-
-    received: int
-    delay_sum: float
-    delay_max: float
-    newest_generation_time: float
-    mean_age: float | None
-    p95_age: float | None
-    peak_age: float | None
+    received: int = 0
+    mean_delay: float | None = None
+    max_delay: float | None = None
+    age: float | None = None
+    mean_age: float | None = None
+    p95_age: float | None = None
+    peak_age: float | None = None
 
 
 class ReceptionLog:
@@ -219,12 +210,13 @@ class ReceptionLog:
         code_of = {(sender, name): code for name, senders in self._codes.items() for sender, code in senders.items()}
         links = sorted(code_of)
         codes = np.array([code_of[link] for link in links], dtype=np.int64)
-        columns = (self._received, self._delay_sum, self._delay_max, self._newest)
+        received = self._received[codes]
+        columns = (received, self._delay_sum[codes] / received, self._delay_max[codes], now - self._newest[codes])
         ages = [
             [None if math.isnan(age) else age for age in column.tolist()]
             for column in self._ages.statistics(now, self._newest_present, codes)
         ]
-        rows = zip(*(column[codes].tolist() for column in columns), *ages, strict=True)
+        rows = zip(*(column.tolist() for column in columns), *ages, strict=True)
         return {link: ReceptionStatistics(*row) for link, row in zip(links, rows, strict=True)}
 
     def _process_pending(self) -> None:
