@@ -17,6 +17,7 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.v2x.link_models.delay import ConstantDelay
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.view import WorldView
 
@@ -85,7 +86,7 @@ def short_channel_delay(
         return
     median = float(delay.quantile(0.5))
     if 0.0 < median < dt - TIME_TOLERANCE:
-        what = "the median delay" if delay.random else "the delay"
+        what = "the delay" if isinstance(delay, ConstantDelay) else "the median delay"
         yield Diagnostic(
             f"most messages take one step of {dt:g} s: {what} of the channel {profile.name!r} is only {median:.3g} s",
             "use a smaller step (--dt) to resolve it",

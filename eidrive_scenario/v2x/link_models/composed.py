@@ -67,7 +67,8 @@ class ComposedChannel(LinkChannel):
 
 def delay_of(delay: Delay, draws: LinkRandom, message: Message, receiver: str) -> float:
     """Return the delay of this message on this link [s]."""
+    if isinstance(delay, ConstantDelay):
+        return delay.seconds
     if isinstance(delay, TraceDelay) and delay.replay:
-        return delay.at(message.number)
-    u = draws.uniform("delay", message.sender, receiver, message.number) if delay.random else 0.5
-    return delay.quantile(u)
+        return delay.seconds[message.number % len(delay.seconds)]
+    return delay.quantile(draws.uniform("delay", message.sender, receiver, message.number))

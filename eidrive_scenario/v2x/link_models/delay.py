@@ -66,11 +66,6 @@ class TraceDelay(Settings):
     def _ascending(self) -> list[float]:
         return sorted(self.seconds)
 
-    @property
-    def random(self) -> bool:
-        """Whether delays are drawn at random."""
-        return not self.replay
-
     def quantile(self, u: float) -> float:
         """Return the quantile of the delay at probability `u` [s]."""
         ascending = self._ascending
@@ -78,10 +73,6 @@ class TraceDelay(Settings):
         below = min(int(rank), len(ascending) - 1)
         above = min(below + 1, len(ascending) - 1)
         return ascending[below] + (rank - below) * (ascending[above] - ascending[below])
-
-    def at(self, number: int) -> float:
-        """Return the delay of message `number` of a link in a replayed trace [s]."""
-        return self.seconds[number % len(self.seconds)]
 
 
 def _column(path: Path, column: object) -> list[float]:
@@ -140,22 +131,12 @@ class ConstantDelay(Settings):
     kind: Literal["constant"] = "constant"
     seconds: NonNegativeFloat = 0.0
 
-    @property
-    def random(self) -> bool:
-        return False
-
     def quantile(self, u: float) -> float:
         """Return the delay [s]."""
         return self.seconds
 
 
-class _RandomDelay(Settings):
-    @property
-    def random(self) -> bool:
-        return True
-
-
-class UniformDelay(_RandomDelay):
+class UniformDelay(Settings):
     """Delay with a uniform distribution between two bounds: minimum, maximum [s]."""
 
     kind: Literal["uniform"]
@@ -173,7 +154,7 @@ class UniformDelay(_RandomDelay):
         return self.minimum + u * (self.maximum - self.minimum)
 
 
-class TruncatedNormalDelay(_RandomDelay):
+class TruncatedNormalDelay(Settings):
     """Delay with a truncated normal distribution: mean, sd [s] before truncation to minimum, maximum [s]."""
 
     kind: Literal["truncated_normal"]
@@ -209,7 +190,7 @@ class TruncatedNormalDelay(_RandomDelay):
         return min(max(delay, self.minimum), math.inf if self.maximum is None else self.maximum)
 
 
-class ShiftedGammaDelay(_RandomDelay):
+class ShiftedGammaDelay(Settings):
     """Delay with a gamma distribution of shape 2: minimum, mean [s]; standard deviation (mean - minimum) / sqrt 2.
 
     Eclipse MOSAIC fits this shape to measured vehicular links (GammaRandomDelay).
@@ -233,7 +214,7 @@ class ShiftedGammaDelay(_RandomDelay):
         return self.minimum + (self.mean - self.minimum) / 2.0 * float(gammaincinv(2.0, u))
 
 
-class LognormalDelay(_RandomDelay):
+class LognormalDelay(Settings):
     """Delay with a lognormal distribution above a minimum [s]; mean, sd [s] refer to the part above it."""
 
     kind: Literal["lognormal"]
