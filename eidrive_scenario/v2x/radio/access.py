@@ -63,25 +63,23 @@ class MediumAccess(ABC):
     sensing_dbm  minimum power of messages that a station senses [dBm]
     """
 
-    def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: DccGate, sensing_dbm: float) -> None:
-        self.names = names
+    def __init__(self, queue: QueueSettings, gate: DccGate, sensing_dbm: float) -> None:
+        """Begin without stations, which `rearrange` adds."""
+        self.names: tuple[str, ...] = ()
         self.gate = gate
         self.queue = queue
         self.sensing_dbm = sensing_dbm
-        count = len(names)
-        self._rows = {name: row for row, name in enumerate(names)}
-        self._waiting: list[deque[Transmission]] = [deque() for _ in names]
+        self._rows: dict[str, int] = {}
+        self._waiting: list[deque[Transmission]] = []
         self._arrivals: deque[Transmission] = deque()
-        self._head: list[Transmission | None] = [None] * count
+        self._head: list[Transmission | None] = []
         self.contending = 0
         """Number of stations with a queued message."""
-        self.ready = np.full(count, math.inf)
+        self.ready = np.zeros(0)
         """Time from which the first message of each station may contend [s]; infinity for empty queues."""
-        self._last_start = np.full(count, -math.inf)
-        self._last_use = np.zeros(count)
-        """Channel time of the last message of each station: duration times share of the channel [s]."""
-        self._busy_time = np.zeros(count)
-        self._period_busy = np.zeros(count)
+        self._last_start, self._last_use = np.zeros(0), np.zeros(0)
+        """Start of the last message of each station, and its channel time: duration times share of the channel [s]."""
+        self._busy_time, self._period_busy = np.zeros(0), np.zeros(0)
         self._period: int | None = None
         """Index of the current period of congestion control; None before the first message."""
         self.fading: FadingDraws | None = None

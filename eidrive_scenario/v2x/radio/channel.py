@@ -23,7 +23,7 @@ from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import DroppedBlock, LinkCounterTable, ReceptionBlock
-from eidrive_scenario.v2x.radio.jamming import Jamming
+from eidrive_scenario.v2x.radio.jamming import ENERGY_DETECTION_DBM, jamming_power
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
@@ -70,15 +70,19 @@ class RadioChannel(QueuedChannel):
         self._rows: dict[str, int] = {}
         self._receivers: dict[str, tuple[tuple[str, ...], Integers]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
-        self._access = self._new_access(())
+        access = profile.queue, DccGate(profile.congestion, 0, self._background_ratio), profile.sensing, seed
+        self._access: MediumAccess = (
+            Csma(*access) if profile.technology == "80211p" else Sidelink(*access, profile.sidelink, profile.noise_dbm)
+        )
         self._access.fading = self._fading
         self._counters = LinkCounterTable(())
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
         self._jitter_keys: list[int] = []
         self._budget: Budget | None = None
-        self._jamming = Jamming(
-            profile.jammers, path_loss, frequency_ghz=profile.frequency_ghz, gain_dbi=profile.antenna_gain_dbi
-        )
+        self._jamming: Array | None = None
+        """Power of all jammers at the stations (N,) [mW], in the order of their names; None without a jammer."""
+        self._jammed: frozenset[str] = frozenset()
+        """Stations that sense a channel which jammers occupy, and so do not transmit."""
         self._open: list[Transmission] = []
         self._outcomes: list[OutcomeBlock] = []
         self._dropped: list[LinkEvent] = []
@@ -87,17 +91,21 @@ class RadioChannel(QueuedChannel):
         self._entry_times: dict[str, float] = {}
         self._last_arrival: dict[tuple[str, str], float] = {}
 
-    def _new_access(self, names: tuple[str, ...]) -> MediumAccess:
-        profile = self.profile
-        gate = DccGate(profile.congestion, len(names), self._background_ratio)
-        if profile.technology == "80211p":
-            return Csma(names, profile.queue, gate, profile.sensing, self._seed)
-        return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink, profile.noise_dbm)
-
     def update_environment(self, surroundings: RadioEnvironment) -> None:
         super().update_environment(surroundings)
         self._budget = None
-        self._jamming.update(surroundings)
+        if not self.profile.jammers:
+            return
+        profile = self.profile
+        self._jamming = jamming_power(
+            profile.jammers,
+            profile.path_loss,
+            surroundings.positions,
+            frequency_ghz=profile.frequency_ghz,
+            gain_dbi=profile.antenna_gain_dbi,
+        )
+        senses = self._jamming >= 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
+        self._jammed = frozenset(surroundings.names[row] for row in np.flatnonzero(senses).tolist())
 
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
         return self.transmit([(message, receivers)], now)
@@ -120,7 +128,7 @@ class RadioChannel(QueuedChannel):
             ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], number)
             transmission = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
             self._counters.send(row, rows, message.size)
-            if self._jamming.blocks(message.sender):
+            if message.sender in self._jammed:
                 self._drop(transmission)
             else:
                 offered.append(transmission)
@@ -140,7 +148,7 @@ class RadioChannel(QueuedChannel):
         return super().statistics(now)
 
     def channel_busy_ratio(self, station: str) -> float | None:
-        if self._jamming.blocks(station):
+        if station in self._jammed:
             return 1.0
         row = self._rows.get(station)
         if row is None or self._until is None or self._until <= self._entry_times[station]:
@@ -239,7 +247,7 @@ class RadioChannel(QueuedChannel):
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Determine the receptions of ended transmissions and enqueue their deliveries."""
-        receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys, self._jamming.power)
+        receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys, self._jamming)
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
         for index, transmission in enumerate(ended):

@@ -30,25 +30,20 @@ class Csma(MediumAccess):
     starts to transmit. Of messages that start at the same time none is earlier: they interfere with each other.
     """
 
-    def __init__(
-        self, names: tuple[str, ...], queue: QueueSettings, gate: DccGate, sensing_dbm: float, seed: int
-    ) -> None:
-        super().__init__(names, queue, gate, sensing_dbm)
+    def __init__(self, queue: QueueSettings, gate: DccGate, sensing_dbm: float, seed: int) -> None:
+        super().__init__(queue, gate, sensing_dbm)
         self._seed = seed
-        self._slots = np.full(len(names), math.nan)
+        self._slots = np.zeros(0)
         """Remaining backoff of the first message of each station [slots]; NaN if it met no busy medium."""
-        self._fixed = np.full(len(names), math.nan)
+        self._fixed = np.zeros(0)
         """Fixed starts, which no later transmission defers [s]; NaN if not fixed."""
-        self._free_from = np.full(len(names), -math.inf)
+        self._free_from = np.zeros(0)
         """Time from which each station senses an idle medium, by the transmissions so far [s]."""
-        self._locked_until = np.full(len(names), -math.inf)
+        self._locked_until = np.zeros(0)
         """Time until which each station is locked or transmits [s]."""
         self._starts = np.zeros(0)
         """Predicted start of the first message of each station [s]; infinity for empty queues."""
-        self._keys = self._backoff_keys()
-
-    def _backoff_keys(self) -> Keys:
-        return np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)
+        self._keys: Keys = np.zeros(0, dtype=np.uint64)
 
     def next_event(self) -> tuple[int, float]:
         """Return the station that starts first, and the predicted start."""
@@ -125,4 +120,4 @@ class Csma(MediumAccess):
         self._slots, self._fixed = reorder_rows(self._slots, rows, math.nan), reorder_rows(self._fixed, rows, math.nan)
         for field in ("_free_from", "_locked_until"):
             setattr(self, field, reorder_rows(getattr(self, field), rows, -math.inf))
-        self._keys = self._backoff_keys()
+        self._keys = np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)

@@ -74,7 +74,8 @@ class ReceptionBlock(OutcomeBlock):
             )
 
     def columns(self) -> OutcomeColumns:
-        number, sent, size = _of_messages(self.ended)
+        number, size = np.array([(entry.message.number, entry.message.size) for entry in self.ended], dtype=np.int64).T
+        sent = np.array([transmission.sent for transmission in self.ended], dtype=float)
         return OutcomeColumns(
             self.budget.names,
             self.senders,
@@ -108,28 +109,12 @@ class DroppedBlock(OutcomeBlock):
             )
 
     def columns(self) -> OutcomeColumns:
-        number, sent, size = _of_messages([self._transmission])
-        all_of_one = np.zeros(len(self._receivers), dtype=np.int64)
-        return OutcomeColumns(
-            self._names,
-            all_of_one + self._sender,
-            self._receivers,
-            OUTCOMES,
-            all_of_one + QUEUE,
-            number[all_of_one],
-            sent[all_of_one],
-            np.full(len(all_of_one), np.inf),
-            size[all_of_one],
+        message, count = self._transmission.message, len(self._receivers)
+        sender, cause, number, size = (
+            np.full(count, value) for value in (self._sender, QUEUE, message.number, message.size)
         )
-
-
-def _of_messages(transmissions: Sequence[Transmission]) -> tuple[Integers, Array, Integers]:
-    """Return numbers, times of sending [s] and sizes [bytes], (T,) each."""
-    return (
-        np.array([transmission.message.number for transmission in transmissions], dtype=np.int64),
-        np.array([transmission.sent for transmission in transmissions], dtype=float),
-        np.array([transmission.message.size for transmission in transmissions], dtype=np.int64),
-    )
+        sent, arrives = (np.full(count, time) for time in (self._transmission.sent, np.inf))
+        return OutcomeColumns(self._names, sender, self._receivers, OUTCOMES, cause, number, sent, arrives, size)
 
 
 _CLASSES = 41

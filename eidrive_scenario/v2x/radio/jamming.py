@@ -11,7 +11,6 @@ from pydantic import Field
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.v2x.propagation import LinkGeometry, PathLoss
-from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 ENERGY_DETECTION_DBM = -65.0
 """Power of any signal from which a station senses a busy channel of 10 MHz [dBm] (IEEE 802.11-2012, 18.3.10.6)."""
@@ -44,37 +43,3 @@ def jamming_power(
         loss = path_loss.loss(between, frequency_ghz, np.full(len(positions), 0.5))
         total += 10.0 ** ((jammer.power_dbm + gain_dbi - loss) / 10.0)
     return total
-
-
-class Jamming:
-    """Power of all jammers at the stations. `power` is (N,) [mW] in the order of their names, None without a jammer."""
-
-    def __init__(
-        self, jammers: Sequence[Jammer], path_loss: PathLoss, *, frequency_ghz: float, gain_dbi: float
-    ) -> None:
-        self._jammers = jammers
-        self._path_loss = path_loss
-        self._frequency_ghz = frequency_ghz
-        self._gain_dbi = gain_dbi
-        self.power: Array | None = None
-        self._blocked: frozenset[str] = frozenset()
-
-    def update(self, surroundings: RadioEnvironment) -> None:
-        """Set the positions of the antennas."""
-        if not self._jammers:
-            return
-        self.power = jamming_power(
-            self._jammers,
-            self._path_loss,
-            surroundings.positions,
-            frequency_ghz=self._frequency_ghz,
-            gain_dbi=self._gain_dbi,
-        )
-        least = 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
-        self._blocked = frozenset(
-            name for name, power in zip(surroundings.names, self.power.tolist(), strict=True) if power >= least
-        )
-
-    def blocks(self, station: str) -> bool:
-        """Return whether a station senses a channel that jammers occupy, and so does not transmit."""
-        return station in self._blocked

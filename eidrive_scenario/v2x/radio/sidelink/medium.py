@@ -69,7 +69,6 @@ class Sidelink(MediumAccess):
 
     def __init__(
         self,
-        names: tuple[str, ...],
         queue: QueueSettings,
         gate: DccGate,
         sensing_dbm: float,
@@ -77,27 +76,27 @@ class Sidelink(MediumAccess):
         settings: SidelinkSettings,
         noise_dbm: float,
     ) -> None:
-        super().__init__(names, queue, gate, sensing_dbm)
+        super().__init__(queue, gate, sensing_dbm)
         self._settings = settings
         self._seed = seed
         noise = 10.0 ** (noise_dbm / 10.0)
         self._control = ControlChannel(noise / RESOURCE_BLOCKS, settings.control_curve)
         self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
-        self._history = SensingHistory(len(names), settings.subchannels, settings.interval_subframes)
-        self._grants: list[Grant | None] = [None] * len(names)
-        self._sent: list[deque[range]] = [deque() for _ in names]
+        self._history = SensingHistory(0, settings.subchannels, settings.interval_subframes)
+        self._grants: list[Grant | None] = []
+        self._sent: list[deque[range]] = []
         """Subframes of the recent transmissions of each station."""
         self._choices: dict[str, int] = {}
         """Number of drawn reselection counters by station, including the time before a re-entry."""
-        self._next_event = np.full(len(names), math.inf)
+        self._next_event = np.zeros(0)
         """Time at which each station selects a resource, or starts its first message on a reserved one [s]."""
-        self._scheduled = np.zeros(len(names), dtype=np.bool_)
+        self._scheduled = np.zeros(0, dtype=np.bool_)
         """Whether the event is the start of a message."""
         self._sending: list[Sending] = []
         """Transmissions that are not sensed up to their end."""
-        self._unmeasured_time, self._period_unmeasured = np.zeros(len(names)), np.zeros(len(names))
+        self._unmeasured_time, self._period_unmeasured = np.zeros(0), np.zeros(0)
         """Time in which each station could not measure because it transmitted [s]."""
-        self._keys = self._sci_keys()
+        self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
 
     def next_event(self) -> tuple[int, float]:
         row = int(np.argmin(self._next_event))
@@ -141,7 +140,8 @@ class Sidelink(MediumAccess):
             if transmission.control is not None:
                 transmission.control = reorder_rows(transmission.control, rows, PROPAGATION)
         self._history.rearrange(rows)
-        self._keys = self._sci_keys()
+        own = np.array([key(self._seed, "sci", name) for name in self.names], dtype=np.uint64)
+        self._keys = combine_keys(own[:, None], own[None, :])
 
     def _start(self, row: int) -> Transmission:
         """Transmit the first message of a station on its resource."""
@@ -280,10 +280,6 @@ class Sidelink(MediumAccess):
         self._unmeasured_time += self._period_unmeasured
         self._period_unmeasured = np.zeros(len(self.names))
         return ratio
-
-    def _sci_keys(self) -> Keys:
-        own = np.array([key(self._seed, "sci", name) for name in self.names], dtype=np.uint64)
-        return combine_keys(own[:, None], own[None, :])
 
     def _draw(self, purpose: str, row: int) -> float:
         return uniform(self._key(purpose, row), self._choices[self.names[row]])
