@@ -63,7 +63,7 @@ def load_profile(
         if _is_inline(text):
             data = load_yaml(source, source=origin or "channel", line=line)
             lines = {} if line is None else key_lines(source, line)
-            return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines, scope)
+            return _parse(data, "custom", origin or "channel", line, lines, scope)
         if not text:
             message = "channel name is empty"
             raise SettingError(Diagnostic(message, "expected a profile such as `ideal`, or `none`", origin, line))
@@ -80,7 +80,7 @@ def load_profile(
             message, hint = f"file {quoted(str(source))} is not a channel profile", "expected a file name in .yaml"
         raise SettingError(Diagnostic(message, hint, origin, line))
     data, lines = load_yaml_file(path)
-    return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
+    return _parse(data, path.stem, str(path), 1, lines, scope, folder=path.parent)
 
 
 def profile_file(
@@ -139,16 +139,8 @@ def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return resolved
 
 
-def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
-    if not isinstance(data, Mapping):
-        given = type(data).__name__ if data is not None else "an empty file"
-        message = f"channel profile is not a mapping (got {given})"
-        raise SettingError(Diagnostic(message, "expected settings such as `model: composed`", source, line))
-    return data
-
-
 def _parse(
-    data: Mapping[str, Any],
+    data: Any,
     name: str,
     source: str,
     line: int | None,
@@ -156,6 +148,10 @@ def _parse(
     scope: Scope | None,
     folder: Path | None = None,
 ) -> ChannelProfile:
+    if not isinstance(data, Mapping):
+        given = type(data).__name__ if data is not None else "an empty file"
+        message = f"channel profile is not a mapping (got {given})"
+        raise SettingError(Diagnostic(message, "expected settings such as `model: composed`", source, line))
     origins = parameter_hints(data, scope)
     data = resolve_references(data, scope, source=source, line=line, lines=lines)
     data = _with_paths(data, folder) if folder is not None else data
