@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -97,6 +98,7 @@ def probability_of_los(distance: Values, environment: str) -> Array:
     return np.where(distance <= 475.0, near, np.maximum(0.0, 0.54 - 0.001 * (distance - 475.0)))
 
 
+@dataclass
 class LinkGeometry:
     """Geometry of M links; the code of state LOS is 0.
 
@@ -107,15 +109,15 @@ class LinkGeometry:
     vehicles      (M,) number of blocking vehicles
     """
 
-    def __init__(
-        self, distance: Array, states: Integers, lower: Array, upper: Array, tops: Array, vehicles: Integers
-    ) -> None:
-        self.distance = np.maximum(distance, 1.0)
-        self.states = states
-        self.lower = lower
-        self.upper = upper
-        self.tops = tops
-        self.vehicles = vehicles
+    distance: Array
+    states: Integers
+    lower: Array
+    upper: Array
+    tops: Array
+    vehicles: Integers
+
+    def __post_init__(self) -> None:
+        self.distance = np.maximum(self.distance, 1.0)
 
     @classmethod
     def in_sight(cls, distance: Array, lower: Array, upper: Array) -> LinkGeometry:
