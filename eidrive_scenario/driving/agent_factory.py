@@ -16,7 +16,7 @@ from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, motion_noise
+from eidrive_scenario.perception.localization import Localizer, MotionNoise, PoseNoiseProcess
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
 from eidrive_scenario.roads import RoadNetwork
@@ -138,7 +138,7 @@ def build_agent(
     noise, localizer = settings.pose_noise, None
     if settings.localization == "ekf":
         imu = next(sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings))
-        localizer = Localizer(spec.name, seed, noise=motion_noise(imu))
+        localizer = Localizer(spec.name, seed, noise=MotionNoise(imu))
     perception = Perception(
         detector,
         tracker=_tracker(settings, detector),

@@ -7,15 +7,12 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from msgspec.structs import replace
 from pydantic import Field, model_validator
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.extensions.settings import Settings
-from eidrive_scenario.perception.localization import at_pose
-from eidrive_scenario.sensing.readings import Readings
 
 MAX_FALSE_OBJECTS = 100
 """Maximum number of false objects of a station."""
@@ -92,13 +89,6 @@ class PoseError(Settings):
     x: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
     y: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
     yaw: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
-
-
-def with_pose_error(readings: Readings, error: PoseError) -> Readings:
-    """Return the readings as if the station were at its pose plus the error."""
-    ego = readings.ego
-    position = ego.position + np.array([error.x, error.y, 0.0])
-    return at_pose(readings, replace(ego, position=position, yaw=wrap_angle(ego.yaw + math.radians(error.yaw))))
 
 
 def with_false_objects(detections: Detections, objects: Sequence[FalseObject], *, with_velocity: bool) -> Detections:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -28,34 +28,15 @@ class MotionNoise:
     The default slip is that of a car whose tires yield by 0.075 m/s per m/s² of lateral acceleration, in curves of
     about two seconds.
 
-    acceleration, turn_rate            white noise of the IMU [m/s²/√Hz], [rad/s/√Hz]
-    acceleration_bias, turn_bias       initial biases of the IMU, standard deviations [m/s²], [rad/s]
-    acceleration_walk, turn_walk       random walk of the biases [m/s²/√s], [rad/s/√s]
-    slip                               lateral velocity of the tires in curves, which the model omits: white noise per
-                                       lateral acceleration [m/√s per m/s²]
-    drift                              the same on a straight course [m/√s]
+    imu    noise and biases that the data sheet of the IMU states
+    slip   lateral velocity of the tires in curves, which the model omits: white noise per lateral acceleration
+           [m/√s per m/s²]
+    drift  the same on a straight course [m/√s]
     """
 
-    acceleration: float = 0.02
-    turn_rate: float = 0.002
-    acceleration_bias: float = 0.0
-    turn_bias: float = 0.005
-    acceleration_walk: float = 0.0
-    turn_walk: float = 1e-4
+    imu: ImuSettings = field(default_factory=ImuSettings)
     slip: float = 0.15
     drift: float = 0.02
-
-
-def motion_noise(imu: ImuSettings) -> MotionNoise:
-    """Return the noise that the data sheet of an IMU states."""
-    return MotionNoise(
-        acceleration=imu.accelerometer_noise,
-        turn_rate=imu.gyroscope_noise,
-        acceleration_bias=imu.accelerometer_bias,
-        turn_bias=imu.gyroscope_bias,
-        acceleration_walk=imu.accelerometer_walk,
-        turn_walk=imu.gyroscope_walk,
-    )
 
 
 @dataclass(frozen=True)
@@ -111,16 +92,8 @@ class InertialFilter:
         middle, mean = yaw + 0.5 * turn * step, speed + 0.5 * gain * step
         cos, sin = math.cos(middle), math.sin(middle)
         distance = mean * step
-        state = np.array(
-            [
-                x + distance * cos,
-                y + distance * sin,
-                yaw + turn * step,
-                speed + gain * step,
-                turn_bias,
-                acceleration_bias,
-            ]
-        )
+        pose = x + distance * cos, y + distance * sin, yaw + turn * step
+        state = np.array([*pose, speed + gain * step, turn_bias, acceleration_bias])
         forward = np.eye(6)
         forward[X, YAW], forward[Y, YAW] = -distance * sin, distance * cos
         forward[X, SPEED], forward[Y, SPEED] = step * cos, step * sin
@@ -134,9 +107,9 @@ class InertialFilter:
         drive[ACCELERATION_BIAS, 0] = drive[TURN_BIAS, 1] = 0.0
         drive[X, 2], drive[Y, 2], drive[SPEED, 2] = -sin, cos, turn
         drive[TURN_BIAS, 3] = drive[ACCELERATION_BIAS, 4] = 1.0
-        drive[:, :2] *= (noise.acceleration / math.sqrt(step), noise.turn_rate / math.sqrt(step))
+        drive[:, :2] *= np.array([noise.imu.accelerometer_noise, noise.imu.gyroscope_noise]) / math.sqrt(step)
         across = noise.drift + noise.slip * abs(speed * turn)
-        drive[:, 2:] *= np.array([across, noise.turn_walk, noise.acceleration_walk]) * math.sqrt(step)
+        drive[:, 2:] *= np.array([across, noise.imu.gyroscope_walk, noise.imu.accelerometer_walk]) * math.sqrt(step)
         self._propagation = forward @ self._propagation
         self.estimate = Estimate(state, forward @ self.estimate.covariance @ forward.T + drive @ drive.T)
 
@@ -170,7 +143,6 @@ class Localizer:
         self._filter: InertialFilter | None = None
         self._imu: ImuReading | None = None
         self._time = 0.0
-        self._ego: EgoState | None = None
 
     @property
     def estimate(self) -> Estimate:
@@ -200,15 +172,14 @@ class Localizer:
             self._filter = InertialFilter(self._initial_estimate(truth), self._noise)
         else:
             self._filter.begin_step()
-        if self._imu is not None or readings.imu is not None:
-            imu = readings.imu or self._imu
-            if imu is not None and readings.time > self._time:
-                self._filter.predict(imu, readings.time - self._time)
-        self._imu, self._time = readings.imu or self._imu, readings.time
+        self._imu = readings.imu or self._imu
+        if self._imu is not None and readings.time > self._time:
+            self._filter.predict(self._imu, readings.time - self._time)
+        self._time = readings.time
         if readings.gnss is not None:
             self._filter.correct(readings.gnss)
         x, y, yaw, speed, turn_bias, acceleration_bias = self._filter.estimate.state.tolist()
-        self._ego = replace(
+        ego = replace(
             truth,
             position=np.array([x, y, float(truth.position[2])]),
             yaw=yaw,
@@ -216,15 +187,14 @@ class Localizer:
             yaw_rate=float(self._imu.angular_rate[2]) - turn_bias if self._imu is not None else 0.0,
             acceleration=float(self._imu.acceleration[0]) - acceleration_bias if self._imu is not None else 0.0,
         )
-        return at_pose(readings, self._ego)
+        return at_pose(readings, ego)
 
     def _initial_estimate(self, truth: EgoState) -> Estimate:
-        seed, *key = self._key
-        start, noise = self._start, self._noise
+        start, imu = self._start, self._noise.imu
         deviations = np.array(
-            [start.position, start.position, start.yaw, start.speed, noise.turn_bias, noise.acceleration_bias]
+            [start.position, start.position, start.yaw, start.speed, imu.gyroscope_bias, imu.accelerometer_bias]
         )
-        drawn = generator(seed, *key).standard_normal(6) * deviations
+        drawn = generator(*self._key).standard_normal(6) * deviations
         x, y, _ = truth.position.tolist()
         state = np.array([x, y, truth.yaw, truth.speed, 0.0, 0.0]) + drawn * (1.0, 1.0, 1.0, 1.0, 0.0, 0.0)
         return Estimate(state, np.diag(deviations**2))
@@ -250,6 +220,13 @@ def at_pose(readings: Readings, ego: EgoState) -> Readings:
         cameras={name: reading.at(rigid @ reading.pose) for name, reading in readings.cameras.items()},
         lidars={name: replace(reading, pose=rigid @ reading.pose) for name, reading in readings.lidars.items()},
     )
+
+
+def add_pose_error(readings: Readings, x: float, y: float, yaw: float) -> Readings:
+    """Return the readings as if the station were at its pose plus an error of x, y [m] and yaw [rad]."""
+    ego = readings.ego
+    position = ego.position + np.array([x, y, 0.0])
+    return at_pose(readings, replace(ego, position=position, yaw=wrap_angle(ego.yaw + yaw)))
 
 
 def _moved(boxes: Array, rigid: Array, turn: float) -> Array:
@@ -312,10 +289,3 @@ class PoseNoiseProcess:
         self._time = time
         errors: Array = self._deviations * self._unit
         return errors
-
-    def displaced(self, readings: Readings) -> Readings:
-        """Return the readings as if the station were at its pose plus the error."""
-        ego = readings.ego
-        x, y, yaw = self.error(readings.time).tolist()
-        position = ego.position + np.array([x, y, 0.0])
-        return at_pose(readings, replace(ego, position=position, yaw=wrap_angle(ego.yaw + yaw)))

@@ -15,8 +15,8 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
-from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess
+from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects
+from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, add_pose_error
 from eidrive_scenario.perception.result_checks import check_array, check_detections, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED
@@ -122,9 +122,10 @@ class Perception:
         if self._localizer is not None:
             readings = self._localizer.with_estimated_pose(readings)
         if self._pose_error is not None:
-            readings = with_pose_error(readings, self._pose_error)
+            error = self._pose_error
+            readings = add_pose_error(readings, error.x, error.y, math.radians(error.yaw))
         if self._pose_noise is not None:
-            readings = self._pose_noise.displaced(readings)
+            readings = add_pose_error(readings, *self._pose_noise.error(readings.time).tolist())
         if (covariance := self.pose_covariance) is not None:
             x, y, _ = readings.ego.position.tolist()
             lagged = sum((source.lagged_covariance for source in self._pose_sources), np.zeros((3, 3)))

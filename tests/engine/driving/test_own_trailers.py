@@ -9,7 +9,7 @@ import pytest
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.communication.own_body import OwnBody
-from eidrive_scenario.perception.faults import PoseError, with_pose_error
+from eidrive_scenario.perception.localization import add_pose_error
 from eidrive_scenario.perception.pipeline import outlines, rows_on_bodies, without_rows
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.world import World
@@ -60,7 +60,7 @@ def test_received_trailer_is_removed_at_its_place_of_the_measurement(car: ActorS
 def test_pose_error_moves_the_trailer_with_its_vehicle() -> None:
     """A quarter turn about the vehicle at the origin, and 2 m ahead: from 9 m behind to 9 m to the right."""
     ego = EgoState(0.0, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    moved = with_pose_error(Readings(0.0, ego, attached=TRAILER), PoseError(x=2.0, yaw=90.0)).attached
+    moved = add_pose_error(Readings(0.0, ego, attached=TRAILER), 2.0, 0.0, math.pi / 2.0).attached
     assert moved[0, [0, 1, 6]].tolist() == pytest.approx([2.0, -9.0, math.pi / 2.0])
     assert TRAILER[0, 0] == -9.0
 

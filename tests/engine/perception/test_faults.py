@@ -10,7 +10,8 @@ import pytest
 from pydantic import ValidationError
 
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.perception.faults import FIRST_TRACK, FalseObject, PoseError, with_false_objects, with_pose_error
+from eidrive_scenario.perception.faults import FIRST_TRACK, FalseObject, with_false_objects
+from eidrive_scenario.perception.localization import add_pose_error
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 
 EMPTY = Detections(4.0)
@@ -72,7 +73,7 @@ def test_pose_error_moves_and_turns_all_objects_about_the_station() -> None:
     truth = TruthReading(
         ("Car",), ("car",), np.array([[15.0, 1.0, 0.7, 4.0, 1.8, 1.4, 0.0]]), np.array([[2.0, 0.0]]), np.ones(1)
     )
-    moved = with_pose_error(Readings(0.0, ego, truth=truth), PoseError(x=1.0, y=-2.0, yaw=90.0))
+    moved = add_pose_error(Readings(0.0, ego, truth=truth), 1.0, -2.0, math.pi / 2.0)
     assert moved.truth is not None
     assert moved.ego.position.tolist() == pytest.approx([6.0, -1.0, 0.0])
     assert moved.truth.boxes[0, :2].tolist() == pytest.approx([6.0, 9.0])

@@ -16,7 +16,6 @@ from eidrive_scenario.perception.localization import (
     Localizer,
     MotionNoise,
     StartNoise,
-    motion_noise,
 )
 from eidrive_scenario.sensing.readings import (
     CameraReading,
@@ -65,7 +64,9 @@ def test_predict_subtracts_biases() -> None:
 
 def test_predict_covariance_grows_by_stated_noise() -> None:
     """At standstill for 4 s with white noise of density n, the variances of heading and speed are n² T."""
-    noise = MotionNoise(acceleration=0.05, turn_rate=0.003, turn_walk=0.0, slip=0.0, drift=0.0)
+    noise = MotionNoise(
+        ImuSettings(accelerometer_noise=0.05, gyroscope_noise=0.003, gyroscope_walk=0.0), slip=0.0, drift=0.0
+    )
     filter_ = InertialFilter(still(0, 0, 0, 0, 0, 0), noise)
     for _ in range(80):
         filter_.predict(imu(), DT)
@@ -77,7 +78,7 @@ def test_predict_covariance_grows_by_stated_noise() -> None:
 
 def test_predict_covariance_follows_numerical_jacobian() -> None:
     """Without noise, the covariance follows the numerical Jacobian."""
-    noise = MotionNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    noise = MotionNoise(ImuSettings(accelerometer_noise=0.0, gyroscope_noise=0.0, gyroscope_walk=0.0), 0.0, 0.0)
     middle = np.array([3.0, -2.0, 0.7, 9.0, 0.01, 0.05])
     before = np.diag([0.3, 0.2, 0.01, 0.4, 1e-4, 1e-3])
 
@@ -107,13 +108,14 @@ def test_filter_nees_under_assumed_noise_is_within_chi_square_bounds() -> None:
     mean over time (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2).
     """
     runs, ticks = 50, 300
-    noise, start = MotionNoise(slip=0.0, drift=0.05), StartNoise()
+    unit, start = ImuSettings(), StartNoise()
+    noise = MotionNoise(unit, slip=0.0, drift=0.05)
     nees = np.zeros(ticks)
     for run in range(runs):
         rng = np.random.default_rng(500 + run)
         truth = np.array([0.0, 0.0, rng.uniform(-3, 3), 8.0])
-        bias = rng.normal(0.0, noise.turn_bias)
-        deviations = np.array([start.position, start.position, start.yaw, start.speed, noise.turn_bias, 1e-9])
+        bias = rng.normal(0.0, unit.gyroscope_bias)
+        deviations = np.array([start.position, start.position, start.yaw, start.speed, unit.gyroscope_bias, 1e-9])
         first = np.array([*truth, bias, 0.0]) + deviations * rng.standard_normal(6)
         first[4:] = 0.0
         filter_ = InertialFilter(Estimate(first, np.diag(deviations**2)), noise)
@@ -125,9 +127,10 @@ def test_filter_nees_under_assumed_noise_is_within_chi_square_bounds() -> None:
             truth += np.array(
                 [distance * cos - aside * sin, distance * sin + aside * cos, turn * DT, push * DT + aside * turn]
             )
-            bias += noise.turn_walk * math.sqrt(DT) * rng.standard_normal()
+            bias += unit.gyroscope_walk * math.sqrt(DT) * rng.standard_normal()
             white = rng.standard_normal(2) / math.sqrt(DT)
-            filter_.predict(imu(push + noise.acceleration * white[0], turn + bias + noise.turn_rate * white[1]), DT)
+            push_noise, turn_noise = unit.accelerometer_noise * white[0], unit.gyroscope_noise * white[1]
+            filter_.predict(imu(push + push_noise, turn + bias + turn_noise), DT)
             if tick % 2 == 0:
                 fix = np.array([*(truth[:2] + 0.3 * rng.standard_normal(2)), 0.0])
                 filter_.correct(GnssReading(fix, 0.09 * np.eye(3)))
@@ -168,7 +171,7 @@ def test_localizer_nees_in_simulated_world_is_within_chi_square_bounds() -> None
         with World(None, dt=DT) as world:
             world.add(CAR, Placement(0, 0, speed=10.0), driven=True)
             rig = Rig(CAR, {"gnss": GnssSettings(), "imu": unit}, seed=seed)
-            localizer = Localizer("Ego", seed, noise=motion_noise(unit))
+            localizer = Localizer("Ego", seed, noise=MotionNoise(unit))
             for tick in range(400):
                 readings = rig.read(world, world.view())
                 localizer.with_estimated_pose(readings)
