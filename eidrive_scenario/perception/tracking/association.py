@@ -60,13 +60,6 @@ def associate(
     return rows, columns
 
 
-def position_noise(covariance: Array) -> Array:
-    """Return position covariances (N, 2, 2), with defaults for missing and too small ones."""
-    noise = covariance.copy()
-    make_plausible(noise)
-    return noise
-
-
 def make_plausible(covariance: Array) -> Bools:
     """Replace unknown position covariances in (N, D, D), and raise implausibly small ones.
 

@@ -15,6 +15,7 @@ from eidrive_scenario.perception.tracking.motion_models import (
     KNOWN_SPEED,
     Estimates,
     MotionModel,
+    MovingModel,
     Standing,
     transposed,
 )
@@ -71,7 +72,7 @@ class InteractingModels:
     pose_errors  random errors of the pose of the station; None: its pose is exact
     """
 
-    def __init__(self, model: MotionModel, pose_errors: PoseErrors | None = None) -> None:
+    def __init__(self, model: MovingModel, pose_errors: PoseErrors | None = None) -> None:
         self._base = model
         self._pose_errors = pose_errors
         models: tuple[MotionModel, ...] = (Standing(model), model)

@@ -50,10 +50,7 @@ class Update(NamedTuple):
 
 
 class MotionModel(ABC):
-    """State of a track and its transition. Positions [m], angles [rad], all in the world frame.
-
-    velocity_deviation  standard deviation of the detected velocity of a moving object in each axis [m/s]
-    """
+    """State of a track and its transition. Positions [m], angles [rad], all in the world frame."""
 
     size: int
     """Number of states."""
@@ -61,9 +58,6 @@ class MotionModel(ABC):
     """Indices of the states that are 0 for an object at rest."""
     measures_heading: bool = False
     """Whether a box corrects the third state, a heading, by its axis."""
-
-    def __init__(self, velocity_deviation: float = KNOWN_SPEED) -> None:
-        self.velocity_deviation = velocity_deviation
 
     @abstractmethod
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
@@ -77,6 +71,16 @@ class MotionModel(ABC):
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         """Return the estimates updated with one measured box per track (N, 7) and position noise (N, 2, 2)."""
 
+
+class MovingModel(MotionModel):
+    """Model of a moving object.
+
+    velocity_deviation  standard deviation of its detected velocity in each axis [m/s]
+    """
+
+    def __init__(self, velocity_deviation: float = KNOWN_SPEED) -> None:
+        self.velocity_deviation = velocity_deviation
+
     @abstractmethod
     def velocity(self, state: Array) -> Array:
         """Return velocities (N, 2) [m/s]."""
@@ -86,7 +90,7 @@ class MotionModel(ABC):
         """Return the variances (N,) of the speeds in these directions (N, 2), None: those of motion [m²/s²]."""
 
 
-class ConstantVelocity(MotionModel):
+class ConstantVelocity(MovingModel):
     """Model with state x, y, vx, vy and white acceleration noise.
 
     Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation, 2001, section 6.2.2.
@@ -127,7 +131,7 @@ class ConstantVelocity(MotionModel):
         return np.asarray(variance / np.maximum(np.square(along).sum(axis=1), 1e-12))
 
 
-class TurnRate(MotionModel):
+class TurnRate(MovingModel):
     """Model with state x, y, heading, speed, turn rate; speed and turn rate are constant except for white noise.
 
     Schubert, Richter and Wanielik, Comparison and evaluation of advanced motion models for vehicle tracking, FUSION
@@ -210,7 +214,6 @@ class Standing(MotionModel):
     """
 
     def __init__(self, base: MotionModel) -> None:
-        super().__init__(base.velocity_deviation)
         self._base = base
         self.size, self.motion, self.measures_heading = base.size, base.motion, base.measures_heading
 
@@ -225,12 +228,6 @@ class Standing(MotionModel):
 
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         return self._base.update(tracks, boxes, noise)
-
-    def velocity(self, state: Array) -> Array:
-        return np.zeros((len(state), 2))
-
-    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
-        return np.zeros(len(tracks.state))
 
     def _at_rest(self, tracks: Estimates) -> Estimates:
         state, covariance = tracks.state.copy(), tracks.covariance.copy()

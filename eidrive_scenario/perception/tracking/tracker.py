@@ -18,8 +18,8 @@ from eidrive_scenario.perception.tracking.association import (
     associate,
     detected,
     likelihood_ratio,
+    make_plausible,
     missed,
-    position_noise,
     survived,
 )
 from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT, InteractingModels, Tracks
@@ -28,7 +28,7 @@ from eidrive_scenario.perception.tracking.motion_models import (
     KNOWN_SPEED,
     ConstantVelocity,
     Estimates,
-    MotionModel,
+    MovingModel,
     TurnRate,
 )
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
@@ -77,7 +77,7 @@ class TrackHistory:
         return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
 
 
-MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
+MODELS: Mapping[str, type[MovingModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
 ACROSS = math.cos(math.pi / 4.0)
 """Cosine of the angle between two axes from which on one is across the other."""
@@ -154,7 +154,8 @@ class Tracker(TrackingMethod):
             self._existence = survived(self._existence, step, self.settings.lifetime)
         if self._pose_errors is not None:
             self._pose_errors.advance(detections.time)
-        stated = position_noise(detections.covariance)
+        stated = detections.covariance.copy()
+        make_plausible(stated)
         noise = stated.copy()
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         expected = self._filter.combined(self._tracks)

@@ -119,7 +119,6 @@ class UncertainPose(MotionModel):
     """
 
     def __init__(self, base: MotionModel, errors: PoseErrors) -> None:
-        super().__init__(base.velocity_deviation)
         self._base = base
         self.size = base.size + 3
         self.motion, self.measures_heading = base.motion, base.measures_heading
@@ -146,12 +145,6 @@ class UncertainPose(MotionModel):
 
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         return self._base.update(tracks, boxes, noise)
-
-    def velocity(self, state: Array) -> Array:
-        return self._base.velocity(state)
-
-    def speed_variance(self, tracks: Estimates, directions: Array | None = None) -> Array:
-        return self._base.speed_variance(tracks, directions)
 
     def _shifted(self, tracks: Estimates, pose: PoseUncertainty, sign: float) -> Estimates:
         """Return the tracks with the effect of the pose error on their position and heading added or subtracted."""

@@ -12,7 +12,7 @@ from eidrive_scenario.perception.tracking.motion_models import (
     TURN_DENSITY,
     ConstantVelocity,
     Estimates,
-    MotionModel,
+    MovingModel,
     TurnRate,
 )
 
@@ -43,7 +43,7 @@ def test_constant_velocity_predict_moves_straight() -> None:
 @pytest.mark.parametrize(("model", "speed"), [(ConstantVelocity, slice(2, 4)), (TurnRate, slice(3, 4))])
 @pytest.mark.parametrize(("deviation", "expected"), [(None, 0.5), (1.5, 1.5)])
 def test_begin_has_the_deviation_of_the_detected_velocity(
-    model: type[MotionModel], speed: slice, deviation: float | None, expected: float
+    model: type[MovingModel], speed: slice, deviation: float | None, expected: float
 ) -> None:
     given = model() if deviation is None else model(deviation)
     held = given.begin(box(0.0, 0.0), np.array([[8.0, 0.0]]), noise())
