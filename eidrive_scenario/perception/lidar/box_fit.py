@@ -177,14 +177,12 @@ class Fit:
     name        class
     covariance  (2, 2) of the center x y [m²]
     deviation   sum of squared deviations of the size from that of the class, in standard deviations
-    hidden      whether something nearer hides the left and the right end
     """
 
     box: tuple[float, float, float, float, float, float, float]
     name: str
     covariance: Array
     deviation: float
-    hidden: tuple[bool, bool]
 
 
 class _Hypothesis(NamedTuple):
@@ -272,7 +270,6 @@ def fit_box(
         best.name,
         covariance + _hypothesis_spread(hypotheses, best, center, shapeless),
         best.cost + 2.0 * math.log(prior.share),
-        hidden,
     )
 
 

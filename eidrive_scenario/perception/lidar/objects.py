@@ -49,13 +49,9 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
     candidates = _fit_clusters(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
     separate = [candidate for candidate in candidates if candidate.fit.deviation <= POOR_FIT]
     for poor in (candidate for candidate in candidates if candidate.fit.deviation > POOR_FIT):
-        parts = clusters(scan.points[poor.rows], scan.pattern.azimuth, grazing=False)
-        part_rows = [poor.rows[part] for part in parts]
-        good = [
-            candidate
-            for candidate in (_fit_clusters(scan, surroundings, part_rows, min_points) if len(parts) > 1 else [])
-            if candidate.fit.deviation <= POOR_FIT
-        ]
+        parts = [poor.rows[part] for part in clusters(scan.points[poor.rows], scan.pattern.azimuth, grazing=False)]
+        fitted = _fit_clusters(scan, surroundings, parts, min_points) if len(parts) > 1 else []
+        good = [candidate for candidate in fitted if candidate.fit.deviation <= POOR_FIT]
         separate += good or _split_dense(scan, poor) or [poor]
     return [
         candidate
@@ -75,9 +71,8 @@ def _split_dense(scan: Scan, poor: FittedObject) -> list[FittedObject]:
     step = scan.pattern.azimuth
     for _ in range(DENSER):
         step /= 2.0
-        parts = [poor.rows[part] for part in clusters(scan.points[poor.rows], step, grazing=False)]
-        fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= FEW]
-        candidates = [FittedObject(part, fit) for part, fit in fits if fit is not None and fit.deviation <= POOR_FIT]
+        parts = _fit_parts(scan, poor.rows, step, FEW)
+        candidates = [part for part in parts if part.fit.deviation <= POOR_FIT]
         if len(candidates) > 1 and sum(len(candidate.rows) for candidate in candidates) >= COVERED * len(poor.rows):
             return candidates
     return []
@@ -97,10 +92,15 @@ def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], 
             candidates.append(FittedObject(rows, fit))
         elif len(rows) > min_points:
             # A cluster that is larger than any road user: its parts at a finer distance.
-            parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
-            fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
-            candidates += [FittedObject(part, fit) for part, fit in fits if fit is not None]
+            candidates += _fit_parts(scan, rows, scan.pattern.azimuth, min_points)
     return candidates
+
+
+def _fit_parts(scan: Scan, rows: Integers, step: float, min_points: int) -> list[FittedObject]:
+    """Return the parts of a cluster at the gaps of rays in this angle [rad] that are not larger than any road user."""
+    parts = [rows[part] for part in clusters(scan.points[rows], step, grazing=False)]
+    fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
+    return [FittedObject(part, fit) for part, fit in fits if fit is not None]
 
 
 def _merge_parts(scan: Scan, candidates: list[FittedObject]) -> list[FittedObject]:
