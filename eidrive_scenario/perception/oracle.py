@@ -24,28 +24,13 @@ class OracleDetector(Detector):
         truth = readings.truth
         if truth is None:
             return Detections(readings.time)
-        count = len(truth.boxes)
-        return Detections(
-            time=readings.time,
-            boxes=truth.boxes,
-            scores=_certain(count),
-            classes=truth.categories,
-            velocity=truth.velocity,
-            covariance=_exact(count),
-        )
+        scores, covariance = _certain(len(truth.boxes))
+        return Detections(readings.time, truth.boxes, scores, truth.categories, truth.velocity, covariance)
 
 
 @lru_cache(maxsize=64)
-def _certain(count: int) -> Array:
-    """Return shared read-only scores (count,) of 1."""
-    scores = np.ones(count)
-    scores.flags.writeable = False
-    return scores
-
-
-@lru_cache(maxsize=64)
-def _exact(count: int) -> Array:
-    """Return shared read-only covariances (count, 2, 2) of 0."""
-    covariance = np.zeros((count, 2, 2))
-    covariance.flags.writeable = False
-    return covariance
+def _certain(count: int) -> tuple[Array, Array]:
+    """Return shared read-only scores (count,) of 1 and covariances (count, 2, 2) of 0."""
+    scores, covariance = np.ones(count), np.zeros((count, 2, 2))
+    scores.flags.writeable = covariance.flags.writeable = False
+    return scores, covariance
