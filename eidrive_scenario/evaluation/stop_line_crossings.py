@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.geometry import segment_distance
-from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, Kind, StopLine, stop_lines
+from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, StopLine, stop_lines
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.signals import Kind
 
 NEAR = 30.0
 """Distance from a point within which stop lines are considered [m]."""

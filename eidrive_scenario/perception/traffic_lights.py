@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
-from eidrive_scenario.sensing.signals import is_give_way_sign, is_stop_sign
-
-Kind = Literal["light", "stop sign", "give way sign"]
+from eidrive_scenario.sensing.signals import Kind, signal_kind
 
 ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
@@ -69,9 +67,9 @@ def stop_lines(roads: RoadNetwork, *, with_give_way: bool = False) -> tuple[Stop
     return tuple(
         line
         for signal in roads.signals.values()
-        if signal.dynamic or is_stop_sign(signal) or (with_give_way and is_give_way_sign(signal))
+        if (kind := signal_kind(signal)) is not None and (with_give_way or kind != "give way sign")
         for place in (signal.place, *signal.references)
-        for line in _lines(roads, signal, place)
+        for line in _lines(roads, signal, kind, place)
     )
 
 
@@ -105,12 +103,11 @@ class SignalsAhead:
                 yield SignalAhead(line.signal, line.kind, distance - progress, state, stop, is_yellow)
 
 
-def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[StopLine]:
+def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -> Iterator[StopLine]:
     """Yield the stop lines of a signal, or of a reference to it, on the lanes for which it is valid."""
     road = roads.roads.get(place.road)
     if road is None:
         return
-    kind: Kind = "light" if signal.dynamic else "stop sign" if is_stop_sign(signal) else "give way sign"
     for number in roads.signal_lanes(place):
         direction = roads.driving_direction(road.id, number)
         beyond = None

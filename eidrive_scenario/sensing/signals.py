@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.view import NOTHING, WorldView
 
+Kind = Literal["light", "stop sign", "give way sign"]
 SIGNAL_KINDS = frozenset({"light", "stop sign"})
+"""Kinds of signals that require a stop, which stations read."""
 
 RANGE = 100.0
 """Maximum distance of readable lights and signs [m]."""
@@ -66,24 +69,15 @@ class SignalSensor:
         return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in visible.tolist())
 
 
-def signal_kind(signal: Signal) -> str | None:
-    """Return one of SIGNAL_KINDS, or None for other signals."""
-    return "light" if signal.dynamic else "stop sign" if is_stop_sign(signal) else None
+_SIGNS: Mapping[str, Kind] = {
+    "206": "stop sign", "R1-1": "stop sign", "205": "give way sign", "R1-2": "give way sign",
+}  # fmt: skip
+"""Kinds of signs by their numbers in the German catalog, which OpenDRIVE files use, and in the American one."""
 
 
-def is_stop_sign(signal: Signal) -> bool:
-    """Return whether a sign requires a stop.
-
-    These are 206 of the German catalog, which OpenDRIVE files use, and R1-1 of the American one.
-    """
-    kind = signal.type.upper()
-    return not signal.dynamic and (kind in ("206", "R1-1") or (kind == "R1" and signal.subtype == "1"))
-
-
-def is_give_way_sign(signal: Signal) -> bool:
-    """Return whether a sign requires to give way.
-
-    These are 205 of the German catalog, which OpenDRIVE files use, and R1-2 of the American one.
-    """
-    kind = signal.type.upper()
-    return not signal.dynamic and (kind in ("205", "R1-2") or (kind == "R1" and signal.subtype == "2"))
+def signal_kind(signal: Signal) -> Kind | None:
+    """Return the kind of a signal; None for signals without right-of-way."""
+    if signal.dynamic:
+        return "light"
+    number = signal.type.upper()
+    return _SIGNS.get(f"R1-{signal.subtype}" if number == "R1" else number)
