@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from eidrive_scenario.sensing.readings import CameraReading, DeferredImage
 from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance, UndrawnImage
+from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -208,40 +208,19 @@ class Camera(Sensor):
         sensor, pose = self._image_sensor, self.mounting.camera_pose(view, row)
         ignored = (*view.unseen_by.get(self.name, ()), *self._ignored)
         undrawn = scene.image(pose, sensor.pinhole, ignore=ignored)
-        conditions = _Conditions(
-            self.settings,
-            scene.weather,
-            pose,
-            view.velocity[row],
-            (*self._key, view.tick),
-            (*self._key, "lens", int(view.time / DROPS_STAY)),
-        )
+        settings, weather, velocity = self.settings, scene.weather, view.velocity[row]
+        # Keys of the random numbers of the noise and falling drops, and of the drops on the lens
+        noise, lens = (*self._key, view.tick), (*self._key, "lens", int(view.time / DROPS_STAY))
+
+        def expose() -> CameraImage:
+            return sensor.develop(undrawn.draw(), weather, pose, generator(*noise), velocity, generator(*lens))
+
         image = DeferredImage(
-            (self.settings.width, self.settings.height),
-            partial(_expose, sensor, undrawn, conditions),
-            lambda: content_digest(undrawn.digest, conditions),
+            (settings.width, settings.height),
+            expose,
+            lambda: content_digest(undrawn.digest, settings, weather, pose, velocity, noise, lens),
         )
-        return CameraReading.of(image, sensor.intrinsics, pose, np.array(self.settings.distortion))
-
-
-class _Conditions(NamedTuple):
-    """Inputs that determine an image in addition to the light in front of the lens.
-
-    velocity     (3,) of the camera [m/s]
-    noise, lens  keys of the random numbers of the noise and falling drops, and of the drops on the lens
-    """
-
-    settings: CameraSettings
-    weather: Weather
-    pose: Array
-    velocity: Array
-    noise: tuple[int, *tuple[str | int, ...]]
-    lens: tuple[int, *tuple[str | int, ...]]
-
-
-def _expose(sensor: ImageSensor, undrawn: UndrawnImage, conditions: _Conditions) -> CameraImage:
-    _, weather, pose, velocity, noise, lens = conditions
-    return sensor.develop(undrawn.draw(), weather, pose, generator(*noise), velocity, generator(*lens))
+        return CameraReading.of(image, sensor.intrinsics, pose, np.array(settings.distortion))
 
 
 class ImageSensor:
