@@ -56,28 +56,24 @@ def turned(points: Array, view: WorldView, rows: Integers, *, upright: bool) -> 
 
 
 def starts_behind_bodies(origins: Array, targets: Array, view: WorldView, rows: Integers) -> Array:
-    """Return starts (P, K, 3) of rays (P, K, 3) behind the bodies (P,) of their sensors, as `ray_starts`."""
-    if view.is_upright:
-        return ray_starts(origins, targets, view.boxes[rows])
-    begin, end = (turned(points, view, rows, upright=True) for points in (origins, targets))
-    return np.asarray(origins + _shares_behind(begin, end, view.boxes[rows])[..., None] * (targets - origins))
+    """Return starts (P, K, 3) of rays (P, K, 3) behind the bodies (P,) of their sensors; unchanged if a ray does not
+    intersect its body."""
+    begin, end = origins, targets
+    if not view.is_upright:
+        begin, end = (turned(points, view, rows, upright=True) for points in (origins, targets))
+    shares = shares_behind(begin, end, view.boxes[rows])
+    return np.asarray(origins + shares[..., None] * (targets - origins))
 
 
-def ray_starts(origins: Array, targets: Array, boxes: Array) -> Array:
-    """Return starts (P, K, 3) of rays (P, K, 3) behind upright boxes (P, 7); unchanged if a ray does not intersect its
-    box."""
-    return np.asarray(origins + _shares_behind(origins, targets, boxes)[..., None] * (targets - origins))
-
-
-def _shares_behind(origins: Array, targets: Array, boxes: Array) -> Array:
-    """Return the shares (P, K) of the rays at which they start."""
+def shares_behind(origins: Array, targets: Array, boxes: Array) -> Array:
+    """Return the shares (P, K) of rays (P, K, 3) at which they leave upright boxes (P, 7); 0 without intersection."""
     enter, leave = crossing(origins, targets, boxes)
     crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
     return np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
 
 
 def few_ray_starts(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
-    """Return the same as `ray_starts` in scalar arithmetic, for a few rays from one origin.
+    """Return starts behind an upright box by `shares_behind` in scalar arithmetic, for a few rays from one origin.
 
     Targets above each other are faster if they are consecutive.
     """

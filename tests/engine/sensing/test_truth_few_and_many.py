@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.sensing.crossing import few_ray_starts, ray_starts
+from eidrive_scenario.sensing.crossing import few_ray_starts, shares_behind
 from eidrive_scenario.sensing.settings import Mount, TruthSettings
 from eidrive_scenario.sensing.truth import (
     TruthSensor,
@@ -27,11 +27,16 @@ point = st.tuples(coordinate, coordinate, coordinate)
 box = st.tuples(coordinate, coordinate, coordinate, length, length, length, st.floats(-7.0, 7.0))
 
 
+def starts_by_arrays(origin: Any, targets: Any, box: Any) -> Any:
+    origins, ends = np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets])
+    return (origins + shares_behind(origins, ends, np.array([box]))[..., None] * (ends - origins))[0]
+
+
 @settings(max_examples=300, deadline=None)
 @given(origin=point, targets=st.lists(point, min_size=1, max_size=12), box=box)
 def test_few_ray_starts_equals_arrays(origin: Any, targets: Any, box: Any) -> None:
     few = few_ray_starts(origin, targets, box)
-    many = ray_starts(np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets]), np.array([box]))[0]
+    many = starts_by_arrays(origin, targets, box)
     np.testing.assert_allclose(np.array(few), many, rtol=0.0, atol=1e-9)
 
 
@@ -40,7 +45,7 @@ def test_few_ray_starts_along_face_equals_arrays() -> None:
     box = (2.0, 1.0, 1.0, 4.0, 2.0, 2.0, 0.0)
     for origin in [(2.0, 1.0, 2.0), (4.0, 1.0, 1.0)]:
         targets = [(9.0, 1.0, 2.0), (9.0, 1.0, 0.0), (-9.0, 1.0, 2.0), (4.0, 7.0, 1.0), (2.0, 1.0, -3.0)]
-        many = ray_starts(np.broadcast_to(origin, (1, 5, 3)), np.array([targets]), np.array([box]))[0]
+        many = starts_by_arrays(origin, targets, box)
         np.testing.assert_allclose(np.array(few_ray_starts(origin, targets, box)), many, atol=1e-12)
 
 
