@@ -36,7 +36,7 @@ class Gnss(Sensor):
     def __init__(self, settings: GnssSettings, spec: ActorSpec, name: str = "gnss", seed: int = 0) -> None:
         super().__init__(settings, spec, name, seed)
         self._key = (seed, "gnss", spec.name, name)
-        self._bias = _RandomWalkBias(self._key, 2, settings.bias, settings.bias_walk)
+        self._bias = _RandomWalkBias(generator(*self._key, "bias"), 2, settings.bias, settings.bias_walk)
         across = settings.position_noise**2 + settings.bias**2
         self._covariance = np.diag([max(v, EXACT**2) for v in (across, across, settings.height_noise**2)])
 
@@ -45,9 +45,7 @@ class Gnss(Sensor):
         position = view.position[row]
         if self.settings.oracle:
             return GnssReading(position, np.eye(3) * EXACT**2)
-        seed, *key = self._key
-        draws = generator(seed, *key, view.tick)
-        settings = self.settings
+        draws, settings = generator(*self._key, view.tick), self.settings
         deviation = (settings.position_noise, settings.position_noise, settings.height_noise)
         measured = position + deviation * draws.standard_normal(3)
         measured[:2] += self._bias.at(view.time, draws)
@@ -68,12 +66,9 @@ class Imu(Sensor):
     def __init__(self, settings: ImuSettings, spec: ActorSpec, name: str = "imu", seed: int = 0) -> None:
         super().__init__(settings, spec, name, seed)
         self._key = (seed, "imu", spec.name, name)
-        self._accelerometer_bias = _RandomWalkBias(
-            (*self._key, "push"), 3, settings.accelerometer_bias, settings.accelerometer_walk
-        )
-        self._gyroscope_bias = _RandomWalkBias(
-            (*self._key, "turn"), 3, settings.gyroscope_bias, settings.gyroscope_walk
-        )
+        push, turn = (generator(*self._key, name, "bias") for name in ("push", "turn"))
+        self._accelerometer_bias = _RandomWalkBias(push, 3, settings.accelerometer_bias, settings.accelerometer_walk)
+        self._gyroscope_bias = _RandomWalkBias(turn, 3, settings.gyroscope_bias, settings.gyroscope_walk)
         self._last: float | None = None
 
     def read(self, scene: Scene, view: WorldView, row: int) -> ImuReading:
@@ -86,8 +81,7 @@ class Imu(Sensor):
         self._last = view.time
         if settings.oracle:
             return ImuReading(acceleration, rates)
-        seed, *key = self._key
-        draws = generator(seed, *key, view.tick)
+        draws = generator(*self._key, view.tick)
         white = draws.standard_normal((2, 3)) / math.sqrt(max(interval, 1e-6))
         return ImuReading(
             acceleration + settings.accelerometer_noise * white[0] + self._accelerometer_bias.at(view.time, draws),
@@ -98,9 +92,8 @@ class Imu(Sensor):
 class _RandomWalkBias:
     """Bias (N,) with a random initial value and random walk: its variance grows by walk² per second."""
 
-    def __init__(self, key: tuple[int | str, ...], axes: int, start: float, walk: float) -> None:
-        seed, *rest = key
-        self._value = start * generator(int(seed), *rest, "bias").standard_normal(axes)
+    def __init__(self, draws: np.random.Generator, axes: int, start: float, walk: float) -> None:
+        self._value = start * draws.standard_normal(axes)
         self._walk = walk
         self._time: float | None = None
 

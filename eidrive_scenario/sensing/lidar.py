@@ -152,8 +152,7 @@ class Lidar(Sensor):
         hits = self._hits(columns, pose, scene, view, row)
         rays = np.flatnonzero(hits.rows != row)
         rows = hits.rows.ravel()[rays]
-        seed, *key = self._key
-        draws = generator(seed, *key, view.tick)
+        draws = generator(*self._key, view.tick)
         weather = scene.weather
         static = ASPHALT + min(2.0 * weather.wetness, 1.0) * (WET_ASPHALT - ASPHALT)
         back = returns(
