@@ -7,11 +7,12 @@ in which `make eval` reads lights. Writes training/out/lamps.npz and its metadat
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.perception.learned.lights import CROP, NONE, SHOWN, LightsOnMap, crops, save
+from eidrive_scenario.perception.learned.lights import CROP, NONE, SHOWN, LightsOnMap, crops
 from training.light_scenes import LightScene, light_scenes
 
 VERSIONS = 12
@@ -158,7 +159,9 @@ def train(data: Samples, seed: int, epochs: int, worlds: int, out: Path) -> None
         },
         "training": {"epochs": epochs, "device": "cpu", "seconds": round(time.perf_counter() - started)},
     }
-    save(out / "lamps.npz", network.weights(), metadata)
+    halves: dict[str, Any] = {name: value.astype(np.float16) for name, value in network.weights().items()}
+    np.savez_compressed(out / "lamps.npz", **halves)
+    (out / "lamps.json").write_text(json.dumps(metadata, indent=1) + "\n", encoding="utf-8")
     print(f"{len(data.states)} image regions; written: {out / 'lamps.npz'}, .json")
 
 

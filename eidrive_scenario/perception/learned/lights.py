@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -88,13 +87,6 @@ def lamp_network() -> LampNetwork:
     """Return the network with the shipped weights."""
     with np.load(WEIGHTS) as stored:
         return LampNetwork({name: stored[name].astype(np.float32) for name in stored.files})
-
-
-def save(path: Path, weights: dict[str, Floats], card: dict[str, Any]) -> None:
-    """Write weights in half precision, and their metadata."""
-    halves: dict[str, Any] = {name: value.astype(np.float16) for name, value in weights.items()}
-    np.savez_compressed(path, **halves)
-    path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
 
 
 def _convolve(features: Floats, kernel: Floats, bias: Floats) -> Floats:
