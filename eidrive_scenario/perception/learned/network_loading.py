@@ -33,8 +33,10 @@ def runtime_of(path: Path, settings: LearnedSettings) -> Runtime:
     return select_runtime(path, settings.runtime, settings.device, settings.precision)
 
 
-def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool) -> None:
-    """Raise SettingError if the weights that the settings select are missing, or are TorchScript without permission of
+def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool) -> tuple[Path, Runtime]:
+    """Return the path of the weights that the settings select, and their runtime.
+
+    Raise SettingError if the weights that the settings select are missing, or are TorchScript without permission of
     the user, and if the runtime is not installed. Nothing is read or imported.
     """
     path = weights_path(name, settings)
@@ -44,6 +46,7 @@ def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     runtime = runtime_of(path, settings)
     if not is_installed(runtime):
         raise missing_runtime(runtime)
+    return path, runtime
 
 
 def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
@@ -51,9 +54,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
 
     Raise SettingError as `check_network`, if the weights are not suitable, and if the device is not available.
     """
-    check_network(name, settings, allow_torchscript=allow_torchscript)
-    path = weights_path(name, settings)
-    runtime = runtime_of(path, settings)
+    path, runtime = check_network(name, settings, allow_torchscript=allow_torchscript)
     if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         return ExternalNetwork(
             path,

@@ -164,18 +164,6 @@ class OwnNetwork(ImageNetwork):
             return image_memory.key_of(self.identity, reading.rgb)
         return self.identity, reading.size, digest
 
-    def find(self, image: NDArray[np.uint8]) -> ImageDetections:
-        memory = image_memory.active()
-        if memory is None:
-            return super().find(image)
-        key = image_memory.key_of(self.identity, image)
-        detections = memory.images.get(key)
-        if detections is None:
-            detections = super().find(image)
-            image_memory.read_only(detections.boxes, detections.scores)
-            memory.images.add(key, detections)
-        return detections
-
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         return self._candidates(self._infer([image])[0])
 

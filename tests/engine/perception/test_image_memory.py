@@ -37,8 +37,11 @@ def network(confidence: float | None = None) -> ImageNetwork:
     return build_network("yolov5", LearnedSettings(confidence=confidence))
 
 
-def image(value: int) -> NDArray[np.uint8]:
-    return np.full((60, 80, 3), value, dtype=np.uint8)
+def image(value: int, width: int = 80) -> CameraReading:
+    """Return a gray image without a digest."""
+    rgb = np.full((60, width, 3), value, dtype=np.uint8)
+    depth, segmentation = np.zeros((60, width), np.float32), np.zeros((60, width), np.int32)
+    return CameraReading(rgb, depth, segmentation, np.eye(3), np.eye(4))
 
 
 def processed_images(used: ImageNetwork, monkeypatch: pytest.MonkeyPatch) -> list[int]:
@@ -57,27 +60,27 @@ def processed_images(used: ImageNetwork, monkeypatch: pytest.MonkeyPatch) -> lis
 def test_equal_images_are_processed_once(memory: ImageMemory, monkeypatch: pytest.MonkeyPatch) -> None:
     first, second = network(), network()
     processed = processed_images(first, monkeypatch)
-    found = first.find(image(10))
-    assert second.find(image(10)) is found
+    found = first.find_in(image(10))
+    assert second.find_in(image(10)) is found
     assert len(processed) == 1
     assert not found.boxes.flags.writeable
-    first.find(image(11))
-    first.find(image(10)[:, :40])
+    first.find_in(image(11))
+    first.find_in(image(10, width=40))
     assert len(processed) == 3, "another content and another size"
-    network(confidence=0.7).find(image(10))
+    network(confidence=0.7).find_in(image(10))
     assert len(processed) == 4, "another minimum confidence"
 
 
 def test_least_recently_used_image_is_removed(memory: ImageMemory, monkeypatch: pytest.MonkeyPatch) -> None:
     used = network()
     for value in (1, 2, 3, 1, 4):
-        used.find(image(value))
+        used.find_in(image(value))
     assert len(memory.images) == 3
     processed = processed_images(used, monkeypatch)
     for value in (1, 3, 4):
-        used.find(image(value))
+        used.find_in(image(value))
     assert processed == []
-    used.find(image(2))
+    used.find_in(image(2))
     assert processed == [1]
 
 
