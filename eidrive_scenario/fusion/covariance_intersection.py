@@ -53,10 +53,10 @@ class CovarianceIntersectionFusion(FusionMethod):
     object exists if at least one report is correct, 1 - prod (1 - r).
     """
 
-    settings_type: ClassVar[type[Settings] | None] = CovarianceIntersectionSettings
+    settings_type: ClassVar[type[CovarianceIntersectionSettings]] = CovarianceIntersectionSettings
 
     def __init__(self, settings: CovarianceIntersectionSettings | None = None) -> None:
-        self.settings = settings or CovarianceIntersectionSettings()
+        self.settings = settings or self.settings_type()
         self._gate = AssociationGate.of(self.settings.gate, self.settings.gate_distance)
         self._history = ReportHistory(self.settings.max_age, self._gate)
         self._aligner = PoseAligner(self._history) if self.settings.align_poses else None

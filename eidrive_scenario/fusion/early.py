@@ -13,7 +13,6 @@ from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
@@ -43,13 +42,13 @@ class EarlyFusion(CovarianceIntersectionFusion):
     intersection. The station reports only objects in its own points, because receivers merge these points themselves.
     """
 
-    settings_type: ClassVar[type[Settings] | None] = EarlyFusionSettings
+    settings_type = EarlyFusionSettings
     settings: EarlyFusionSettings
 
     shares: ClassVar[Literal["points", "features"] | None] = "points"
 
     def __init__(self, settings: EarlyFusionSettings | None = None) -> None:
-        super().__init__(settings or EarlyFusionSettings())
+        super().__init__(settings)
         self._received: dict[str, tuple[float, Array]] = {}
         """Time and points (N, 3) of the newest cloud of each station."""
 

@@ -18,7 +18,6 @@ from eidrive_scenario.base.feature_map import LatentCodec
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
-from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
@@ -90,13 +89,13 @@ class IntermediateFusion(CovarianceIntersectionFusion):
     intersection. The station reports only objects in its own features.
     """
 
-    settings_type: ClassVar[type[Settings] | None] = IntermediateFusionSettings
+    settings_type = IntermediateFusionSettings
     settings: IntermediateFusionSettings
 
     shares: ClassVar[Literal["points", "features"] | None] = "features"
 
     def __init__(self, settings: IntermediateFusionSettings | None = None) -> None:
-        super().__init__(settings or IntermediateFusionSettings())
+        super().__init__(settings)
         self._detector: Detector | None = None
         self._maps = 0
         """Number of maps of this station."""
@@ -310,10 +309,7 @@ class Where2commSettings(IntermediateFusionSettings):
 class Where2commFusion(AttentionFusion):
     """Attention to the most confident cells of other stations (Where2comm: Hu et al., NeurIPS 2022)."""
 
-    settings_type: ClassVar[type[Settings] | None] = Where2commSettings
-
-    def __init__(self, settings: Where2commSettings | None = None) -> None:
-        super().__init__(settings or Where2commSettings())
+    settings_type = Where2commSettings
 
 
 def _smoothed(confidence: Floats) -> Array:

@@ -42,9 +42,7 @@ One lost message about an object at rest, which is reported once per second (ETS
 """
 
 
-def predict(
-    mean: Array, covariance: Array, step: Array, turn: Array, turning: Bools | None = None
-) -> tuple[Array, Array]:
+def predict(mean: Array, covariance: Array, step: Array, turn: Array, turning: Bools) -> tuple[Array, Array]:
     """Return states (N, 4) x y vx vy and covariances (N, 4, 4), predicted by `step` (N,) [s].
 
     The model is white noise acceleration with a coordinated turn of known rate `turn` (N,) [rad/s] (Bar-Shalom, Li and
@@ -52,10 +50,8 @@ def predict(
     be negative if a clock is fast; the uncertainty grows by the same amount.
 
     turning  (N,) whether the equations of a turn are evaluated, which differ from the others by rounding if the rate is
-             0; None: for all if any track turns
+             0
     """
-    if turning is None:
-        turning = np.full(len(turn), turn.any())
     if not turning.any():
         return _predict_straight(mean, covariance, step)
     if turning.all():

@@ -80,11 +80,6 @@ class ReportHistory:
         self._selection: tuple[Integers, Integers] | None = None
         """Result of `select` for the stations in `_order`; None after a change of the rows."""
 
-    @property
-    def stations(self) -> frozenset[str]:
-        """Stations with stored reports."""
-        return frozenset(self._histories)
-
     def add_report(self, report: Report) -> None:
         """Store a report. It is processed at the next `process`."""
         history = self._histories.get(report.station)

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from eidrive_scenario.fusion.prediction import CAR_LENGTH, REPORT_LIFETIME, predict, predictable_time
+from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.fusion import prediction
+from eidrive_scenario.fusion.prediction import CAR_LENGTH, REPORT_LIFETIME, predictable_time
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, ConstantVelocity, Estimates
 
 STATE = np.array([[1.0, 2.0, 10.0, -3.0]])
 SPREAD = np.array([[[0.5, 0.1, 0.02, 0.0], [0.1, 0.4, 0.0, 0.03], [0.02, 0.0, 0.2, 0.05], [0.0, 0.03, 0.05, 0.3]]])
+
+
+def predict(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
+    return prediction.predict(mean, covariance, step, turn, turn != 0.0)
 
 
 def test_predict_without_turn_equals_the_tracker() -> None:

@@ -154,11 +154,11 @@ def test_evict_stale_does_not_change_the_fused_objects(report: Make, monkeypatch
         return lists, fusion
 
     evicting, fusion = fuse_all()
-    assert len(fusion._history.stations) < 12
-    assert len(fusion._history.tracks(tuple(sorted(fusion._history.stations)))) < 12
+    assert len(fusion._history._histories) < 12
+    assert len(fusion._history.tracks(tuple(sorted(fusion._history._histories)))) < 12
     monkeypatch.setattr(ReportHistory, "evict_stale", lambda history, now: None)
     retaining, fusion = fuse_all()
-    assert len(fusion._history.stations) == 60
+    assert len(fusion._history._histories) == 60
     assert max(map(len, evicting)) > 2
     for one, other in zip(evicting, retaining, strict=True):
         assert_equal(one, other)
