@@ -15,7 +15,6 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.v2x.analytic.table import (
     RATIOS,
     REACH,
-    SHADOWING,
     STEP,
     ErrorTable,
     autocorrelation,
@@ -77,18 +76,18 @@ def cv2x_mode4_errors(
     blocks, ratios, block_errors = CODINGS[subchannels]
     noise = NOISE_DBM - 10.0 * np.log10(RESOURCE_BLOCKS / blocks)
     curve = np.interp(RATIOS, ratios, block_errors)
-    errors = errors_over(signal(received_power(distance), SHADOWING, SENSING), curve)
-    propagation = errors @ interference(np.array([NO_INTERFERENCE]), SHADOWING, noise)[0]  # (13)
-    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING, SHADOWING)  # (10)
+    errors = errors_over(signal(received_power(distance), SENSING), curve)
+    propagation = errors @ interference(np.array([NO_INTERFERENCE]), noise)[0]  # (13)
+    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING)  # (10)
 
     to_receiver = interferer_positions(density)
     to_sender = np.abs(to_receiver + distance[:, None])
-    with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, noise).T  # (17)
+    with_interferer = errors @ interference(received_power(to_receiver), noise).T  # (17)
     destroys = loss_by_interferer(with_interferer, propagation)  # (18)
 
     resources = subchannels * 1000.0 / rate  # (28)
     power_by_distance = received_power(np.arange(-REACH, REACH + 1.0))
-    sensed = sensed_share(power_by_distance, SENSING, SHADOWING)  # (11)
+    sensed = sensed_share(power_by_distance, SENSING)  # (11)
     in_reach = density * float(sensed.sum())  # (29.1)
     overlap = autocorrelation(sensed)  # (30.2)
 
@@ -101,7 +100,7 @@ def cv2x_mode4_errors(
         common = overlap / overlap[0] * (density * excluded * overlap[0] / in_reach - apart) + apart
         candidates = CANDIDATE_SHARE * resources
         both = (resources - 2.0 * excluded + common) * (candidates / (resources - excluded)) ** 2
-        unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received_power(to_sender), threshold, SHADOWING)
+        unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received_power(to_sender), threshold)
         chosen = unaware * both[np.floor(to_sender + 0.5).astype(np.int64)] / candidates**2
         lost: Array = 1.0 - np.prod(1.0 - chosen * destroys, axis=1)
         return lost
@@ -133,7 +132,7 @@ def _raise_threshold(power: Array, density: float, resources: float) -> tuple[fl
     """Raise the threshold [dBm] until enough candidates remain (step 3); return it and the excluded resources (32)."""
     threshold = SENSING
     while True:
-        in_reach = 2.0 * density * float(sensed_share(power, threshold, SHADOWING).sum())
+        in_reach = 2.0 * density * float(sensed_share(power, threshold).sum())
         excluded = _count_excluded(in_reach, resources)
         if resources - excluded >= CANDIDATE_SHARE * resources:
             return threshold, excluded

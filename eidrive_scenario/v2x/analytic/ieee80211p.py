@@ -13,7 +13,6 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.v2x.analytic.table import (
     RATIOS,
     REACH,
-    SHADOWING,
     ErrorTable,
     autocorrelation,
     errors_over,
@@ -71,7 +70,7 @@ def ieee80211p_errors(
         return power - winner_b1(meters, FREQUENCY, height, height)
 
     duration = airtime(size, bit_rate)
-    sensed = sensed_share(received_power(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)
+    sensed = sensed_share(received_power(np.arange(-REACH, REACH + 1.0)), SENSING)  # (13)
     unsaturated = offered_load(density, rate, size, power, bit_rate, height)
     square, linear, constant = FIT
     channel_busy_ratio = square * unsaturated**2 + linear * unsaturated + constant  # (35)
@@ -79,17 +78,17 @@ def ieee80211p_errors(
     overlap /= overlap.max()  # (20)
 
     curve = np.interp(RATIOS + 10.0 * np.log10(BANDWIDTH / bit_rate), *FRAME_ERRORS)
-    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING, SHADOWING)  # (12)
-    errors = errors_over(signal(received_power(distance), SHADOWING, SENSING), curve)
+    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING)  # (12)
+    errors = errors_over(signal(received_power(distance), SENSING), curve)
     propagation = errors @ noise_alone(NOISE_DBM)[0]  # (24)
 
     to_receiver = interferer_positions(density)
     to_sender = np.abs(to_receiver + distance[:, None])
     closer = np.abs(to_receiver) < np.abs(distance)[:, None]
-    with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, NOISE_DBM).T  # (30)
+    with_interferer = errors @ interference(received_power(to_receiver), NOISE_DBM).T  # (30)
     destroys = loss_by_interferer(with_interferer, propagation)  # (31)
-    at_receiver = sensed_share(received_power(to_receiver), SENSING, SHADOWING)
-    senses = sensed_share(received_power(to_sender), SENSING, SHADOWING)
+    at_receiver = sensed_share(received_power(to_receiver), SENSING)
+    senses = sensed_share(received_power(to_sender), SENSING)
     share = rate / (1.0 - channel_busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
     same_slot = SLOT * share * senses  # (22)
     hidden = duration * share * (1.0 - senses)  # (18)
@@ -104,7 +103,7 @@ def ieee80211p_errors(
 def offered_load(density: float, rate: float, size: int, power: float, bit_rate: float, height: float) -> float:
     """Return the channel busy ratio without overlap of transmissions (34); `height` is the antenna height [m]."""
     received = power - winner_b1(np.arange(-REACH, REACH + 1.0), FREQUENCY, height, height)
-    return density * rate * airtime(size, bit_rate) * float(sensed_share(received, SENSING, SHADOWING).sum())
+    return density * rate * airtime(size, bit_rate) * float(sensed_share(received, SENSING).sum())
 
 
 def _any(probability: Array) -> Array:

@@ -70,18 +70,17 @@ REACH, FARTHEST_INTERFERER = 1500, 1000
 """Maximum distances at which vehicles contribute to the load and interfere [m]."""
 
 
-def sensed_share(power: Array, threshold: float, spread: float) -> Array:
-    """Return the share of packets above the threshold, by mean power and spread of the shadowing [dBm, dB]."""
-
+def sensed_share(power: Array, threshold: float) -> Array:
+    """Return the share of packets above the threshold, by mean power [dBm]."""
     from scipy.special import erf
 
-    share: Array = 0.5 * (1.0 + erf((power - threshold) / (spread * math.sqrt(2.0))))
+    share: Array = 0.5 * (1.0 + erf((power - threshold) / (SHADOWING * math.sqrt(2.0))))
     return share
 
 
-def signal(power: Array, spread: float, threshold: float) -> Array:
+def signal(power: Array, threshold: float) -> Array:
     """Return the power distribution (D, L) of the sensed packets, for mean powers (D,) [dBm]."""
-    density = np.exp(-0.5 * ((LEVELS - power[:, None]) / spread) ** 2)
+    density = np.exp(-0.5 * ((LEVELS - power[:, None]) / SHADOWING) ** 2)
     density[:, threshold > LEVELS] = 0.0
     return _normalize(density)
 
@@ -93,11 +92,11 @@ def noise_alone(noise: float) -> Array:
     return density
 
 
-def interference(power: Array, spread: float, noise: float) -> Array:
+def interference(power: Array, noise: float) -> Array:
     """Return the distribution (I, L) of noise plus one shadowed interferer, for mean powers (I,) [dBm]."""
     total = 10.0 ** (LEVELS[noise < LEVELS] / 10.0)
     alone = total - 10.0 ** (noise / 10.0)
-    exponent = -0.5 * ((10.0 * np.log10(alone) - power[:, None]) / spread) ** 2
+    exponent = -0.5 * ((10.0 * np.log10(alone) - power[:, None]) / SHADOWING) ** 2
     density = np.zeros((len(power), len(LEVELS)))
     density[:, noise < LEVELS] = total / alone * np.exp(exponent)
     return _normalize(density)
