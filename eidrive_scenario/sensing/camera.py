@@ -40,41 +40,12 @@ def lens_of(settings: CameraSettings) -> Pinhole:
     return Pinhole.of_fov(settings.width, settings.height, fov, settings.near, settings.far)
 
 
-class Optics:
-    """Distortion of an undistorted image with a sufficiently large field of view."""
-
-    def __init__(self, settings: CameraSettings) -> None:
-        self._distortion = _distortion(settings) if any(settings.distortion) else None
-        self._supersampling = settings.supersampling
-        straight = lens_of(settings) if self._distortion is None else self._distortion.straight
-        self.pinhole = straight.finer(self._supersampling)
-        """Camera of the image that `distort` expects."""
-
-    def distort(self, radiance: Radiance) -> Radiance:
-        """Return the image of the lens; depth and segmentation are those of the nearest ray, not interpolated."""
-
-        import cv2
-
-        luminance: Any
-        luminance, depth, segmentation = radiance
-        if self._supersampling > 1:
-            size = (self.pinhole.width // self._supersampling, self.pinhole.height // self._supersampling)
-            luminance = cv2.resize(luminance, size, interpolation=cv2.INTER_AREA)
-            middle = slice(self._supersampling // 2, None, self._supersampling)
-            depth, segmentation = depth[middle, middle], segmentation[middle, middle]
-        if self._distortion is not None:
-            x, y = self._distortion.x, self._distortion.y
-            luminance = cv2.remap(luminance, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-            row, column = np.rint(y).astype(np.intp), np.rint(x).astype(np.intp)
-            depth, segmentation = depth[row, column], segmentation[row, column]
-        return Radiance(luminance, depth, segmentation)
-
-
 @lru_cache(maxsize=32)
 def _distortion(settings: CameraSettings) -> _Distortion:
     """Return the direction of each pixel center, found by iteration to 1e-9.
 
-    Raise SettingError if the iteration does not converge, as with strong coefficients that compensate each other.
+    Raise SettingError if a direction does not project within a tenth of a pixel of its center: strong coefficients that
+    compensate each other do not converge.
     """
 
     import cv2
@@ -86,25 +57,16 @@ def _distortion(settings: CameraSettings) -> _Distortion:
     same = np.eye(3)
     undistorted = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
     rays = np.asarray(undistorted, dtype=float)[:, 0]
-    _check_convergence(rays, pixels[:, 0], lens, settings)
+    none, along = np.zeros(3), np.column_stack([rays, np.ones(len(rays))])
+    projected = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0]
+    if not np.abs(projected - pixels).max() < 0.1:
+        what = f"distortion: the coefficients cannot be inverted (got {list(settings.distortion)})"
+        raise SettingError(Diagnostic(what, "use smaller coefficients or a smaller fov"))
     low, high = rays.min(axis=0) * lens.focal - 1.0, rays.max(axis=0) * lens.focal + 1.0
     (left, top), (right, bottom) = np.floor(low), np.ceil(high)
     straight = Pinhole(int(right - left), int(bottom - top), lens.focal, -left, -top, lens.near, lens.far)
     places = (rays * lens.focal - (left, top) - 0.5).astype(np.float32).reshape(lens.height, lens.width, 2)
     return _Distortion(straight, np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1]))
-
-
-def _check_convergence(rays: Array, pixels: Array, lens: Pinhole, settings: CameraSettings) -> None:
-    """Raise SettingError unless each direction (N, 2) projects within a tenth of a pixel of its position (N, 2)."""
-
-    import cv2
-
-    along = np.column_stack([rays, np.ones(len(rays))])
-    none = np.zeros(3)
-    projected = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]
-    if not np.abs(projected - pixels).max() < 0.1:
-        what = f"distortion: the coefficients cannot be inverted (got {list(settings.distortion)})"
-        raise SettingError(Diagnostic(what, "use smaller coefficients or a smaller fov"))
 
 
 LENS = 0.65
@@ -201,7 +163,7 @@ class Camera(Sensor):
     def check_settings(cls, settings: SensorSettings) -> None:
         """Raise SettingError if the distortion of the lens cannot be inverted."""
         if isinstance(settings, CameraSettings):
-            Optics(settings)
+            ImageSensor(settings)
 
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
         """Return an image from the actor in this row."""
@@ -224,15 +186,16 @@ class Camera(Sensor):
 
 
 class ImageSensor:
-    """Image sensor with these camera settings that captures images at any pose."""
+    """Image sensor with these camera settings, behind their lens, that captures images at any pose."""
 
     def __init__(self, settings: CameraSettings) -> None:
         self.settings = settings
         self._lens = lens_of(settings)
         self.intrinsics = self._lens.intrinsics
-        self._optics = Optics(settings)
-        self.pinhole = self._optics.pinhole
-        """Camera of the light that `develop` expects."""
+        self._distortion = _distortion(settings) if any(settings.distortion) else None
+        straight = self._lens if self._distortion is None else self._distortion.straight
+        self.pinhole = straight.finer(settings.supersampling)
+        """Camera of the light that `develop` expects, undistorted and with a sufficiently large field of view."""
 
     def capture(
         self,
@@ -265,10 +228,30 @@ class ImageSensor:
     ) -> CameraImage:
         """Return the image of the light that reaches the camera `pinhole`, with the arguments of `capture`."""
         settings = self.settings
-        radiance = self._optics.distort(radiance)
+        radiance = self.distort(radiance)
         draw_precipitation(radiance.luminance, weather, pose, self._lens, draws, velocity)
         if lens is not None and settings.lens_drops:
             draw_drops_on_lens(radiance.luminance, weather, lens)
         exposure = meter_exposure(radiance.luminance, settings)
         rgb = develop(radiance.luminance, exposure, settings.noise, draws)
         return CameraImage(rgb, radiance.depth, radiance.segmentation)
+
+    def distort(self, radiance: Radiance) -> Radiance:
+        """Return the image of the lens; depth and segmentation are those of the nearest ray, not interpolated."""
+
+        import cv2
+
+        luminance: Any
+        supersampling = self.settings.supersampling
+        luminance, depth, segmentation = radiance
+        if supersampling > 1:
+            size = (self.pinhole.width // supersampling, self.pinhole.height // supersampling)
+            luminance = cv2.resize(luminance, size, interpolation=cv2.INTER_AREA)
+            middle = slice(supersampling // 2, None, supersampling)
+            depth, segmentation = depth[middle, middle], segmentation[middle, middle]
+        if self._distortion is not None:
+            x, y = self._distortion.x, self._distortion.y
+            luminance = cv2.remap(luminance, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            row, column = np.rint(y).astype(np.intp), np.rint(x).astype(np.intp)
+            depth, segmentation = depth[row, column], segmentation[row, column]
+        return Radiance(luminance, depth, segmentation)

@@ -21,7 +21,6 @@ from eidrive_scenario.sensing.camera import (
     Camera,
     Exposure,
     ImageSensor,
-    Optics,
     develop,
     lens_of,
     meter_exposure,
@@ -69,7 +68,7 @@ def test_capture_projects_corners_like_opencv(distortion: Any, place: tuple[floa
 def test_distort_pixel_directions_agree_with_opencv() -> None:
     """The colors of the image are ray directions; the lens distorts them as OpenCV does."""
     settings = CameraSettings(width=160, height=120, fov=100, distortion=BARREL)
-    optics = Optics(settings)
+    optics = ImageSensor(settings)
     pinhole = optics.pinhole
     rows, columns = np.indices((pinhole.height, pinhole.width), dtype=np.float32) + 0.5
     rays = np.stack([(columns - pinhole.center_x) / pinhole.focal, (rows - pinhole.center_y) / pinhole.focal], axis=-1)
@@ -109,7 +108,7 @@ def test_camera_settings_with_large_undistorted_image_are_refused() -> None:
 def test_optics_with_non_invertible_distortion_raises() -> None:
     settings = CameraSettings(width=64, height=48, fov=139.363, distortion=(0.0, 0.977637, 0.0, 0.271634, -0.110679))
     with pytest.raises(SettingError, match="cannot be inverted"):
-        Optics(settings)
+        ImageSensor(settings)
 
 
 def test_optics_of_random_distortions_are_exact_or_refused() -> None:
@@ -122,7 +121,7 @@ def test_optics_of_random_distortions_are_exact_or_refused() -> None:
             settings = CameraSettings(
                 width=32, height=24, fov=draw.uniform(10.0, 170.0), distortion=tuple(coefficients)
             )
-            pinhole = Optics(settings).pinhole
+            pinhole = ImageSensor(settings).pinhole
         except (ValidationError, SettingError):
             refused += 1
             continue
@@ -135,7 +134,7 @@ def test_supersampling_averages_finer_pixels() -> None:
         world.add(CRATE, Placement(4.0, 0.5))
         fine = CameraSettings(width=80, height=60, fov=70, supersampling=2)
         pinhole = lens_of(fine)
-        radiance = Optics(fine).distort(world.radiance(level(), Optics(fine).pinhole))
+        radiance = ImageSensor(fine).distort(world.radiance(level(), ImageSensor(fine).pinhole))
         double = world.radiance(level(), pinhole.finer(2)).luminance
     np.testing.assert_allclose(radiance.luminance, double.reshape(60, 2, 80, 2, 3).mean(axis=(1, 3)), rtol=1e-4)
     assert radiance.depth.shape == (60, 80)
