@@ -134,9 +134,7 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
         "highFrequencyContainer": (
             "basicVehicleContainerHighFrequency",
             {
-                "heading": _heading(state.yaw),
-                "speed": {"speedValue": _clamp(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
-                "driveDirection": "forward" if state.speed >= 0.0 else "backward",
+                **_motion(state),
                 "vehicleLength": {
                     "vehicleLengthValue": _clamp(length * 10.0, 1, 1022),
                     "vehicleLengthConfidenceIndication": "unavailable",
@@ -178,14 +176,7 @@ def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
         "numberOfPerceivedObjects": min(len(detections), 255),
     }
     if station != ROADSIDE:
-        parameters["stationDataContainer"] = (
-            "originatingVehicleContainer",
-            {
-                "heading": _heading(state.yaw),
-                "speed": {"speedValue": _clamp(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
-                "driveDirection": "forward" if state.speed >= 0.0 else "backward",
-            },
-        )
+        parameters["stationDataContainer"] = ("originatingVehicleContainer", _motion(state))
     if sensors:
         sectors = (message.sensors or ())[:sensors]
         parameters["sensorInformationContainer"] = [
@@ -270,9 +261,13 @@ def _position(state: StationState) -> dict[str, Any]:
     }
 
 
-def _heading(yaw: float) -> dict[str, int]:
-    """Return the heading, clockwise from north (the y axis)."""
-    return {"headingValue": _tenths_of_degrees(math.pi / 2.0 - yaw), "headingConfidence": 127}
+def _motion(state: StationState) -> dict[str, Any]:
+    """Return the heading, clockwise from north (the y axis), and the speed."""
+    return {
+        "heading": {"headingValue": _tenths_of_degrees(math.pi / 2.0 - state.yaw), "headingConfidence": 127},
+        "speed": {"speedValue": _clamp(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+        "driveDirection": "forward" if state.speed >= 0.0 else "backward",
+    }
 
 
 def _distance(meters: float) -> dict[str, int]:
