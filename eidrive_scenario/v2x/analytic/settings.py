@@ -52,7 +52,7 @@ class Ieee80211pLoss(Settings):
 
     def table(self) -> ErrorTable:
         """Return the error probabilities by distance."""
-        return _ieee80211p(self)
+        return _table(self)
 
 
 class Cv2xMode4Loss(Settings):
@@ -84,33 +84,17 @@ class Cv2xMode4Loss(Settings):
 
     def table(self) -> ErrorTable:
         """Return the error probabilities by distance."""
-        return _cv2x_mode4(self)
+        return _table(self)
 
 
-def _distances() -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
-
-
-@cache
-def _ieee80211p(loss: Ieee80211pLoss) -> ErrorTable:
-    return ieee80211p_errors(
-        _distances(),
-        density=loss.density,
-        rate=loss.rate,
-        size=loss.size,
-        power=loss.power_dbm,
-        bit_rate=loss.data_rate_mbps * 1e6,
-        environment_height=loss.environment_height,
-    )
+_DISTANCES = np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
 
 
 @cache
-def _cv2x_mode4(loss: Cv2xMode4Loss) -> ErrorTable:
-    return cv2x_mode4_errors(
-        _distances(),
-        density=loss.density,
-        rate=loss.rate,
-        power=loss.power_dbm,
-        subchannels=loss.subchannels,
-        environment_height=loss.environment_height,
-    )
+def _table(loss: Ieee80211pLoss | Cv2xMode4Loss) -> ErrorTable:
+    traffic = {"density": loss.density, "rate": loss.rate, "power": loss.power_dbm}
+    height = loss.environment_height
+    if isinstance(loss, Cv2xMode4Loss):
+        return cv2x_mode4_errors(_DISTANCES, **traffic, subchannels=loss.subchannels, environment_height=height)
+    bit_rate = loss.data_rate_mbps * 1e6
+    return ieee80211p_errors(_DISTANCES, **traffic, size=loss.size, bit_rate=bit_rate, environment_height=height)
