@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.geometry import rotation_matrix
-from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, STOP_SIGN
 from eidrive_scenario.rendering.meshes import actor_mesh
 from eidrive_scenario.rendering.meshes.signs import sign_face
 from eidrive_scenario.roads.model.signal_states import lamp_colors, lamps, lit
@@ -61,7 +61,7 @@ def actor_labels(
     counts = np.bincount(segmentation[segmentation >= 0], minlength=len(view.names))
     labels = []
     for index in np.flatnonzero(counts).tolist():
-        name = image_class(view.categories[index])
+        name = view.categories[index].replace("van", "car")  # the networks do not distinguish them
         if view.names[index] in skipped or name not in IMAGE_CLASSES:
             continue
         lines, columns = np.nonzero(segmentation == index)

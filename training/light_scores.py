@@ -34,7 +34,8 @@ def readings(networks: Mapping[str, ImageNetwork], scenes: Iterable[LightScene])
         read = {"lamps alone": {light.id: light.state for light in lights.read({}, cameras)}}
         for name, network in networks.items():
             images: dict[str, ImageDetections] = {"camera": network.find(scene.reading.rgb)}
-            read[f"{name} alone"] = {light.id: light.state for light in lights.by_class(images, cameras)}
+            by_class = lights.match(images["camera"], scene.reading) if lights.ids else {}
+            read[f"{name} alone"] = {lights.ids[row]: state for row, (_, state) in by_class.items()}
             read[f"{name} and lamps"] = {light.id: light.state for light in lights.read(images, cameras)}
         for light in scene.lights:
             states = {method: _merge_red(of.get(light.id, "")) for method, of in sorted(read.items())}

@@ -35,11 +35,6 @@ _VEHICLES = (*VEHICLES, "van")
 _SAME_AS = {"van": "car", "person": "pedestrian", "motorcycle": "motorbike"}
 
 
-def image_class(category: str) -> str:
-    """Return the class of the image detectors for this actor category; a van is a car."""
-    return _SAME_AS.get(category, category)
-
-
 def object_category(name: str) -> str | None:
     """Return the class out of eidrive_scenario.base.detections.CLASSES for a network class; None for other things."""
     if name in CLASSES:

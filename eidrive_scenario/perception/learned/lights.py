@@ -136,7 +136,8 @@ class LightsOnMap:
     def __init__(self, roads: RoadNetwork | None) -> None:
         heads = [] if roads is None else signal_heads(roads)
         heads = [head for head in heads if signal_kind(head.signal) in SIGNAL_KINDS]
-        self._ids = [head.signal.id for head in heads]
+        self.ids = [head.signal.id for head in heads]
+        """Ids of the signals, in the order of the map."""
         self._dynamic: Bools = np.array([head.signal.dynamic for head in heads], dtype=bool)
         self._feet = np.array([head.pose[:3] for head in heads], dtype=float).reshape(-1, 3)
         self._heights = np.array([head.height for head in heads], dtype=float)
@@ -151,22 +152,12 @@ class LightsOnMap:
     ) -> tuple[SignalReading, ...]:
         """Return the visible signals of the map, each once with its most certain state, in the order of the map."""
         best: dict[int, tuple[float, str]] = {}
-        for name, camera in cameras.items() if self._ids else ():
-            boxes = self._match(detected[name], camera) if name in detected else {}
+        for name, camera in cameras.items() if self.ids else ():
+            boxes = self.match(detected[name], camera) if name in detected else {}
             for row, (score, state) in (boxes | self._lamp_states(camera, boxes)).items():
                 if row not in best or score > best[row][0]:
                     best[row] = (score, state)
-        return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
-
-    def by_class(
-        self, detected: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
-    ) -> tuple[SignalReading, ...]:
-        """Return the same from the classes of the boxes alone."""
-        best: dict[int, tuple[float, str]] = {}
-        for name, detections in detected.items() if self._ids else ():
-            for row, candidate in self._match(detections, cameras[name]).items():
-                best[row] = max(best.get(row, candidate), candidate)
-        return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
+        return tuple(SignalReading(self.ids[row], best[row][1]) for row in sorted(best))
 
     def in_view(self, camera: CameraReading) -> list[LightView]:
         """Return the lights within range and within the image that face the camera."""
@@ -181,7 +172,7 @@ class LightsOnMap:
         centers, heights = (low + high) / 2.0, np.abs(low - high)[:, 1]
         inside = ((centers >= 0.0) & (centers < camera.size)).all(axis=1) & (heights >= LEAST_HEIGHT)
         return [
-            LightView(int(rows[k]), self._ids[rows[k]], (float(centers[k, 0]), float(centers[k, 1])), float(heights[k]))
+            LightView(int(rows[k]), self.ids[rows[k]], (float(centers[k, 0]), float(centers[k, 1])), float(heights[k]))
             for k in np.flatnonzero(inside).tolist()
         ]
 
@@ -206,7 +197,7 @@ class LightsOnMap:
                 states[view.row] = (float(likely[index]), SHOWN[index])
         return states
 
-    def _match(self, detections: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
+    def match(self, detections: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
         """Return score and state of the box with the highest score for each signal, by its row."""
         positions, _ = pixels(self._feet + self._heights[:, None] * (0.0, 0.0, 0.5), camera)
         matches: dict[int, tuple[float, str]] = {}

@@ -8,7 +8,6 @@ import pytest
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.perception.learned.image_network import (
     IMAGE_CLASSES,
-    image_class,
     light_state,
     object_category,
     suppression_groups,
@@ -92,8 +91,6 @@ def test_suppression_groups_merge_vehicle_classes_and_light_states() -> None:
 
 
 def test_class_names_map_to_image_classes_categories_and_light_states() -> None:
-    assert image_class("van") == "car"
-    assert image_class("truck") == "truck"
     assert object_category("person") == "pedestrian"
     assert object_category("stop sign") is None
     assert light_state("traffic light yellow") == "yellow"
