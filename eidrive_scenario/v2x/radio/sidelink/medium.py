@@ -19,7 +19,7 @@ from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Trans
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
-from eidrive_scenario.v2x.radio.sidelink.sensing import ControlChannel, Pdu, SensingHistory
+from eidrive_scenario.v2x.radio.sidelink.sensing import ControlChannel, Pdus, SensingHistory
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 
@@ -232,37 +232,31 @@ class Sidelink(MediumAccess):
     def _sense_window(self, ended: int) -> None:
         """Evaluate sensing of transmissions before subframe `ended`, at most one sensing window."""
         due = [
-            Pdu(subframe, sending.row, sending.transmission)
+            (subframe, sending.row, sending.transmission)
             for sending in self._sending
             for subframe in range(sending.subframe, min(sending.end, ended))
         ]
         for sending in self._sending:
             sending.subframe = max(sending.subframe, ended)
         self._sending = [sending for sending in self._sending if sending.subframe < sending.end]
-        due.sort(key=lambda pdu: (pdu.subframe, pdu.row))
-        rows = np.array([pdu.row for pdu in due])
-        widths = np.array([pdu.transmission.bands for pdu in due])
-        blocks = np.array([self._settings.pssch_blocks(width) for width in widths.tolist()])[:, None]
-        power = self.power[rows]
-        for index, pdu in enumerate(due):
-            if pdu.transmission.gain is not None:
-                power[index] += pdu.transmission.gain
+        pdus = Pdus.of(sorted(due, key=lambda part: part[:2]))
+        blocks = np.array([self._settings.pssch_blocks(width) for width in pdus.widths.tolist()])[:, None]
+        power = self.power[pdus.rows]
+        for index, transmission in enumerate(pdus.transmissions):
+            if transmission.gain is not None:
+                power[index] += transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
-        self._history.proceed(due[-1].subframe + 1)
-        busy, unmeasured = self._history.busy(
-            self._history.receive(due, milliwatts / widths[:, None]), self._busy_above
-        )
+        self._history.proceed(int(pdus.subframes[-1]) + 1)
+        received = self._history.receive(pdus, milliwatts / pdus.widths[:, None])
+        busy, unmeasured = self._history.busy(received, self._busy_above)
         self._period_busy += SUBFRAME * busy
         self._period_unmeasured += SUBFRAME * unmeasured
-        codes = self._control.decode(due, milliwatts / blocks, self._keys)
-        for pdu, code in zip(due, codes, strict=True):
-            before = pdu.transmission.control
-            pdu.transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
+        codes = self._control.decode(pdus, milliwatts / blocks, self._keys)
+        for transmission, code in zip(pdus.transmissions, codes, strict=True):
+            before = transmission.control
+            transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
         codes[power < self.sensing_dbm] = PROPAGATION
-        rsrp = power - 10.0 * np.log10(SUBCARRIERS * blocks)
-        reserving = [index for index, pdu in enumerate(due) if pdu.transmission.reserves]
-        if reserving:
-            self._history.reserve([due[index] for index in reserving], codes[reserving], rsrp[reserving])
+        self._history.reserve(pdus, codes, power - 10.0 * np.log10(SUBCARRIERS * blocks))
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period

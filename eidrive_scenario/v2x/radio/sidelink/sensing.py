@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,27 @@ BOOST = 2.0
 """Power ratio of resource elements of the control channel and of the data: 3 dB (3GPP TS 36.213, 14.2)."""
 
 
-@dataclass(frozen=True)
-class Pdu:
-    """Part of a transmission in one subframe."""
+class Pdus(NamedTuple):
+    """Parts (T,) of transmissions in one subframe each, in the order of the subframes.
 
-    subframe: int
-    row: int
-    transmission: Transmission
+    rows           of the senders
+    bands, widths  first subchannel and number of subchannels
+    numbers        of the messages
+    """
+
+    transmissions: Sequence[Transmission]
+    subframes: Integers
+    rows: Integers
+    bands: Integers
+    widths: Integers
+    numbers: Integers
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[int, int, Transmission]]) -> Pdus:
+        """Return at least one part, given by subframe, row of the sender and transmission."""
+        subframes, rows, transmissions = zip(*parts, strict=True)
+        columns = [(each.first_band, each.bands, each.message.number) for each in transmissions]
+        return cls(transmissions, np.array(subframes), np.array(rows), *np.array(columns, dtype=np.int64).T)
 
 
 @dataclass(frozen=True)
@@ -39,7 +54,7 @@ class ControlChannel:
     block_noise: float
     curve: ErrorCurve
 
-    def decode(self, pdus: Sequence[Pdu], per_block: Array, keys: Keys) -> Codes:
+    def decode(self, pdus: Pdus, per_block: Array, keys: Keys) -> Codes:
         """Return the outcome of the SCI of each PDU at each station (T, N): DELIVERED, PROPAGATION or COLLISION.
 
         The control channel is in the first subchannel of its transmission; other users of this subchannel interfere.
@@ -47,11 +62,8 @@ class ControlChannel:
         per_block  (T, N) received power of each PDU in one resource block of its data [mW]
         keys       (N, N) keys of the links, by sender and receiver
         """
-        subframes, rows = (np.array([getattr(pdu, name) for pdu in pdus]) for name in ("subframe", "row"))
-        first = np.array([pdu.transmission.first_band for pdu in pdus])
-        last = first + np.array([pdu.transmission.bands for pdu in pdus])
-        numbers = np.array([pdu.transmission.message.number for pdu in pdus])[:, None]
-        draws = uniforms(keys[rows], numbers)
+        subframes, first, last = pdus.subframes, pdus.bands, pdus.bands + pdus.widths
+        draws = uniforms(keys[pdus.rows], pdus.numbers[:, None])
         signal = BOOST * per_block
         codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
         meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
@@ -82,60 +94,56 @@ CAPACITY = 256
 
 @dataclass
 class Reservations:
-    """Decoded control information of the last `span` subframes that reserves resources, in columns of R entries.
+    """Decoded control information of the last `span` subframes that reserves resources.
 
-    subframes, bands, widths  (R,) subframe, first subchannel and number of subchannels
-    rsrp                      (R, N) PSSCH-RSRP [dBm]; -inf if not decoded
+    resources  (R, 3) subframe, first subchannel and number of subchannels
+    rsrp       (R, N) PSSCH-RSRP [dBm]; -inf if not decoded
     """
 
     stations: int
     span: int
-    subframes: Integers = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
-    bands: Integers = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
-    widths: Integers = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    resources: Integers = field(default_factory=lambda: np.zeros((CAPACITY, 3), dtype=np.int64))
     begin: int = 0
     end: int = 0
 
     def __post_init__(self) -> None:
         self.rsrp = np.full((CAPACITY, self.stations), NOT_DECODED, dtype=np.float32)
 
-    def add(self, subframes: Integers, bands: Integers, widths: Integers, rsrp: Array) -> None:
+    def add(self, resources: Integers, rsrp: Array) -> None:
         """Append entries, in the order of their subframes."""
-        count = len(subframes)
-        if self.end + count > len(self.subframes):
-            self._grow(count, int(subframes[0]))
+        count = len(resources)
+        if self.end + count > len(self.resources):
+            self._grow(count, int(resources[0, 0]))
         rows = slice(self.end, self.end + count)
-        self.subframes[rows], self.bands[rows], self.widths[rows] = subframes, bands, widths
-        self.rsrp[rows] = rsrp
+        self.resources[rows], self.rsrp[rows] = resources, rsrp
         self.end += count
 
     def of(self, row: int, now: int) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
         """Return subframes, bands, widths and PSSCH-RSRP decoded by a station in the span before subframe `now`."""
-        self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
+        self._forget(now)
         rsrp = self.rsrp[self.begin : self.end, row]
         decoded = np.flatnonzero(rsrp > NOT_DECODED)
-        rows = decoded + self.begin
-        return self.subframes[rows], self.bands[rows], self.widths[rows], rsrp[decoded]
+        subframes, bands, widths = self.resources[decoded + self.begin].T
+        return subframes, bands, widths, rsrp[decoded]
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
         self.rsrp = reorder_rows(self.rsrp, rows, NOT_DECODED)
         self.stations = len(rows)
 
+    def _forget(self, now: int) -> None:
+        self.begin += int(np.searchsorted(self.resources[self.begin : self.end, 0], now - self.span))
+
     def _grow(self, count: int, now: int) -> None:
-        self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
-        live = slice(self.begin, self.end)
-        kept = self.end - self.begin
-        size = len(self.subframes)
+        self._forget(now)
+        live, kept = slice(self.begin, self.end), self.end - self.begin
+        size = len(self.resources)
         while kept + count > size // 2:
             size *= 2
-        for name in ("subframes", "bands", "widths"):
-            column = np.zeros(size, dtype=np.int64)
-            column[:kept] = getattr(self, name)[live]
-            setattr(self, name, column)
+        resources = np.zeros((size, 3), dtype=np.int64)
         rsrp = np.full((size, self.stations), NOT_DECODED, dtype=np.float32)
-        rsrp[:kept] = self.rsrp[live]
-        self.rsrp, self.begin, self.end = rsrp, 0, kept
+        resources[:kept], rsrp[:kept] = self.resources[live], self.rsrp[live]
+        self.resources, self.rsrp, self.begin, self.end = resources, rsrp, 0, kept
 
 
 class SensingHistory:
@@ -163,19 +171,18 @@ class SensingHistory:
                 self.monitored[rows] = True
             self._until = until
 
-    def receive(self, pdus: Sequence[Pdu], per_subchannel: Array) -> Integers:
+    def receive(self, pdus: Pdus, per_subchannel: Array) -> Integers:
         """Add transmissions in appended subframes; return these subframes.
 
         per_subchannel  (T, N) received power of each PDU in each of its subchannels [mW]
         """
-        subframes = np.array([pdu.subframe for pdu in pdus], dtype=np.int64)
-        own = np.array([pdu.row for pdu in pdus], dtype=np.int64)
-        for pdu, power in zip(pdus, per_subchannel, strict=True):
-            first = pdu.transmission.first_band
-            self.rssi[pdu.subframe % WINDOW, first : first + pdu.transmission.bands] += power.astype(np.float32)
-        self.rssi[subframes % WINDOW, :, own] = 0.0
-        self.monitored[subframes % WINDOW, own] = False
-        return np.array(sorted({pdu.subframe for pdu in pdus}), dtype=np.int64)
+        at = pdus.subframes % WINDOW
+        columns = (column.tolist() for column in (at, pdus.bands, pdus.widths))
+        for row, first, width, power in zip(*columns, per_subchannel, strict=True):
+            self.rssi[row, first : first + width] += power.astype(np.float32)
+        self.rssi[at, :, pdus.rows] = 0.0
+        self.monitored[at, pdus.rows] = False
+        return np.unique(pdus.subframes)
 
     def busy(self, subframes: Integers, threshold: float) -> tuple[Array, Integers]:
         """Return the busy time and the unmeasured time of each station over these subframes (N,) [subframes].
@@ -188,15 +195,13 @@ class SensingHistory:
         counts = ((self.rssi[rows] > threshold) & monitored[:, None]).sum(axis=(0, 1))
         return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
 
-    def reserve(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
-        """Add the decoded control information of PDUs that reserve resources."""
-        subframes = np.array([pdu.subframe for pdu in pdus], dtype=np.int64)
-        bands, widths = (
-            np.array([getattr(pdu.transmission, name) for pdu in pdus], dtype=np.int64)
-            for name in ("first_band", "bands")
-        )
-        decoded = (codes == DELIVERED) & self.monitored[subframes % WINDOW]
-        self.reservations.add(subframes, bands, widths, np.where(decoded, rsrp, NOT_DECODED))
+    def reserve(self, pdus: Pdus, codes: Codes, rsrp: Array) -> None:
+        """Add the decoded control information of those PDUs that reserve resources."""
+        reserves = np.flatnonzero([transmission.reserves for transmission in pdus.transmissions])
+        if len(reserves):
+            decoded = (codes == DELIVERED) & self.monitored[pdus.subframes % WINDOW]
+            resources = np.stack([pdus.subframes, pdus.bands, pdus.widths], axis=1)
+            self.reservations.add(resources[reserves], np.where(decoded, rsrp, NOT_DECODED)[reserves])
 
     def of(self, row: int, now: int, own: Integers) -> Sensed:
         """Return the sensing results of a station before subframe `now`; it transmitted in the subframes `own`."""
