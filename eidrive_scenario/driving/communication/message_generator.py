@@ -28,7 +28,7 @@ from eidrive_scenario.v2x.messages.generation import (
     cpm_size,
     objects_that_fit,
 )
-from eidrive_scenario.v2x.messages.message import Message, Payload, StationState, station_id
+from eidrive_scenario.v2x.messages.message import Message, Payload, StationState, shift_timestamps, station_id
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -136,7 +136,8 @@ class MessageGenerator:
             generated += messages
         if self._offset > 0.0:
             generated = [replace(message, offset=self._offset) for message in generated]
-        return tuple([self._clock.with_station_timestamps(message, now) for message in generated])
+        error = self._clock.error(now)
+        return tuple([shift_timestamps(message, error) for message in generated])
 
     def _feature_messages(self, state: StationState, now: float, payloads: tuple[Payload, ...]) -> list[Message]:
         """Return a message for each frame of a map, unless the frames of this map are sent already."""

@@ -24,7 +24,7 @@ from eidrive_scenario.perception.result_checks import describe
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, pose_covariance_at
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
-from eidrive_scenario.v2x.messages.message import Message, Payload, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import Message, Payload, ReceivedMessage, StationState, shift_timestamps
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 
@@ -255,7 +255,7 @@ class ReportStore:
         name, regions, sharing = self._name, self._regions, self._sharing
         expired: list[int] = []
         for row, received in enumerate(inbox):
-            message = self._clock.with_local_timestamps(received.message, now)
+            message = shift_timestamps(received.message, -self._clock.error(now))
             sender, perceived, complete = message.sender, message.kind == "cpm", message.objects is None
             own = sender == name
             if own and not (own_perception and perceived):

@@ -119,16 +119,13 @@ class StationClock:
         """Return the difference between station time and true time [s]."""
         return self.offset + self.drift * now
 
-    def with_station_timestamps(self, message: Message, now: float) -> Message:
-        """Return a message of this station with timestamps of this clock; `generated` stays in true time."""
-        return _shift_timestamps(message, self.error(now))
 
-    def with_local_timestamps(self, message: Message, now: float) -> Message:
-        """Return a received message with timestamps relative to this clock, which the station assumes to be true."""
-        return _shift_timestamps(message, -self.error(now))
+def shift_timestamps(message: Message, error: float) -> Message:
+    """Return a message with timestamps that are later by `error` [s]; `generated` stays in true time.
 
-
-def _shift_timestamps(message: Message, error: float) -> Message:
+    A sender shifts by the error of its clock. A receiver, which assumes that its own clock is right, shifts back by the
+    error of that.
+    """
     if error == 0.0:
         return message
     return replace(

@@ -19,7 +19,7 @@ from eidrive_scenario.v2x.messages.generation import (
     objects_that_fit,
     quality,
 )
-from eidrive_scenario.v2x.messages.message import Message, StationClock, StationState
+from eidrive_scenario.v2x.messages.message import Message, StationClock, StationState, shift_timestamps
 from eidrive_scenario.v2x.messages.point_cloud import compress
 
 DT = 0.05
@@ -208,12 +208,12 @@ def test_station_clock_shifts_timestamps_only() -> None:
     sender, receiver = StationClock(offset=0.02, drift=1e-4), StationClock(offset=-0.01)
     points = compress(np.zeros((1, 3)), 99.8, 0.2)
     message = Message("A", 0, 100.0, state(100.0), Detections(99.9), 121, points=points)
-    stamped = sender.with_station_timestamps(message, 100.0)
+    stamped = shift_timestamps(message, sender.error(100.0))
     assert stamped.generated == 100.0
     assert stamped.state.time == pytest.approx(100.03)
     assert stamped.detections.time == pytest.approx(99.93)
     assert stamped.points is not None
     assert stamped.points.time == pytest.approx(99.83)
-    local = receiver.with_local_timestamps(stamped, 100.2)
+    local = shift_timestamps(stamped, -receiver.error(100.2))
     assert local.detections.time == pytest.approx(99.94), "30 ms by the sender, 10 ms by the receiver"
-    assert StationClock().with_station_timestamps(message, 100.0) is message
+    assert shift_timestamps(message, StationClock().error(100.0)) is message
