@@ -66,22 +66,8 @@ class InertialFilter:
     def __init__(self, start: Estimate, noise: MotionNoise) -> None:
         self.estimate = start
         self._noise = noise
-        self._propagation = np.zeros((6, 6))
-        """Covariance of the error of the state and its error before the last `begin_step`."""
-
-    def begin_step(self) -> None:
-        """Begin a time step, in which predictions and corrections change the error."""
-        self._propagation = self.estimate.covariance
-
-    @property
-    def pose_covariance(self) -> Array:
-        """Covariance (3, 3) of the errors of x, y [m] and yaw [rad]."""
-        return self.estimate.covariance[PLANE]
-
-    @property
-    def lagged_covariance(self) -> Array:
-        """Covariance (3, 3) of the errors of x, y [m] and yaw [rad] with those before the time step."""
-        return self._propagation[PLANE]
+        self.propagation = np.zeros((6, 6))
+        """Covariance of the error of the state with its error at the start of the time step."""
 
     def predict(self, imu: ImuReading, step: float) -> None:
         """Predict the state by `step` [s] with the accelerations and turn rates of the IMU."""
@@ -110,7 +96,7 @@ class InertialFilter:
         drive[:, :2] *= np.array([noise.imu.accelerometer_noise, noise.imu.gyroscope_noise]) / math.sqrt(step)
         across = noise.drift + noise.slip * abs(speed * turn)
         drive[:, 2:] *= np.array([across, noise.imu.gyroscope_walk, noise.imu.accelerometer_walk]) * math.sqrt(step)
-        self._propagation = forward @ self._propagation
+        self.propagation = forward @ self.propagation
         self.estimate = Estimate(state, forward @ self.estimate.covariance @ forward.T + drive @ drive.T)
 
     def correct(self, gnss: GnssReading) -> None:
@@ -122,7 +108,7 @@ class InertialFilter:
         rest[:, :2] -= gain
         state = state + gain @ (gnss.position[:2] - state[:2])
         state[YAW] = wrap_angle(float(state[YAW]))
-        self._propagation = rest @ self._propagation
+        self.propagation = rest @ self.propagation
         self.estimate = Estimate(state, rest @ covariance @ rest.T + gain @ noise @ gain.T)
 
 
@@ -152,12 +138,12 @@ class Localizer:
     @property
     def pose_covariance(self) -> Array:
         """Covariance (3, 3) of the errors of the estimated x, y [m] and yaw [rad]."""
-        return self._started.pose_covariance
+        return self.estimate.covariance[PLANE]
 
     @property
     def lagged_covariance(self) -> Array:
         """Covariance (3, 3) of these errors with those of the last reading; 0 at the first one."""
-        return self._started.lagged_covariance
+        return self._started.propagation[PLANE]
 
     @property
     def _started(self) -> InertialFilter:
@@ -171,7 +157,7 @@ class Localizer:
         if self._filter is None:
             self._filter = InertialFilter(self._initial_estimate(truth), self._noise)
         else:
-            self._filter.begin_step()
+            self._filter.propagation = self._filter.estimate.covariance
         self._imu = readings.imu or self._imu
         if self._imu is not None and readings.time > self._time:
             self._filter.predict(self._imu, readings.time - self._time)
