@@ -6,7 +6,7 @@ import dataclasses
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -66,16 +66,15 @@ class _ReceivedMap:
     present: Bools
 
 
-@dataclass(frozen=True)
-class _MovingBox:
-    """Reported box at `time` [s]: center, length, width, heading and velocity in the plane [m, rad, m/s]."""
+class _MovingBox(NamedTuple):
+    """Reported box at `time` [s]: center, heading, length, width and velocity in the plane [m, rad, m/s]."""
 
     time: float
     x: float
     y: float
+    yaw: float
     length: float
     width: float
-    yaw: float
     vx: float
     vy: float
 
@@ -218,18 +217,15 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         """Return the moving boxes of a station after a report, by object."""
         detections = report.detections
         held = {} if report.complete else self._boxes.get(report.station, {})
-        boxes = {number: box for number, box in held.items() if self._is_usable(box, detections.time)}
+        now, max_age = detections.time, self.settings.max_age
+        boxes = {number: box for number, box in held.items() if abs(now - box.time) <= max_age}
         numbers = detections.tracks or range(len(detections))
         for number, box, (vx, vy) in zip(numbers, detections.boxes.tolist(), detections.velocity.tolist(), strict=True):
             boxes.pop(number, None)
             if math.hypot(vx, vy) > 0.0:  # not if it is unknown
                 x, y, _, length, width, _, yaw = box
-                boxes[number] = _MovingBox(detections.time, x, y, length, width, yaw, vx, vy)
+                boxes[number] = _MovingBox(now, x, y, yaw, length, width, vx, vy)
         return boxes
-
-    def _is_usable(self, box: _MovingBox, time: float) -> bool:
-        """Return whether a box can be predicted to a time [s]."""
-        return abs(time - box.time) <= self.settings.max_age
 
     def _covered(self, arrived: _ReceivedMap, points: Array) -> Bools:
         """Return whether the features at points (N, 2) of the world are in the fused map."""
@@ -255,9 +251,10 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         present = np.zeros((len(self._received), *shape), np.bool_)
         for station, (sender, held) in enumerate(sorted(self._received.items())):
             moving = np.array([
-                (box.x + box.vx * (held.time - box.time), box.y + box.vy * (held.time - box.time), box.yaw,
-                 box.length + 2.0 * BOX_MARGIN, box.width + 2.0 * BOX_MARGIN, box.vx, box.vy)
-                for box in self._boxes.get(sender, {}).values() if self._is_usable(box, held.time)
+                (x + vx * (held.time - time), y + vy * (held.time - time), yaw, length + 2.0 * BOX_MARGIN,
+                 width + 2.0 * BOX_MARGIN, vx, vy)
+                for time, x, y, yaw, length, width, vx, vy in self._boxes.get(sender, {}).values()
+                if abs(held.time - time) <= self.settings.max_age
             ]).reshape(-1, 7)  # fmt: skip
             grid, age = self._grid_for(sender, self._grid), features.time - held.time
             latent, present[station] = warp(held.latent, held.present, held.grid, grid, moving, age)
