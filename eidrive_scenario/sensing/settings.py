@@ -162,14 +162,13 @@ class CameraSettings(SensorSettings):
                 break
             distorted = next_distorted
             if distorted >= corner:
-                return self._check_undistorted_size(radius / corner)
-        raise ValueError(
-            f"the distortion folds the image {math.degrees(math.atan(radius)):.0f} degrees off the optical axis"
-        )
-
-    def _check_undistorted_size(self, scale: float) -> CameraSettings:
-        """Limit the pixels of the undistorted image, which is `scale` times as wide and high."""
-        if self.width * self.height * self.supersampling**2 * scale**2 > 1.1 * MAX_PIXELS:
+                break
+        if distorted < corner:
+            raise ValueError(
+                f"the distortion folds the image {math.degrees(math.atan(radius)):.0f} degrees off the optical axis"
+            )
+        # The undistorted image is radius / corner times as wide and high.
+        if self.width * self.height * self.supersampling**2 * (radius / corner) ** 2 > 1.1 * MAX_PIXELS:
             raise ValueError(
                 f"the undistorted image has more than {MAX_PIXELS} pixels (reduce width, height, supersampling or fov)"
             )
