@@ -25,9 +25,7 @@ from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.network_loading import build_network, check_network, runtime_of, weights_path
 from eidrive_scenario.perception.learned.runtimes import runtime_versions
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.perception.learned.weights import (
-    check_weights_exist,
-)
+from eidrive_scenario.perception.learned.weights import check_weights_exist
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readings, SignalReading
@@ -151,8 +149,8 @@ class ImageDetector(Detector):
         Image boxes that no body fills are omitted.
         """
         clouds: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
-        categories = {row: object_category(name) for row, name in enumerate(detections.classes)}
-        used = {row: category for row, category in categories.items() if category is not None}
+        categories = map(object_category, detections.classes)
+        used = {row: category for row, category in enumerate(categories) if category is not None}
         rows = list(used)
         lifted = most_certain(
             [
