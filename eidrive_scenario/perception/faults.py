@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
+from msgspec.structs import replace
 from pydantic import Field, model_validator
 
 from eidrive_scenario.base.arrays import Array
@@ -105,13 +106,14 @@ def with_false_objects(detections: Detections, objects: Sequence[FalseObject], *
         [false_object.velocity if with_velocity else (math.nan, math.nan) for false_object in added]
     )
     covariance = np.array([np.eye(2) * false_object.deviation**2 for false_object in added])
-    return Detections(
-        detections.time,
-        np.concatenate([detections.boxes, np.array([false_object.box(detections.time) for false_object in added])]),
-        np.concatenate([detections.scores, scores]),
-        (*detections.classes, *(false_object.kind for false_object in added)),
-        np.concatenate([detections.velocity, velocity]),
-        np.concatenate([detections.covariance, covariance]),
-        (*detections.tracks, *(FIRST_TRACK + number for number in numbers)) if detections.tracks else (),
-        np.concatenate([detections.existence, scores]) if len(detections.existence) else NOT_ESTIMATED,
+    boxes = np.array([false_object.box(detections.time) for false_object in added])
+    return replace(
+        detections,
+        boxes=np.concatenate([detections.boxes, boxes]),
+        scores=np.concatenate([detections.scores, scores]),
+        classes=(*detections.classes, *(false_object.kind for false_object in added)),
+        velocity=np.concatenate([detections.velocity, velocity]),
+        covariance=np.concatenate([detections.covariance, covariance]),
+        tracks=(*detections.tracks, *(FIRST_TRACK + number for number in numbers)) if detections.tracks else (),
+        existence=np.concatenate([detections.existence, scores]) if len(detections.existence) else NOT_ESTIMATED,
     )

@@ -123,6 +123,11 @@ def test_parked_station_and_mast_are_not_reported(make: Make) -> None:
         ("{delay: {kind: uniform, minimum: 0.01, maximum: 0.05}}", 0.05, "the median delay of the channel 'custom'"),
         ("{delay: {kind: uniform, minimum: 0.01, maximum: 0.2}}", 0.05, ""),
         ("{delay: {kind: trace, seconds: [0.01, 0.01, 0.3]}}", 0.05, "the median delay of the channel 'custom'"),
+        (
+            "{delay: {kind: trace, seconds: [0.01, 0.02, 0.3], replay: true}}",
+            0.05,
+            "the median delay of the channel 'custom' is only 0.02 s",
+        ),
         ("5g_uu", 0.05, "the median delay of the channel '5g_uu' is only 0.0103 s"),
         ("5g_uu", 0.01, ""),
         ("80211p_urban", 0.05, ""),

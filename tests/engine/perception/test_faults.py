@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from pydantic import ValidationError
 
 from eidrive_scenario.base.detections import Detections
@@ -51,6 +52,11 @@ def test_false_objects_are_added_to_tracks_with_constant_numbers() -> None:
     assert found.boxes[1].tolist() == [60.0, 0.0, 1.5, 9.0, 2.0, 3.0, 0.0]
     assert np.isnan(found.velocity[1]).all()
     assert with_false_objects(ONE, [early], with_velocity=True) is ONE
+
+
+def test_false_objects_keep_the_stated_deviation_of_velocities() -> None:
+    measured = replace(ONE, velocity_deviation=1.5)
+    assert with_false_objects(measured, [FalseObject(x=9.0, y=0.0)], with_velocity=True).velocity_deviation == 1.5
 
 
 @pytest.mark.parametrize(
