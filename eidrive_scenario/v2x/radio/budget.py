@@ -11,7 +11,8 @@ from scipy.special import ndtr, ndtri
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniforms
-from eidrive_scenario.v2x.propagation import LinkGeometry, PathLoss, probability_of_los
+from eidrive_scenario.v2x.propagation import LinkGeometry, Tr37885, probability_of_los
+from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT
 
@@ -50,29 +51,15 @@ class LinkBudget:
 
     Shadowing and the loss by blocking vehicles are correlated over the distance s that both antennas have covered,
     e^(-s / d) (M. Gudmundson, Electronics Letters 27(23), 1991). Random numbers are keyed by pair and update count.
-
-    line_of_sight  `rays` through the world, `random` by the probabilities of TR 37.885, or `clear`
     """
 
-    def __init__(
-        self,
-        path_loss: PathLoss,
-        *,
-        seed: int,
-        frequency_ghz: float,
-        line_of_sight: str = "rays",
-        environment: str = "urban",
-        shadowing_db: float | None = None,
-        decorrelation: float | None = None,
-    ) -> None:
-        self._path_loss = path_loss
+    def __init__(self, profile: RadioProfile, seed: int) -> None:
+        self._profile = profile
         self._seed = seed
-        self._frequency = frequency_ghz
-        self._line_of_sight = line_of_sight
-        self._environment = environment
-        self._spreads = np.array(path_loss.spreads if shadowing_db is None else (shadowing_db,) * 3)
+        path_loss, spread, reach = profile.path_loss, profile.shadowing_db, profile.decorrelation
+        self._spreads = np.array(path_loss.spreads if spread is None else (spread,) * 3)
         """Standard deviation of the shadowing by state [dB]."""
-        self._reaches = np.array(path_loss.reaches if decorrelation is None else (decorrelation,) * 3)
+        self._reaches = np.array(path_loss.reaches if reach is None else (reach,) * 3)
         """Decorrelation distance of the shadowing by state [m]."""
         self._reach = self._distance_of(OUT_OF_REACH)
         self._names: tuple[str, ...] = ()
@@ -98,7 +85,7 @@ class LinkBudget:
         distance = np.sqrt(np.einsum("pi,pi->p", offset, offset))
         between, blockers = self._link_geometry(surroundings, distance)
         shadowing, blockage = self._update_shadowing(positions, between.states)
-        mean_loss = self._path_loss.loss(between, self._frequency, ndtr(blockage))
+        mean_loss = self._profile.path_loss.loss(between, self._profile.frequency_ghz, ndtr(blockage))
         # In matrices of stations each pair stands twice; the last entry, of zeros, is the link of a station to itself.
         links, states = np.zeros((3, len(self._first) + 1)), np.full(len(self._first) + 1, LOS)
         links[0, :-1] = distance
@@ -115,7 +102,7 @@ class LinkBudget:
         for _ in range(40):  # halves of ln 1e9 = 20.7: a relative error of 2e-11
             middle = math.sqrt(near * far)
             between = LinkGeometry.in_sight(np.full(1, middle), heights, heights)
-            there = self._path_loss.loss(between, self._frequency, draws)[0]
+            there = self._profile.path_loss.loss(between, self._profile.frequency_ghz, draws)[0]
             near, far = (near, middle) if there >= loss else (middle, far)
         return far
 
@@ -156,11 +143,13 @@ class LinkBudget:
         ends = heights.take(self._first), heights.take(self._second)
         between = LinkGeometry.in_sight(distance, np.minimum(*ends), np.maximum(*ends))
         blockers: dict[tuple[int, int], tuple[str, ...]] = {}
-        if self._line_of_sight == "random":
-            hidden = uniforms(self._sight_keys, 0) > probability_of_los(distance, self._environment)
+        if self._profile.line_of_sight == "random":
+            path_loss = self._profile.path_loss
+            environment = path_loss.environment if isinstance(path_loss, Tr37885) else "highway"
+            hidden = uniforms(self._sight_keys, 0) > probability_of_los(distance, environment)
             between.states[hidden], between.vehicles[hidden] = NLOSV, 1
             between.tops[hidden] = between.upper[hidden] + 0.1
-        elif self._line_of_sight == "rays" and surroundings.sight is not None and len(distance):
+        elif self._profile.line_of_sight == "rays" and surroundings.sight is not None and len(distance):
             near = np.flatnonzero(distance < self._reach)
             if self._pairs is None:
                 rows = zip(self._first.tolist(), self._second.tolist(), strict=True)

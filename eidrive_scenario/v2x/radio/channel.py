@@ -17,7 +17,7 @@ from eidrive_scenario.v2x.link_models.delay import ConstantDelay
 from eidrive_scenario.v2x.link_models.loss import LossProcess, NoLoss
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
-from eidrive_scenario.v2x.propagation import FadingDraws, Nakagami, Tr37885
+from eidrive_scenario.v2x.propagation import FadingDraws, Nakagami
 from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
@@ -46,22 +46,8 @@ class RadioChannel(QueuedChannel):
         super().__init__()
         self.profile = profile
         self._seed = seed
-        path_loss = profile.path_loss
-        self._link_budget = LinkBudget(
-            path_loss,
-            seed=seed,
-            frequency_ghz=profile.frequency_ghz,
-            line_of_sight=profile.line_of_sight,
-            environment=path_loss.environment if isinstance(path_loss, Tr37885) else "highway",
-            shadowing_db=profile.shadowing_db,
-            decorrelation=profile.decorrelation,
-        )
-        self._receiver = Receiver(
-            tuple(profile.noise_in(width) for width in range(1, profile.max_subchannels + 1)),
-            profile.sensing,
-            profile.curves,
-            background=profile.background_by_loss(),
-        )
+        self._link_budget = LinkBudget(profile, seed)
+        self._receiver = Receiver(profile)
         background = self._receiver.background
         self._background_ratio = 0.0 if background is None else background[0].channel_busy_ratio
         """Channel busy ratio caused by vehicles that are not simulated."""

@@ -15,7 +15,7 @@ from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
-from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
+from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS
 
 Codes = NDArray[np.int8]
@@ -36,20 +36,19 @@ class Receptions:
     senders: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
 class Receiver:
-    """Parameters common to all receivers.
+    """Model of the receivers of all stations.
 
-    noises_dbm   noise in the band of a message in 1, 2, … subchannels [dBm]
-    sensing_dbm  minimum sensed power [dBm]
-    curves       packet error curves by code of the line-of-sight state
     background   background traffic, and the mean path loss (D,) at the distances of its table [dB]
     """
 
-    noises_dbm: Sequence[float]
-    sensing_dbm: float
-    curves: Sequence[ErrorCurve]
-    background: tuple[ErrorTable, Array] | None = None
+    def __init__(self, profile: RadioProfile) -> None:
+        self._noises_dbm = [profile.noise_in(width) for width in range(1, profile.max_subchannels + 1)]
+        """Noise in the band of a message in 1, 2, … subchannels [dBm]."""
+        self._sensing_dbm = profile.sensing
+        self._curves = profile.curves
+        """Packet error curves by code of the line-of-sight state."""
+        self.background = profile.background_by_loss()
 
     def receive(
         self,
@@ -78,7 +77,7 @@ class Receiver:
         links, states = keys.take(senders, axis=0), budget.states.take(senders, axis=0)
         numbers = np.array([[transmission.message.number] for transmission in ended])
         sizes = np.array([[transmission.message.size] for transmission in ended], dtype=float)
-        noise_dbm = np.array([[self.noises_dbm[transmission.bands - 1]] for transmission in ended])
+        noise_dbm = np.array([[self._noises_dbm[transmission.bands - 1]] for transmission in ended])
         draws, snr = uniforms(links, numbers), signal - noise_dbm
 
         def lost_with(disturbance: Array) -> Bools:
@@ -86,7 +85,7 @@ class Receiver:
             floor = 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + disturbance)
             return draws < self._errors(signal - floor, states, sizes)
 
-        losses = [(SENSING, signal < self.sensing_dbm), (PROPAGATION, draws < self._errors(snr, states, sizes))]
+        losses = [(SENSING, signal < self._sensing_dbm), (PROPAGATION, draws < self._errors(snr, states, sizes))]
         busy = [transmission.busy for transmission in ended if transmission.busy is not None]
         if busy:
             losses.append((BUSY, np.array(busy)))
@@ -108,8 +107,8 @@ class Receiver:
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
         """Return the packet error rates (T, N) at these ratios of signal to noise and interference [dB]."""
         if not states.any():
-            return self.curves[LOS].at(ratio, sizes)
-        return np.choose(states, [curve.at(ratio, sizes) for curve in self.curves])
+            return self._curves[LOS].at(ratio, sizes)
+        return np.choose(states, [curve.at(ratio, sizes) for curve in self._curves])
 
     @staticmethod
     def _background_losses(

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from radio_traffic import DT, exchange, message, radio
 
-from eidrive_scenario.v2x.propagation import Tr37885
 from eidrive_scenario.v2x.radio.budget import LinkBudget
 from eidrive_scenario.v2x.radio.channel import RadioChannel
+from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 
 ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}
@@ -79,7 +79,7 @@ def test_delivery_ratio_falls_with_distance_down_to_lost_by_sensing() -> None:
 
 def test_shadowing_is_symmetric_and_correlated_over_covered_distance() -> None:
     """Over 5 m with a decorrelation distance of 10 m the correlation is e^(-1/2)."""
-    budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear", decorrelation=10.0)
+    budget = LinkBudget(RadioProfile(line_of_sight="clear", decorrelation=10.0), 1)
     names = [f"{n:02}" for n in range(30)]
     series = []
     for step in range(60):
@@ -98,7 +98,7 @@ def test_shadowing_is_symmetric_and_correlated_over_covered_distance() -> None:
 
 
 def test_shadowing_of_a_pair_is_kept_while_other_stations_change() -> None:
-    budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear")
+    budget = LinkBudget(RadioProfile(line_of_sight="clear"), 1)
     two = {"B": (0.0, 0.0, 1.5), "D": (50.0, 0.0, 1.5)}
     loss = budget.at(RadioEnvironment(two)).loss[0, 1]
     three = {"A": (10.0, 5.0, 1.5), **two}

@@ -10,7 +10,7 @@ import pytest
 from radio_traffic import message, radio
 from sidelink_traffic import MODE_4, TWO, Air, many
 
-from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
+from eidrive_scenario.v2x.radio.profile import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 

@@ -17,10 +17,10 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate
+from eidrive_scenario.v2x.radio.profile import SidelinkSettings
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
-from eidrive_scenario.v2x.radio.sidelink.sensing import ControlChannel, Pdus, SensingHistory
-from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
+from eidrive_scenario.v2x.radio.sidelink.sensing import Pdus, SensingHistory, decode_control
 from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 
 SUBCARRIERS = 12
@@ -80,7 +80,7 @@ class Sidelink(MediumAccess):
         self._settings = settings
         self._seed = seed
         noise = 10.0 ** (noise_dbm / 10.0)
-        self._control = ControlChannel(noise / RESOURCE_BLOCKS, settings.control_curve)
+        self._block_noise = noise / RESOURCE_BLOCKS
         self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
         self._history = SensingHistory(0, settings.subchannels, settings.interval_subframes)
         self._grants: list[Grant | None] = []
@@ -251,7 +251,8 @@ class Sidelink(MediumAccess):
         busy, unmeasured = self._history.busy(received, self._busy_above)
         self._period_busy += SUBFRAME * busy
         self._period_unmeasured += SUBFRAME * unmeasured
-        codes = self._control.decode(pdus, milliwatts / blocks, self._keys)
+        curve = self._settings.control_curve
+        codes = decode_control(pdus, milliwatts / blocks, self._block_noise, curve, self._keys)
         for transmission, code in zip(pdus.transmissions, codes, strict=True):
             before = transmission.control
             transmission.control = code if before is None else np.where(before == DELIVERED, code, before)

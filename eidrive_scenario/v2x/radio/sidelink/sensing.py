@@ -43,43 +43,34 @@ class Pdus(NamedTuple):
         return cls(transmissions, np.array(subframes), np.array(rows), *np.array(columns, dtype=np.int64).T)
 
 
-@dataclass(frozen=True)
-class ControlChannel:
-    """Decoder of the control channel.
+def decode_control(pdus: Pdus, per_block: Array, block_noise: float, curve: ErrorCurve, keys: Keys) -> Codes:
+    """Return the outcome of the SCI of each PDU at each station (T, N): DELIVERED, PROPAGATION or COLLISION.
 
+    The control channel is in the first subchannel of its transmission; other users of this subchannel interfere.
+
+    per_block    (T, N) received power of each PDU in one resource block of its data [mW]
     block_noise  noise in one resource block [mW]
     curve        packet error rate by signal-to-interference-and-noise ratio
+    keys         (N, N) keys of the links, by sender and receiver
     """
-
-    block_noise: float
-    curve: ErrorCurve
-
-    def decode(self, pdus: Pdus, per_block: Array, keys: Keys) -> Codes:
-        """Return the outcome of the SCI of each PDU at each station (T, N): DELIVERED, PROPAGATION or COLLISION.
-
-        The control channel is in the first subchannel of its transmission; other users of this subchannel interfere.
-
-        per_block  (T, N) received power of each PDU in one resource block of its data [mW]
-        keys       (N, N) keys of the links, by sender and receiver
-        """
-        subframes, first, last = pdus.subframes, pdus.bands, pdus.bands + pdus.widths
-        draws = uniforms(keys[pdus.rows], pdus.numbers[:, None])
-        signal = BOOST * per_block
-        codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
-        meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
-        np.fill_diagonal(meets, False)
-        met = np.flatnonzero(meets.any(axis=1))
-        interference = np.zeros((len(met), per_block.shape[1]))
-        for index, own in enumerate(met.tolist()):
-            others = np.flatnonzero(meets[own])
-            boosted = np.where(first[others] == first[own], BOOST, 1.0)
-            interference[index] = (per_block[others] * boosted[:, None]).sum(axis=0)
-        if len(met):
-            disturbed = _decibels(signal[met] / (self.block_noise + interference))
-            codes[met] = np.where(draws[met] < self.curve.at(disturbed, 1), COLLISION, DELIVERED)
-        ratio = _decibels(signal / self.block_noise)
-        codes[draws < self.curve.at(ratio, 1)] = PROPAGATION
-        return codes
+    subframes, first, last = pdus.subframes, pdus.bands, pdus.bands + pdus.widths
+    draws = uniforms(keys[pdus.rows], pdus.numbers[:, None])
+    signal = BOOST * per_block
+    codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
+    meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
+    np.fill_diagonal(meets, False)
+    met = np.flatnonzero(meets.any(axis=1))
+    interference = np.zeros((len(met), per_block.shape[1]))
+    for index, own in enumerate(met.tolist()):
+        others = np.flatnonzero(meets[own])
+        boosted = np.where(first[others] == first[own], BOOST, 1.0)
+        interference[index] = (per_block[others] * boosted[:, None]).sum(axis=0)
+    if len(met):
+        disturbed = _decibels(signal[met] / (block_noise + interference))
+        codes[met] = np.where(draws[met] < curve.at(disturbed, 1), COLLISION, DELIVERED)
+    ratio = _decibels(signal / block_noise)
+    codes[draws < curve.at(ratio, 1)] = PROPAGATION
+    return codes
 
 
 def _decibels(ratio: Array) -> Array:
