@@ -11,15 +11,16 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.v2x.analytic.table import (
+    LEVELS,
     RATIOS,
     REACH,
+    STEP,
     ErrorTable,
     autocorrelation,
     errors_over,
     interference,
     interferer_positions,
     loss_by_interferer,
-    noise_alone,
     sensed_share,
     signal,
 )
@@ -80,7 +81,7 @@ def ieee80211p_errors(
     curve = np.interp(RATIOS + 10.0 * np.log10(BANDWIDTH / bit_rate), *FRAME_ERRORS)
     not_sensed = 1.0 - sensed_share(received_power(distance), SENSING)  # (12)
     errors = errors_over(signal(received_power(distance), SENSING), curve)
-    propagation = errors @ noise_alone(NOISE_DBM)[0]  # (24)
+    propagation = errors[:, round((NOISE_DBM - LEVELS[0]) / STEP)]  # (24)
 
     to_receiver = interferer_positions(density)
     to_sender = np.abs(to_receiver + distance[:, None])

@@ -85,13 +85,6 @@ def signal(power: Array, threshold: float) -> Array:
     return _normalize(density)
 
 
-def noise_alone(noise: float) -> Array:
-    """Return the distribution (1, L) of a constant noise power [dBm]."""
-    density = np.zeros((1, len(LEVELS)))
-    density[0, round((noise - LEVELS[0]) / STEP)] = 1.0
-    return density
-
-
 def interference(power: Array, noise: float) -> Array:
     """Return the distribution (I, L) of noise plus one shadowed interferer, for mean powers (I,) [dBm]."""
     total = 10.0 ** (LEVELS[noise < LEVELS] / 10.0)
