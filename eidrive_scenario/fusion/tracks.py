@@ -61,11 +61,6 @@ _ROW_OF_CLASS = {name: row for row, name in enumerate(CLASSES)}
 _MISC = _ROW_OF_CLASS["misc"]
 
 
-def join_rows(parts: Sequence[Rows]) -> Table:
-    """Return a table of these rows."""
-    return np.concatenate(parts).view(TRACK)
-
-
 def rows_of(tracks: Table) -> Rows:
     """Return the rows of a table as bytes, which share its memory."""
     return tracks.view(_ROW)
@@ -221,7 +216,7 @@ def update_tracks(
         return tracks
     fresh = np.ones(len(born), dtype=bool)
     fresh[columns] = False
-    both = join_rows([rows_of(tracks), rows_of(born.take(np.flatnonzero(fresh)))])
+    both = np.concatenate([rows_of(tracks), rows_of(born.take(np.flatnonzero(fresh)))]).view(TRACK)
     return both.take(np.argsort(both["station"], kind="stable"))
 
 

@@ -63,16 +63,12 @@ class RadioEnvironment:
         """Antenna positions (N, 3) in the order of `names` [m]."""
         return np.array([self.places[name] for name in self.names], dtype=float).reshape(-1, 3)
 
-    def height(self, name: str) -> float:
-        """Return the height of an antenna above the ground [m]."""
-        return self.places[name][2] - self.grounds.get(name, 0.0)
-
     @cached_property
     def heights(self) -> Array:
         """Heights of the antennas above the ground (N,) in the order of `names` [m]."""
         if not self.grounds:
             return self.positions[:, 2]
-        return np.array([self.height(name) for name in self.names], dtype=float)
+        return np.array([self.places[name][2] - self.grounds.get(name, 0.0) for name in self.names], dtype=float)
 
 
 EMPTY_RADIO_ENVIRONMENT = RadioEnvironment({})

@@ -33,11 +33,8 @@ class Graph:
         self._arrays = arrays
         self._nodes: list[Node] = []
         self._tensors: dict[str, Floats] = {}
-        self._channels: dict[str, int] = {IMAGE: channels}
-
-    def channels(self, layer: str) -> int:
-        """Return the number of channels of a layer's output."""
-        return self._channels[layer]
+        self.channels: dict[str, int] = {IMAGE: channels}
+        """Number of channels of the output of each layer."""
 
     def array(self, name: str, shape: Sequence[int]) -> Floats:
         """Return a weight in single precision."""
@@ -60,7 +57,7 @@ class Graph:
         padding: int | None = None,
     ) -> str:
         """Add a convolution, into which its batch normalization is folded, and SiLU."""
-        shape = (outputs, self._channels[source] // groups, kernel, kernel)
+        shape = (outputs, self.channels[source] // groups, kernel, kernel)
         weight = self.array(f"{name}.conv.weight", shape).astype(np.float64)
         gain, offset, mean, variance = (self.array(f"{name}.norm.{part}", (outputs,)).astype(float) for part in _NORM)
         gain = gain / np.sqrt(variance + _EPSILON)
@@ -72,15 +69,13 @@ class Graph:
 
     def relu_unit(self, source: str, name: str, outputs: int, kernel: int = 1, stride: int = 1) -> str:
         """Add a convolution and ReLU."""
-        weight = self.array(f"{name}.weight", (outputs, self._channels[source], kernel, kernel))
+        weight = self.array(f"{name}.weight", (outputs, self.channels[source], kernel, kernel))
         bias = self.array(f"{name}.bias", (outputs,))
         return self._relu(self._convolution(source, name, weight, bias, stride, kernel // 2, 1))
 
     def enlarging_unit(self, source: str, name: str, outputs: int, factor: int) -> str:
         """Add a transposed convolution, by which each cell becomes `factor` x `factor` cells, and ReLU."""
-        self._tensors[f"{name}.weight"] = self.array(
-            f"{name}.weight", (self._channels[source], outputs, factor, factor)
-        )
+        self._tensors[f"{name}.weight"] = self.array(f"{name}.weight", (self.channels[source], outputs, factor, factor))
         self._tensors[f"{name}.bias"] = self.array(f"{name}.bias", (outputs,))
         inputs = (source, f"{name}.weight", f"{name}.bias")
         sides = (factor, factor)
@@ -88,27 +83,27 @@ class Graph:
 
     def head(self, source: str, name: str, outputs: int) -> str:
         """Add a 1x1 convolution without activation."""
-        weight = self.array(f"{name}.weight", (outputs, self._channels[source], 1, 1))
+        weight = self.array(f"{name}.weight", (outputs, self.channels[source], 1, 1))
         return self._convolution(source, name, weight, self.array(f"{name}.bias", (outputs,)), 1, 0, 1)
 
     def sum(self, first: str, second: str) -> str:
         """Add a residual connection."""
-        return self._add("Add", (first, second), self._channels[first])
+        return self._add("Add", (first, second), self.channels[first])
 
     def concatenation(self, *sources: str) -> str:
         """Add a concatenation of channels."""
-        return self._add("Concat", sources, sum(self._channels[source] for source in sources), axis=1)
+        return self._add("Concat", sources, sum(self.channels[source] for source in sources), axis=1)
 
     def max_pool(self, source: str, kernel: int) -> str:
         """Add a maximum over a square around each cell."""
         attributes = {"kernel_shape": (kernel, kernel), "pads": (kernel // 2,) * 4, "strides": (1, 1)}
-        return self._add("MaxPool", (source,), self._channels[source], **attributes)
+        return self._add("MaxPool", (source,), self.channels[source], **attributes)
 
     def doubled(self, source: str) -> str:
         """Add a repetition of each cell in both directions."""
         self._tensors["doubled"] = np.array([1.0, 1.0, 2.0, 2.0], dtype=np.float32)
         attributes = {"coordinate_transformation_mode": "asymmetric", "mode": "nearest", "nearest_mode": "floor"}
-        return self._add("Resize", (source, "", "doubled"), self._channels[source], **attributes)
+        return self._add("Resize", (source, "", "doubled"), self.channels[source], **attributes)
 
     def onnx(
         self,
@@ -128,17 +123,17 @@ class Graph:
         """
         width, height = input_size
         shapes = {
-            name: (1, self._channels[name], -(-height // stride), -(-width // stride))
+            name: (1, self.channels[name], -(-height // stride), -(-width // stride))
             for name, stride in outputs.items()
         }
         nodes: Sequence[Node] = self._nodes
         tensors: Mapping[str, NDArray[Any]] = self._tensors
         if ranges is not None:
             nodes, tensors = quantized(nodes, tensors, IMAGE, list(outputs), ranges, single)
-        return onnx_model(nodes, tensors, {IMAGE: (1, self._channels[IMAGE], height, width)}, shapes)
+        return onnx_model(nodes, tensors, {IMAGE: (1, self.channels[IMAGE], height, width)}, shapes)
 
     def _relu(self, source: str) -> str:
-        return self._add("Relu", (source,), self._channels[source])
+        return self._add("Relu", (source,), self.channels[source])
 
     def _convolution(
         self, source: str, name: str, weight: Any, bias: Any, stride: int, padding: int, groups: int
@@ -158,7 +153,7 @@ class Graph:
     def _add(self, operator: str, inputs: Sequence[str], channels: int, **attributes: Attribute) -> str:
         output = f"{operator.lower()}_{len(self._nodes)}"
         self._nodes.append(Node(operator, inputs, output, attributes))
-        self._channels[output] = channels
+        self.channels[output] = channels
         return output
 
 
@@ -181,7 +176,7 @@ def ssd_onnx(
     outputs = {}
     for kind, each in (("box_heads", 4), ("class_heads", 1 + classes)):
         for number, (level, stride) in enumerate(zip(levels, SSD_STRIDES, strict=True)):
-            width = graph.channels(level)
+            width = graph.channels[level]
             x = graph.conv_unit(level, f"{kind}.{number}.0", width, 3, groups=width)
             outputs[graph.head(x, f"{kind}.{number}.1", BOXES_PER_CELL * each)] = stride
     return graph.onnx(input_size, outputs, ranges)
@@ -196,7 +191,7 @@ def _separable_units(graph: Graph, source: str, name: str, units: tuple[tuple[in
 
 
 def _separable_unit(graph: Graph, source: str, name: str, outputs: int, stride: int) -> str:
-    inputs = graph.channels(source)
+    inputs = graph.channels[source]
     x = graph.conv_unit(source, f"{name}.depthwise", inputs, 3, stride, groups=inputs)
     x = graph.conv_unit(x, f"{name}.pointwise", outputs)
     return graph.sum(source, x) if stride == 1 and inputs == outputs else x

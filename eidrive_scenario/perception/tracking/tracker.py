@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -34,22 +35,22 @@ from eidrive_scenario.perception.tracking.motion_models import (
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 
 
+@dataclass(slots=True, eq=False)
 class TrackHistory:
-    """Detection history of one track."""
+    """Detection history of one track.
 
-    __slots__ = ("_last_detection", "_names", "_recent", "hits", "is_often_detected", "number", "score")
+    is_often_detected  whether the object was detected in n of m successive scans
+    number             track number once the track is confirmed
+    score              of the last detection
+    """
 
-    def __init__(self) -> None:
-        self.is_often_detected = False
-        """Whether the object was detected in n of m successive scans."""
-        self.number: int | None = None
-        """Track number once the track is confirmed."""
-        self.hits = 0
-        self.score = 0.0
-        """Score of the last detection."""
-        self._recent: list[bool] = []
-        self._names: dict[str, float] = {}
-        self._last_detection = -math.inf
+    is_often_detected: bool = False
+    number: int | None = None
+    hits: int = 0
+    score: float = 0.0
+    _recent: list[bool] = field(default_factory=list)
+    _names: dict[str, float] = field(default_factory=dict)
+    _last_detection: float = -math.inf
 
     @property
     def name(self) -> str:
