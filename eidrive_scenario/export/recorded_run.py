@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
@@ -41,17 +42,17 @@ class RecordedRun:
         """Scenario and seed in one line."""
         return f"{self.recording.scenario or self.recording.path.stem}, seed {self.recording.seed}"
 
-    @property
+    @cached_property
     def towed(self) -> Mapping[str, str]:
         """Vehicle categories of the trailers and semitrailers of the scenario, by name."""
         return recorded_trailers(self.recording)
 
-    @property
+    @cached_property
     def axles(self) -> Mapping[str, AxleCenters]:
         """Axles of the vehicles of the scenario, by name."""
         return recorded_axles(self.recording)
 
-    @property
+    @cached_property
     def weather(self) -> Weather | None:
         """Weather of an option that replaces that of the scenario; None without one, and if it cannot be read."""
         try:

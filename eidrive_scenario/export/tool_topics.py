@@ -4,30 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.export.foxglove.writer import FoxgloveTopics, check_foxglove
+from eidrive_scenario.export.mcap_topics import ToolTopics
 from eidrive_scenario.export.osi.trace import OsiTopics, check_osi
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run
 from eidrive_scenario.files.atomic import atomic_output
-from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import Recorder
 
-
-class ToolTopics(Protocol):
-    """Topics of one tool in a file."""
-
-    def add(self, frame: Frame) -> None:
-        """Add the messages of a frame."""
-        ...
-
-    def finish(self) -> None:
-        """Add the messages after the last frame."""
-        ...
-
-
-_TOPICS: Mapping[str, tuple[Callable[[], None], Callable[[Any, RecordedRun], ToolTopics]]] = {
+_TOPICS: Mapping[str, tuple[Callable[[], None], type[ToolTopics]]] = {
     "foxglove": (check_foxglove, FoxgloveTopics),
     "osi": (check_osi, OsiTopics),
 }

@@ -8,6 +8,7 @@ from urllib.parse import quote
 
 from eidrive_scenario.base.geometry import quaternion
 from eidrive_scenario.base.imports import optional_import
+from eidrive_scenario.export.mcap_topics import nanoseconds
 
 WORLD = "map"
 """Name of the world frame, the root of all frames."""
@@ -48,7 +49,7 @@ def escaped(name: str) -> str:
 
 def set_stamp(stamp: Any, time: float) -> None:
     """Set a timestamp [s]."""
-    stamp.FromNanoseconds(max(round(time * 1e9), 0))
+    stamp.FromNanoseconds(nanoseconds(time))
 
 
 def set_vector(vector: Any, values: Sequence[float]) -> None:

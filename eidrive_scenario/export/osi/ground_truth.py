@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 from eidrive_scenario.export.osi.lanes import LaneMap, TrafficLights
@@ -16,8 +14,6 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.rendering.daylight import daylight
 from eidrive_scenario.rendering.tone_mapping import LUMA
-from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 from eidrive_scenario.world.environment import Environment, weather_from_environment
 from eidrive_scenario.world.weather import Weather
 
@@ -40,7 +36,7 @@ _NO_SKY = "skyOff"
 
 
 def set_environment(
-    osi: Osi, conditions: Any, environment: Environment | None, time: float, fixed: Weather | None = None
+    osi: Osi, conditions: Any, environment: Environment | None, time: float, fixed: Weather | None
 ) -> None:
     """Set the values that the scenario or an option of the run specifies, at `time` [s] of the run.
 
@@ -132,33 +128,15 @@ _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
 
 
 class GroundTruthBuilder:
-    """Builder of the messages of one run. The first message contains the lanes and boundaries of the map.
+    """Builder of the messages of one run. The first message contains the lanes and boundaries of the map."""
 
-    host   name of the host vehicle, or None
-    towed  vehicle categories of trailers and semitrailers, by name
-    axles  axles of vehicles, by name
-    weather  that an option of the run sets instead of the scenario
-    """
-
-    def __init__(
-        self,
-        osi: Osi,
-        roads: RoadNetwork | None,
-        ids: Identifiers,
-        host: str | None,
-        towed: Mapping[str, str] = MappingProxyType({}),
-        axles: Mapping[str, AxleCenters] = MappingProxyType({}),
-        weather: Weather | None = None,
-    ) -> None:
+    def __init__(self, osi: Osi, run: RecordedRun) -> None:
         self._osi = osi
-        self._roads = roads
-        self._ids = ids
-        self._lanes = LaneMap(osi, roads, ids)
-        self._lights = TrafficLights(osi, roads, ids)
-        self._host = host
-        self._towed = towed
-        self._axles = axles
-        self._weather = weather
+        self._run = run
+        self._ids = Identifiers()
+        self._lanes = LaneMap(osi, run.roads, self._ids)
+        self._lights = TrafficLights(osi, run.roads, self._ids)
+        self._host = host_vehicle(run)
         self._has_map = False
 
     def build(self, frame: Frame) -> Any:
@@ -166,28 +144,22 @@ class GroundTruthBuilder:
         message = self._osi.begin(self._osi.ground_truth(), frame.view.time)
         if self._host is not None:
             message.host_vehicle_id.value = self._ids.of(ACTOR, self._host)
-        if self._roads is not None:
+        if self._run.roads is not None:
             message.map_reference = ROAD_FILE
-            self._set_projection(message)
+            message.proj_string = self._run.roads.header.geo_reference
+            if any(shift := self._run.roads.header.offset):
+                offset = message.proj_frame_offset
+                offset.position.x, offset.position.y, offset.position.z, offset.yaw = shift
         if not self._has_map:
             self._lanes.add(message)
             self._has_map = True
         lanes = self._lanes.assigned(frame.view)
-        add_moving_objects(self._osi, message, frame, self._ids, lanes, self._towed, self._axles)
+        add_moving_objects(self._osi, message, frame, self._ids, lanes, self._run)
         self._lights.add(message, frame.signals)
-        if frame.environment is not None or self._weather is not None:
+        if frame.environment is not None or self._run.weather is not None:
             conditions = message.environmental_conditions
-            set_environment(self._osi, conditions, frame.environment, frame.view.time, self._weather)
+            set_environment(self._osi, conditions, frame.environment, frame.view.time, self._run.weather)
         return message
-
-    def _set_projection(self, message: Any) -> None:
-        assert self._roads is not None
-        header = self._roads.header
-        message.proj_string = header.geo_reference
-        x, y, z, turn = header.offset
-        if any(header.offset):
-            offset = message.proj_frame_offset
-            offset.position.x, offset.position.y, offset.position.z, offset.yaw = x, y, z, turn
 
 
 def host_vehicle(run: RecordedRun) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation, set_vector
+from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation.recorded_outcome import AxleCenters
 from eidrive_scenario.world.appearance import Appearance
@@ -50,19 +50,11 @@ def object_type(category: str) -> str:
 
 
 def add_moving_objects(
-    osi: Osi,
-    message: Any,
-    frame: Frame,
-    ids: Identifiers,
-    lanes: Mapping[int, int],
-    towed: Mapping[str, str] = MappingProxyType({}),
-    axles: Mapping[str, AxleCenters] = MappingProxyType({}),
+    osi: Osi, message: Any, frame: Frame, ids: Identifiers, lanes: Mapping[int, int], run: RecordedRun
 ) -> None:
     """Add all actors to a GroundTruth message.
 
     lanes  identifiers of lanes by the row of the actor
-    towed  vehicle categories of trailers and semitrailers, by name
-    axles  axles of vehicles, by name
     """
     view = frame.view
     turns = rotation_matrix(view.yaw, view.pitch, view.roll)
@@ -87,11 +79,11 @@ def add_moving_objects(
         if category in VEHICLES:
             kind = osi.moving_object.VehicleClassification.Type
             classification = moving_object.vehicle_classification
-            classification.type = kind.Value(_TOWED.get(towed.get(name, ""), VEHICLES[category]))
+            classification.type = kind.Value(_TOWED.get(run.towed.get(name, ""), VEHICLES[category]))
             classification.has_trailer = name in frame.trailers
             if classification.has_trailer:
                 classification.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
-            _set_axles(moving_object.vehicle_attributes, view.offset[row], axles.get(name))
+            _set_axles(moving_object.vehicle_attributes, view.offset[row], run.axles.get(name))
             _set_lights(osi, classification.light_state, frame.appearances.get(name))
 
 

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from eidrive_scenario.base.imports import optional_import
+from eidrive_scenario.export.mcap_topics import nanoseconds
 
 
 class Identifiers:
@@ -52,11 +53,6 @@ class Osi:
 def set_time(stamp: Any, time: float) -> None:
     """Set a timestamp [s]."""
     stamp.seconds, stamp.nanos = divmod(nanoseconds(time), 1_000_000_000)
-
-
-def nanoseconds(time: float) -> int:
-    """Return a time [s] in nanoseconds, at least 0."""
-    return max(round(time * 1e9), 0)
 
 
 def set_vector(vector: Any, values: Any) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 from urllib.parse import quote
 
 from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder, host_vehicle
-from eidrive_scenario.export.osi.schemas import Identifiers, Osi, nanoseconds
+from eidrive_scenario.export.mcap_topics import ToolTopics, protobuf_registration, write_topics
+from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
@@ -43,110 +44,54 @@ def write_osi(run: RecordedRun, path: Path) -> None:
         message = f"an OSI trace has no suffix {path.suffix!r}"
         hint = f"give a file *{MULTI_CHANNEL} (multi-channel) or *{SINGLE_CHANNEL} (single-channel)"
         raise SettingError(Diagnostic(message, hint, str(path)))
-    osi = Osi()
+    if suffix == MULTI_CHANNEL:
+        write_topics(run, path, OsiTopics)
+        return
+    builder = GroundTruthBuilder(Osi(), run)
     with atomic_output(path) as partial, create(partial) as stream:
-        if suffix == SINGLE_CHANNEL:
-            _write_single_channel(osi, run, stream)
-        else:
-            _write_multi_channel(osi, run, stream)
+        for frame in run.frames():
+            for data in run.converted(frame, lambda frame: [builder.build(frame).SerializeToString()]):
+                stream.write(struct.pack("<I", len(data)) + data)
 
 
 def check_osi() -> None:
     """Raise SettingError if a library is missing."""
     Osi()
-    optional_import("mcap_protobuf.schema", "export")
+    protobuf_registration()
 
 
-def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
-    builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.axles, run.weather)
-    for frame in run.frames():
-        for data in run.converted(frame, lambda frame: [builder.build(frame).SerializeToString()]):
-            stream.write(struct.pack("<I", len(data)) + data)
+class OsiTopics(ToolTopics):
+    """Topics of OSI's multi-channel format in a file, which gets the metadata of a trace."""
 
-
-def _write_multi_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
-    from mcap.writer import CompressionType, Writer
-
-    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(profile="", library="eidrive-scenario")
-    topics = OsiTopics(writer, run, osi)
-    for frame in run.frames():
-        topics.add(frame)
-    writer.finish()  # type: ignore[no-untyped-call]
-
-
-class OsiTopics:
-    """Topics of OSI's multi-channel format in a file, each registered with its first message.
-
-    writer  writer of an MCAP file, which gets the metadata of a trace
-    run     run whose frames are added in order
-
-    Raise SettingError if a library is missing.
-    """
-
-    def __init__(self, writer: Any, run: RecordedRun, osi: Osi | None = None) -> None:
-        self._writer = writer
-        self._run = run
-        self._osi = osi = osi or Osi()
-        self._register = optional_import("mcap_protobuf.schema", "export").register_schema
-        self._protobuf = optional_import("google.protobuf", "export").__version__
-        self._traces = _Traces(osi, run)
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
+    def __init__(self, writer: Any, run: RecordedRun) -> None:
+        super().__init__(writer, run)
+        self._osi = osi = Osi()
+        self._truth = GroundTruthBuilder(osi, run)
+        self._sensors = Identifiers(_FIRST_SENSOR)
+        self._stations: dict[tuple[str, str], SensorDataBuilder] = {}
+        protobuf = optional_import("google.protobuf", "export").__version__
+        self._versions = {"osi_version": osi.version, "protobuf_version": protobuf}
+        limits = {f"{edge}_{name}": version for edge in ("min", "max") for name, version in self._versions.items()}
         source = f"eidrive-scenario {run.recording.metadata.get('eidrive-scenario', 'unknown')}"
-        metadata = {
-            f"{edge}_{name}_version": version
-            for edge in ("min", "max")
-            for name, version in (("osi", osi.version), ("protobuf", self._protobuf))
-        }
         description = {"description": f"{run.title}; {_CONVENTIONS}", "data_sources": source}
-        writer.add_metadata(TRACE_METADATA, {"version": osi.version, **metadata, **description})
+        writer.add_metadata(TRACE_METADATA, {"version": osi.version, **limits, **description})
 
     def add(self, frame: Frame) -> None:
         """Add the messages of a frame."""
-        instant = nanoseconds(frame.view.time)
-        for topic, text, message in self._run.converted(frame, self._traces.messages):
-            if topic not in self._channels:
-                self._channels[topic] = self._channel(topic, text, type(message))
-            self._writer.add_message(self._channels[topic], instant, message.SerializeToString(), instant)
+        for topic, description, message in self._run.converted(frame, self._messages):
+            about = {f"{_CHANNEL}.{key}": text for key, text in (*self._versions.items(), ("description", description))}
+            self.write(topic, message, frame.view.time, about)
 
-    def finish(self) -> None:
-        """Do nothing: a trace has no messages after the last frame."""
-
-    def _channel(self, topic: str, text: str, kind: Any) -> int:
-        name = kind.DESCRIPTOR.full_name
-        if name not in self._schemas:
-            self._schemas[name] = self._register(self._writer, kind)
-        entries = {"osi_version": self._osi.version, "protobuf_version": self._protobuf, "description": text}
-        about = {f"{_CHANNEL}.{key}": value for key, value in entries.items()}
-        number: int = self._writer.register_channel(topic, "protobuf", self._schemas[name], about)
-        return number
-
-
-class _Traces:
-    """All messages of a run with their topics and descriptions."""
-
-    def __init__(self, osi: Osi, run: RecordedRun) -> None:
-        self._osi = osi
-        self._sensors = Identifiers(_FIRST_SENSOR)
-        self._axles = run.axles
-        self._truth = GroundTruthBuilder(
-            osi, run.roads, Identifiers(), host_vehicle(run), run.towed, self._axles, run.weather
-        )
-        self._title = run.title
-        self._stations: dict[tuple[str, str], SensorDataBuilder] = {}
-
-    def messages(self, frame: Frame) -> Iterator[tuple[str, str, Any]]:
+    def _messages(self, frame: Frame) -> Iterator[tuple[str, str, Any]]:
         """Yield topic, description and message of a frame."""
-        yield GROUND_TRUTH, f"ground truth of {self._title}", self._truth.build(frame)
+        yield GROUND_TRUTH, f"ground truth of {self._run.title}", self._truth.build(frame)
         for station in frame.steps:
             for name, text in _LISTS.items():
-                key = station, name
-                if key not in self._stations:
-                    self._stations[key] = SensorDataBuilder(
-                        self._osi, self._sensors, station, name, self._axles.get(station)
-                    )
-                message = self._stations[key].build(frame)
+                if (station, name) not in self._stations:
+                    axles = self._run.axles.get(station)
+                    builder = SensorDataBuilder(self._osi, self._sensors, station, name, axles)
+                    self._stations[station, name] = builder
+                message = self._stations[station, name].build(frame)
                 if message is not None:
                     yield sensor_data_topic(station, name), f"{text} of {station}", message
 

@@ -5,20 +5,23 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 from written_recording import view, write_run
 
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
-from eidrive_scenario.export.osi.schemas import Identifiers, Osi
+from eidrive_scenario.export.osi.schemas import Osi
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.environment import Environment
 
 
 def conditions(environment: Environment) -> Any:
-    builder = GroundTruthBuilder(Osi(), None, Identifiers(), None)
-    return builder.build(Frame(view({"A": {}}), environment=environment)).environmental_conditions
+    with TemporaryDirectory() as folder:
+        run = write_run(Path(folder), [Frame(view({"A": {}}), environment=environment)])
+        (message,) = map(GroundTruthBuilder(Osi(), run).build, run.frames())
+    return message.environmental_conditions
 
 
 def test_environment_is_in_classes_of_standard() -> None:
@@ -90,7 +93,7 @@ def test_clouds_are_in_eighths_of_the_sky(clouds: str, name: str) -> None:
 def test_only_a_full_sky_has_eight_eighths(tmp_path: Path, cover: float, name: str) -> None:
     metadata = {"settings": json.dumps({"weather_profile": {"cloud_cover": cover}})}
     run = write_run(tmp_path, [Frame(view({"A": {}}))], metadata=metadata)
-    builder = GroundTruthBuilder(Osi(), None, Identifiers(), None, weather=run.weather)
+    builder = GroundTruthBuilder(Osi(), run)
     (found,) = (builder.build(frame).environmental_conditions.clouds for frame in run.frames())
     assert type(found).FractionalCloudCover.Name(found.fractional_cloud_cover) == f"FRACTIONAL_CLOUD_COVER_{name}_OKTAS"
 
@@ -131,7 +134,7 @@ def test_weather_option_replaces_that_of_the_scenario(tmp_path: Path) -> None:
     metadata = {"settings": json.dumps({"weather_profile": profile | {"visual_range": 100}})}
     day = Environment(date_time="2026-06-21T12:00:00", fog_range=20_000.0, precipitation="dry", temperature=280.0)
     run = write_run(tmp_path, [Frame(view({"A": {}}), environment=day), Frame(view({"A": {}}, 1))], metadata=metadata)
-    builder = GroundTruthBuilder(Osi(), None, Identifiers(), None, weather=run.weather)
+    builder = GroundTruthBuilder(Osi(), run)
     for frame in run.frames():
         found = builder.build(frame).environmental_conditions
         kinds = type(found)
