@@ -209,90 +209,63 @@ class RunState(msgspec.Struct):
 
 def execute(commands: Commands, run: RunState) -> None:
     """Execute all commands of one tick but the placements, which are an argument of `World.step`."""
-    for handler in HANDLERS:
-        handler(commands, run)
-
-
-def remove_actors(commands: Commands, run: RunState) -> None:
-    """Remove actors from the world and the stack."""
+    world, stack = run.world, run.stack
     for name in sorted(commands.removals):
-        run.world.remove(name)
-        run.stack.remove(name)
-
-
-def set_trailers(commands: Commands, run: RunState) -> None:
-    """Set which actors are connected, before a trailer enters the world."""
-    if commands.trailers is run.trailers:
-        return
-    run.trailers = commands.trailers
-    run.world.set_trailers([frozenset(pair) for pair in commands.trailers.items()])
-
-
-def spawn_actors(commands: Commands, run: RunState) -> None:
-    """Add actors to the world and the stack."""
+        world.remove(name)
+        stack.remove(name)
+    if commands.trailers is not run.trailers:  # connected before a trailer enters the world
+        run.trailers = commands.trailers
+        world.set_trailers([frozenset(pair) for pair in commands.trailers.items()])
     for name, placement in commands.spawns.items():
         spec = commands.actor_specs.get(name) or actor_spec(name, run.scenario.entities[name])
-        run.world.add(spec, placement)
-        run.stack.add(spec)
-
-
-def switch_drivers(commands: Commands, run: RunState) -> None:
-    """Switch each vehicle of the stack between its own controls and scripted motion."""
-    for name in sorted(run.stack.drivers):
-        run.world.set_driven(name, name in commands.driven)
-
-
-def set_inputs(commands: Commands, run: RunState) -> None:
-    """Pass goals and signal states to the next step of the stack."""
+        world.add(spec, placement)
+        stack.add(spec)
+    for name in sorted(stack.drivers):
+        world.set_driven(name, name in commands.driven)
     run.inputs = StackInputs(commands.goals, commands.signals)
+    world.set_display_state(commands.signals, commands.appearances)
+    _set_weather(commands.environment, run)
+    for command in commands.custom:
+        _execute_custom(command, run)
 
 
-def set_display_state(commands: Commands, run: RunState) -> None:
-    """Show signal states and appearances in camera images."""
-    run.world.set_display_state(commands.signals, commands.appearances)
-
-
-def set_weather(commands: Commands, run: RunState) -> None:
+def _set_weather(environment: Environment | None, run: RunState) -> None:
     """Set the weather of an EnvironmentAction, unless an option overrides it. The sun follows a running clock."""
     if run.weather_fixed:
         return
-    if commands.environment is not None:
-        run.environment = commands.environment
+    if environment is not None:
+        run.environment = environment
     elif run.environment is None or not run.environment.moves_sun or run.world.time < run.weather_since + SUN_PERIOD:
         return
     run.weather_since = run.world.time
     run.world.set_weather(weather_from_environment(run.environment, run.world.time))
 
 
-def execute_custom(commands: Commands, run: RunState) -> None:
-    """Execute CustomCommandActions. A command of another tool has no effect, which is a warning."""
-    for command in commands.custom:
-        if command.type != CRITERION:  # `add_criteria` records criteria with all their settings
-            run.record(command.type, command.content)
-        handler = CUSTOM_HANDLERS.get(command.type)
-        if handler is not None:
-            handler(command, run)
-        elif not command.type.startswith(PREFIX):
-            run.warnings.append(
-                f"{command.source}:{command.line}: command of type {command.type!r} is recorded, not executed"
-            )
+def _execute_custom(command: CustomCommand, run: RunState) -> None:
+    """Execute a CustomCommandAction. No command starts a program; one of another tool is a warning without effect."""
+    if command.type == CRITERION:  # `add_criteria` records criteria with all their settings
+        add_criteria(_declared_by(command, run), run)
+        return
+    run.record(command.type, command.content)
+    if command.type == CHANNEL:
+        scope, line = command.scope, command.line
+        warnings = run.stack.request_channel(command.content, source=command.source, line=line, scope=scope)
+        run.warnings += map(str, warnings)
+    elif command.type in EXITS:
+        run.exit = exit_verdict(command, run.world.time)
+    elif not command.type.startswith(PREFIX):
+        message = f"command of type {command.type!r} is recorded, not executed"
+        run.warnings.append(f"{command.source}:{command.line}: {message}")
 
 
-def select_channel(command: CustomCommand, run: RunState) -> None:
-    """Select the channel of a command `eidrive.channel`."""
-    warnings = run.stack.request_channel(command.content, source=command.source, line=command.line, scope=command.scope)
-    run.warnings += map(str, warnings)
-
-
-def declare(command: CustomCommand, run: RunState) -> None:
-    """Add the criteria of a command `eidrive.criterion`."""
+def _declared_by(command: CustomCommand, run: RunState) -> tuple[CriterionDeclaration, ...]:
+    """Return the criteria of a command `eidrive.criterion`."""
     declarations = run.declared.get(command_key(command))
-    if declarations is None:  # A command that an action of an extension has created
-        context = CriteriaContext(tuple(run.scenario.entities), has_roads=run.roads is not None)
-        declarations = parse_criteria(
-            command.content, context, source=command.source, line=command.line, scope=command.scope
-        )
-    add_criteria(declarations, run)
+    if declarations is not None:
+        return declarations
+    # A command that an action of an extension has created
+    context = CriteriaContext(tuple(run.scenario.entities), has_roads=run.roads is not None)
+    return parse_criteria(command.content, context, source=command.source, line=command.line, scope=command.scope)
 
 
 def add_criteria(declarations: Iterable[CriterionDeclaration], run: RunState) -> None:
@@ -303,28 +276,3 @@ def add_criteria(declarations: Iterable[CriterionDeclaration], run: RunState) ->
         bind_roads(criterion, run.roads)
         run.record(CRITERION, declaration_text(declaration, criterion.name))
     run.criteria += added
-
-
-def end_run(command: CustomCommand, run: RunState) -> None:
-    """End the run with the verdict of an exit command."""
-    run.exit = exit_verdict(command, run.world.time)
-
-
-HANDLERS: tuple[Callable[[Commands, RunState], None], ...] = (
-    remove_actors,
-    set_trailers,
-    spawn_actors,
-    switch_drivers,
-    set_inputs,
-    set_display_state,
-    set_weather,
-    execute_custom,
-)
-"""Handlers of `Commands`, in the order of execution."""
-
-CUSTOM_HANDLERS: dict[str, Callable[[CustomCommand, RunState], None]] = {
-    CHANNEL: select_channel,
-    CRITERION: declare,
-    **dict.fromkeys(EXITS, end_run),
-}
-"""Handlers of CustomCommandActions by type. No command starts a program."""
