@@ -11,13 +11,14 @@ from pathlib import Path
 
 from lxml import etree
 
+from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.files.bounded import MIB, read_regular_file
 from eidrive_scenario.files.yaml_text import is_inline
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.reading.document import VERSIONS
 from eidrive_scenario.openscenario.reading.parsing import open_document
 from eidrive_scenario.openscenario.reading.schema import rules
-from eidrive_scenario.openscenario.scenario import Scenario
+from eidrive_scenario.openscenario.scenario import EntitySelections, Scenario
 from eidrive_scenario.openscenario.validation.names import LEVELS, ReferenceMatch
 
 WORD = re.compile(r"\w+")
@@ -88,6 +89,7 @@ class Outline:
         self.root = Node(scenario.storyboard, None, ("storyboard",), None)
         self.root.children = [self._node(story, self.root, ()) for story in scenario.storyboard.story]
         self.nodes = tuple(self.root.walk())
+        self._selections = EntitySelections(scenario)
         self._references = ReferenceMatch((node.path, node) for node in self.nodes)
 
     def _node(self, element: model.Element, parent: Node, above: tuple[str, ...]) -> Node:
@@ -103,24 +105,12 @@ class Outline:
         """Return the elements of a level to which a reference applies."""
         return [node for node in self._references.by(reference) if node.level is level]
 
-    def members(self, name: str, enclosing: tuple[str, ...] = ()) -> tuple[str, ...]:
-        """Return the entity of this name, or the members of the selection of this name.
-
-        enclosing  selections that contain it, to end recursion
-        """
-        if name in self.scenario.entities:
+    def members(self, name: str) -> tuple[str, ...]:
+        """Return the entity of this name, or the members of the selection of this name."""
+        try:
+            return tuple(self._selections.members(name)) or (name,)
+        except ScenarioError:  # a selection in itself, which the setup of the run reports
             return (name,)
-        entities = self.scenario.document.entities
-        members: list[str] = []
-        for selection in entities.entity_selection if entities else ():
-            if selection.name != name:
-                continue
-            for ref in selection.members.entity_ref:
-                if ref.entity_ref not in (name, *enclosing):
-                    members += self.members(ref.entity_ref, (*enclosing, name))
-            for by_type in selection.members.by_type:
-                members += self.scenario.entities_by_type.get(by_type.object_type, ())
-        return tuple(dict.fromkeys(members)) or (name,)
 
     def actors(self, node: Node) -> tuple[str, ...]:
         """Return the actors of a storyboard element that the file lists."""
