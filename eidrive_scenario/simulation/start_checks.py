@@ -8,7 +8,7 @@ the start beside a road.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import islice
 
 import numpy as np
@@ -163,10 +163,10 @@ def spawn_warnings(
     gaps = _gaps(roads, view, names)
     on_road = [name for name in names if gaps[name] <= MARGIN]
     yield from overlapping_spawns(scenario, view, on_road, among=[*on_road, *drivers])
-    on_trajectories = _on_trajectories(scenario)
+    guided = _performers(scenario, lambda element: isinstance(element, model.FollowTrajectoryAction))
     for name in names:
         moving = abs(float(view.speed[view.rows[name]])) >= MOVING
-        if moving and MARGIN < gaps[name] <= BESIDE and name not in on_trajectories:
+        if moving and MARGIN < gaps[name] <= BESIDE and name not in guided:
             x, y, *_ = view.plain_boxes[view.rows[name]]
             message = (
                 f"{quoted(name)} starts at ({x:.1f}, {y:.1f}) m and moves, {gaps[name]:.0f} m off the nearest road"
@@ -193,16 +193,15 @@ def _gaps(roads: RoadNetwork | None, view: WorldView, names: list[str]) -> dict[
     return gaps
 
 
-def _on_trajectories(scenario: Scenario) -> frozenset[str]:
-    """Return the entities that follow a trajectory at any time."""
+def _performers(scenario: Scenario, is_wanted: Callable[[model.Element], bool]) -> frozenset[str]:
+    """Return the entities that may perform an action with such an element, in Init or in an event."""
     selections, names = EntitySelections(scenario), set[str]()
     for private in scenario.storyboard.init.actions.private:
-        if any(isinstance(element, model.FollowTrajectoryAction) for element in private.walk()):
+        if any(map(is_wanted, private.walk())):
             names.update(selections.members(private.entity_ref))
     for group in _groups(scenario):
-        if any(isinstance(element, model.FollowTrajectoryAction) for element in group.walk()):
-            for actor in group.actors.entity_ref:
-                names.update(selections.members(actor.entity_ref))
+        if any(map(is_wanted, _elements(scenario, group))):
+            names.update(_actors(scenario, selections, group))
     return frozenset(names)
 
 
@@ -259,14 +258,7 @@ def _moved(scenario: Scenario) -> frozenset[str]:
     own = registry("actions")
     if any(command.type in own for command in scenario.custom_commands):
         return frozenset(scenario.entities)
-    selections, names = EntitySelections(scenario), set[str]()
-    for private in scenario.storyboard.init.actions.private:
-        if any(map(_moves, private.private_action)):
-            names.update(selections.members(private.entity_ref))
-    for group in _groups(scenario):
-        if any(isinstance(element, model.PrivateAction) and _moves(element) for element in _elements(scenario, group)):
-            names.update(_actors(scenario, selections, group))
-    return frozenset(names)
+    return _performers(scenario, lambda element: isinstance(element, model.PrivateAction) and _moves(element))
 
 
 def _moves(action: model.PrivateAction) -> bool:

@@ -6,8 +6,22 @@ from pathlib import Path
 
 import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
-from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
-from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml, world_position_xml
+from openscenario_xml import agent_xml, catalog_xml, object_xml, road_file_xml, scenario_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    end_xml,
+    event_xml,
+    group_xml,
+    init_xml,
+    lane_position_xml,
+    maneuver_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+    world_position_xml,
+)
 
 from eidrive_scenario.base.geometry import Box, overlap
 from eidrive_scenario.checks.scenario_checks import check_scenario
@@ -234,3 +248,25 @@ def test_scripted_vehicle_that_moves_beside_the_road_is_a_warning(
     if warned:
         assert "'Ego' starts at" in found[0]
         assert "12 m off the nearest road" in found[0]
+
+
+def test_vehicle_on_trajectory_of_catalog_maneuver_may_start_beside_road(tmp_path: Path) -> None:
+    vertices = "".join(
+        f'<Vertex time="{time}"><Position>{world(20 + 10 * time, 15.5)}</Position></Vertex>' for time in (0, 1)
+    )
+    trajectory = f'<Trajectory name="t" closed="false"><Shape><Polyline>{vertices}</Polyline></Shape></Trajectory>'
+    follow = f"""<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef>{trajectory}</TrajectoryRef>
+    <TimeReference><None/></TimeReference><TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction>
+    </RoutingAction></PrivateAction>"""
+    maneuver = maneuver_xml(event_xml("follow", follow, trigger_xml(condition_xml(time_xml(0.05)))))
+    (tmp_path / "ways.xosc").write_bytes(catalog_xml("ways", maneuver))
+    path = write(tmp_path, world(20, 15.5), lane_position_xml(-1, 200), driven=False)
+    action = f"<PrivateAction><LongitudinalAction>{STEP.format(10.0)}</LongitudinalAction></PrivateAction>"
+    text = path.read_text().replace("</PrivateAction>", "</PrivateAction>" + action, 1)
+    text = text.replace(
+        "<CatalogLocations>", "<CatalogLocations><ManeuverCatalog><Directory path='.'/></ManeuverCatalog>"
+    )
+    reference = '<CatalogReference catalogName="ways" entryName="maneuver"/>'
+    story = acts_xml(act_xml(group_xml(reference)))
+    path.write_text(text.replace("</Init>", f"</Init>{story}"))
+    assert not start_warnings(path)
