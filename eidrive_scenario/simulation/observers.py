@@ -25,17 +25,6 @@ class Observer(Protocol):
         """Finish after the last frame."""
 
 
-def checked_observer(observer: Observer) -> Observer:
-    """Return an observer. Raise SettingError for an object that lacks the methods of an observer."""
-    for method in ("observe", "close"):
-        if not callable(getattr(observer, method, None)):
-            name = type(observer).__name__
-            raise SettingError(
-                Diagnostic(f"observer {name} has no method {method}", "define observe(frame) and close()")
-            )
-    return observer
-
-
 def checked_observers(observers: Iterable[Observer]) -> tuple[Observer, ...]:
     """Return observers. Raise SettingError for an object that is no list of them, such as a single one."""
     if not isinstance(observers, Iterable):
@@ -44,16 +33,12 @@ def checked_observers(observers: Iterable[Observer]) -> tuple[Observer, ...]:
 
 
 class Observers:
-    """The observers of one run. Each is closed exactly once.
+    """The observers of one run. Each is closed exactly once."""
 
-    Raise SettingError for an object that lacks the methods of an observer.
-    """
-
-    def __init__(self, observers: Iterable[Observer] = ()) -> None:
+    def __init__(self) -> None:
         self._observers: tuple[Observer, ...] = ()
         self._unclosed: list[Observer] = []
         self._waiting: list[Observer] = []
-        self.add(*observers)
 
     def __iter__(self) -> Iterator[Observer]:
         return iter(self._observers)
@@ -61,7 +46,11 @@ class Observers:
     def add(self, *observers: Observer) -> None:
         """Add observers of all frames from now on. Raise SettingError if one lacks a method."""
         for observer in observers:
-            self._observers = (*self._observers, checked_observer(observer))
+            for method in ("observe", "close"):
+                if not callable(getattr(observer, method, None)):
+                    message = f"observer {type(observer).__name__} has no method {method}"
+                    raise SettingError(Diagnostic(message, "define observe(frame) and close()"))
+            self._observers = (*self._observers, observer)
             self._unclosed.append(observer)
             self._waiting.append(observer)
 

@@ -71,8 +71,28 @@ class RunResult:
         return f"{head}: {outcome} ({self.end_reason} at {self.simulated_s:.2f} s{warned})"
 
     def _repr_html_(self) -> str:
-        """Return the outcome as HTML for notebooks; all texts are escaped."""
-        return result_html(self)
+        """Return the outcome as an HTML fragment for notebooks: title, table of criteria, end, warnings."""
+        word = outcome_word(self)
+        color = {"passed": "#1a7f37", "not judged": "#9a6700"}.get(word, "#b42318")
+        title = f"{escape(self.scenario)}, seed {self.seed}, channel {escape(self.channel)}"
+        rows = "".join(
+            f"<tr><td>{escape(verdict.name)}</td><td>{'passed' if verdict.passed else 'failed'}</td>"
+            f"<td>{escape(quantity_text(verdict.value, verdict.unit))}</td>"
+            f"<td>{escape(quantity_text(verdict.limit, verdict.unit))}</td>"
+            '<td style="text-align:left">'
+            f"{'<br>'.join(map(escape, (verdict.reason, *verdict.violation_state)))}</td></tr>"
+            for verdict in self.criteria
+        )
+        heads = "".join(f"<th>{head}</th>" for head in ("criterion", "", "value", "limit", "reason"))
+        table = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
+        warnings = "".join(f"<li>{escape(warning)}</li>" for warning in self.warnings)
+        mark = escape(self.trace_hash[:12])
+        return (
+            f'<div><p><b>{title}</b>: <b style="color:{color}">{word}</b></p>{table}'
+            f"<p>{escape(self.end_reason)} at {self.simulated_s:.2f} s, trace <code>{mark}</code></p>"
+            + (f"<p>warnings:</p><ul>{warnings}</ul>" if warnings else "")
+            + "</div>"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as one flat row: every value is a number, a text, a truth value or None.
@@ -81,7 +101,27 @@ class RunResult:
         channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names;
         `warnings`, the number of them. `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
         """
-        return result_row(self)
+        row: dict[str, Scalar] = {
+            "scenario": self.scenario,
+            "run": self.run,
+            "seed": self.seed,
+            "channel": self.channel,
+            "passed": bool(self.passed),
+            "end_reason": self.end_reason,
+            "exit_code": self.exit_code,
+            "simulated_s": float(self.simulated_s),
+            "wall_s": float(self.wall_s),
+            "warnings": len(self.warnings),
+            **{option.name: getattr(self.settings, option.name) for option in OPTIONS if option.in_row},
+        }
+        row.update((f"parameter.{name}", typed(text)) for name, text in self.parameters.items())
+        row.update(_flat("channel", self.settings.channel_profile or {}))
+        for verdict in self.criteria:
+            row[f"{verdict.name}.passed"] = bool(verdict.passed)
+            row[f"{verdict.name}.value"] = None if verdict.value is None else float(verdict.value)
+            row[f"{verdict.name}.limit"] = None if verdict.limit is None else float(verdict.limit)
+        row.update((name, float(value)) for name, value in self.metrics.items())
+        return {**row, "settings_sha256": self.settings.digest, "trace_hash": self.trace_hash}
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that `--json` prints."""
@@ -116,31 +156,6 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
     return {**{key: getattr(verdict, key) for key in keys}, "violation_state": list(verdict.violation_state)}
 
 
-def result_row(result: RunResult) -> dict[str, Scalar]:
-    """Return the columns that `RunResult.to_dict` describes."""
-    row: dict[str, Scalar] = {
-        "scenario": result.scenario,
-        "run": result.run,
-        "seed": result.seed,
-        "channel": result.channel,
-        "passed": bool(result.passed),
-        "end_reason": result.end_reason,
-        "exit_code": result.exit_code,
-        "simulated_s": float(result.simulated_s),
-        "wall_s": float(result.wall_s),
-        "warnings": len(result.warnings),
-        **{option.name: getattr(result.settings, option.name) for option in OPTIONS if option.in_row},
-    }
-    row.update((f"parameter.{name}", typed(text)) for name, text in result.parameters.items())
-    row.update(_flat("channel", result.settings.channel_profile or {}))
-    for verdict in result.criteria:
-        row[f"{verdict.name}.passed"] = bool(verdict.passed)
-        row[f"{verdict.name}.value"] = None if verdict.value is None else float(verdict.value)
-        row[f"{verdict.name}.limit"] = None if verdict.limit is None else float(verdict.limit)
-    row.update((name, float(value)) for name, value in result.metrics.items())
-    return {**row, "settings_sha256": result.settings.digest, "trace_hash": result.trace_hash}
-
-
 def typed(text: str) -> Scalar:
     """Return the text of a parameter as a number if it is one; `007` and words remain texts."""
     if _WHOLE.fullmatch(text):
@@ -159,30 +174,6 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Scalar]]:
         yield name, json.dumps(value)
     else:
         yield name, value if isinstance(value, str | int | float | bool) or value is None else str(value)
-
-
-def result_html(result: RunResult) -> str:
-    """Return the outcome as an HTML fragment: title, table of criteria, end, warnings."""
-    word = outcome_word(result)
-    color = {"passed": "#1a7f37", "not judged": "#9a6700"}.get(word, "#b42318")
-    title = f"{escape(result.scenario)}, seed {result.seed}, channel {escape(result.channel)}"
-    rows = "".join(
-        f"<tr><td>{escape(verdict.name)}</td><td>{'passed' if verdict.passed else 'failed'}</td>"
-        f"<td>{escape(quantity_text(verdict.value, verdict.unit))}</td>"
-        f"<td>{escape(quantity_text(verdict.limit, verdict.unit))}</td>"
-        f'<td style="text-align:left">{"<br>".join(map(escape, (verdict.reason, *verdict.violation_state)))}</td></tr>'
-        for verdict in result.criteria
-    )
-    heads = "".join(f"<th>{head}</th>" for head in ("criterion", "", "value", "limit", "reason"))
-    table = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
-    warnings = "".join(f"<li>{escape(warning)}</li>" for warning in result.warnings)
-    mark = escape(result.trace_hash[:12])
-    return (
-        f'<div><p><b>{title}</b>: <b style="color:{color}">{word}</b></p>{table}'
-        f"<p>{escape(result.end_reason)} at {result.simulated_s:.2f} s, trace <code>{mark}</code></p>"
-        + (f"<p>warnings:</p><ul>{warnings}</ul>" if warnings else "")
-        + "</div>"
-    )
 
 
 def outcome_word(result: RunResult) -> str:
