@@ -37,7 +37,10 @@ class JsonText:
         self._is_finite = _check_of(kind)
         self._arrays = _ArrayTexts()
         self._encoder = msgspec.json.Encoder(enc_hook=self._arrays.plain)
-        self._decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(kind, dec_hook=_decode_array)
+        # The hook gets arrays: other types that msgspec does not support have no encoding
+        self._decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(
+            kind, dec_hook=lambda array_kind, data: codec(array_kind).decode(data)
+        )
 
     def decode(self, data: bytes) -> Any:
         """Return the record of a text. Sequences are lists or tuples, and unknown fields are ignored where possible.
@@ -92,11 +95,6 @@ class _ArrayTexts:
         return text
 
 
-def _decode_array(kind: Any, data: Any) -> Any:
-    """Return an array of the given type. Other types that msgspec does not support have no encoding."""
-    return codec(kind).decode(data)
-
-
 def _plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
@@ -114,32 +112,24 @@ def _check_of(kind: Any) -> Check | None:
     if kind is float:
         return isfinite
     if origin in (Union, types.UnionType):
-        return _optional(next((check for argument in arguments if (check := _check_of(argument)) is not None), None))
+        check = next(filter(None, map(_check_of, arguments)), None)
+        return check and (lambda value: value is None or check(value))
     if origin is frozenset:
         raise TypeError(f"{kind!r}: the order of its members is undefined")
     if origin is tuple and arguments[-1] is not Ellipsis:
-        checks = [_check_of(argument) for argument in arguments]
-        return None if not any(checks) else lambda values: _all_pass(checks, values)
+        checks = list(map(_check_of, arguments))
+        if not any(checks):
+            return None
+        return lambda values: all(each is None or each(value) for each, value in zip(checks, values, strict=True))
     if origin in (tuple, Sequence):
-        return _several(_check_of(arguments[0]))
+        of_entry = _check_of(arguments[0])
+        return of_entry and (lambda values: all(map(of_entry, values)))
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        inner = _several(_check_of(arguments[1]))
-        return None if inner is None else lambda mapping: inner(mapping.values())
+        of_value = _check_of(arguments[1])
+        return of_value and (lambda mapping: all(map(of_value, mapping.values())))
     if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, msgspec.Struct)):
         return _record(kind)
     return None
-
-
-def _optional(inner: Check | None) -> Check | None:
-    return None if inner is None else lambda value: value is None or inner(value)
-
-
-def _several(inner: Check | None) -> Check | None:
-    return None if inner is None else lambda values: all(map(inner, values))
-
-
-def _all_pass(checks: Sequence[Check | None], values: Sequence[Any]) -> bool:
-    return all(check is None or check(value) for check, value in zip(checks, values, strict=True))
 
 
 def _record(kind: type) -> Check | None:
@@ -148,18 +138,14 @@ def _record(kind: type) -> Check | None:
     names = msgspec.structs.fields(kind) if issubclass(kind, msgspec.Struct) else fields(kind)  # type: ignore[arg-type]
     checks = [(field.name, check) for field in names if (check := _check_of(hints[field.name])) is not None]
     numbers = [name for name, check in checks if check is isfinite]
-    others = [(attrgetter(name), check) for name, check in checks if check is not isfinite]
     if not checks:
         return None
     several = attrgetter(*numbers) if len(numbers) > 1 else None
-    first = attrgetter(numbers[0]) if len(numbers) == 1 else None
+    others = [(attrgetter(name), check) for name, check in checks if several is None or check is not isfinite]
 
     def is_finite(record: Any) -> bool:
-        if several is not None:
-            # The sum of finite numbers is finite but for an overflow, which only costs time
-            if not isfinite(sum(several(record))):
-                return False
-        elif first is not None and not isfinite(first(record)):
+        # The sum of finite numbers is finite but for an overflow, which only costs time
+        if several is not None and not isfinite(sum(several(record))):
             return False
         for field, check in others:  # noqa: SIM110 - faster than all()
             if not check(field(record)):
