@@ -30,8 +30,10 @@ class Table:
     rows: Callable[[RecordedRun], Iterator[Row]]
 
 
-def _floats(*names: str) -> dict[str, type]:
-    return dict.fromkeys(names, float)
+def _columns(names: str) -> Columns:
+    """Return columns from their names; one that does not contain numbers is `NAME:TYPE`."""
+    types = {"": float, "int": int, "str": str, "bool": bool}
+    return {name: types[kind] for name, _, kind in (word.partition(":") for word in names.split())}
 
 
 def _of_frames(rows: Callable[[Frame], Iterable[Row]]) -> Callable[[RecordedRun], Iterator[Row]]:
@@ -108,66 +110,32 @@ def _verdicts(run: RecordedRun) -> Iterator[Row]:
         yield (verdict.name, verdict.passed, *measured, verdict.reason, "; ".join(verdict.violation_state))
 
 
-_TIME = _floats("time")
-_BOX = _floats("x", "y", "z", "length", "width", "height", "yaw")
 TABLES: Mapping[str, Table] = {
     "actors": Table(
-        {
-            **_TIME,
-            "name": str,
-            **_floats("x", "y", "z", "h", "p", "r", "speed"),
-            "category": str,
-            **_floats("vx", "vy", "vz", "ax", "ay", "az", "yaw_rate", "length", "width", "height"),
-            "tick": int,
-        },
+        _columns(
+            "time name:str x y z h p r speed category:str vx vy vz ax ay az yaw_rate length width height tick:int"
+        ),
         _of_frames(_actors),
     ),
     "objects": Table(
-        {
-            **_TIME,
-            **dict.fromkeys(("station", "list", "class"), str),
-            **_BOX,
-            **_floats("score", "existence", "vx", "vy"),
-            "track": int,
-        },
+        _columns("time station:str list:str class:str x y z length width height yaw score existence vx vy track:int"),
         _of_frames(_objects),
     ),
     "plans": Table(
-        {
-            **_TIME,
-            **dict.fromkeys(("station", "reason"), str),
-            **_floats("speed", "acceleration", "braking", "throttle", "brake", "steering"),
-        },
-        _of_frames(_plans),
+        _columns("time station:str reason:str speed acceleration braking throttle brake steering"), _of_frames(_plans)
     ),
     "messages": Table(
-        {
-            **_floats("sent"),
-            **dict.fromkeys(("sender", "receiver"), str),
-            "number": int,
-            "outcome": str,
-            **_floats("arrives"),
-            "reason": str,
-            "size": int,
-            **_floats("path_loss_db", "snr_db"),
-            **dict.fromkeys(("los", "blockers"), str),
-            "expired": bool,
-        },
+        _columns(
+            "sent sender:str receiver:str number:int outcome:str arrives reason:str size:int path_loss_db snr_db "
+            "los:str blockers:str expired:bool"
+        ),
         _messages,
     ),
     "transitions": Table(
-        {**_TIME, **dict.fromkeys(("kind", "path", "transition", "state", "reason"), str)}, _of_frames(_transitions)
+        _columns("time kind:str path:str transition:str state:str reason:str"), _of_frames(_transitions)
     ),
     "verdicts": Table(
-        {
-            "name": str,
-            "passed": bool,
-            **_floats("value", "limit"),
-            "unit": str,
-            **_floats("first_violation"),
-            **dict.fromkeys(("reason", "violation_state"), str),
-        },
-        _verdicts,
+        _columns("name:str passed:bool value limit unit:str first_violation reason:str violation_state:str"), _verdicts
     ),
 }
 """Tables by name."""
