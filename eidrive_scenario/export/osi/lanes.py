@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,6 @@ class LaneMap:
         if self._roads is None:
             return
         spacing = point_spacing(self._roads)
-        ways = _successors(self._roads)
         for road in self._roads.roads.values():
             for section in road.sections:
                 if section.length <= 0.0:
@@ -60,7 +58,7 @@ class LaneMap:
                         self._add_boundary(message, edge, line, number)
                     if lane.id:
                         line = center_line(self._roads, road, section, lane, spacing)
-                        self._add_lane(message, road, section, lane, line, ways)
+                        self._add_lane(message, road, section, lane, line)
 
     def assigned(self, view: WorldView) -> dict[int, int]:
         """Return the identifiers of the lanes on which actors are, by row."""
@@ -76,7 +74,7 @@ class LaneMap:
                 assigned[row] = self._ids.of("lane", location.road, section.index, location.lane)
         return assigned
 
-    def _add_lane(self, message: Any, road: Road, section: LaneSection, lane: Lane, line: Line, ways: _Ways) -> None:
+    def _add_lane(self, message: Any, road: Road, section: LaneSection, lane: Lane, line: Line) -> None:
         kinds = self._osi.lane.Classification
         lane_message = message.lane.add()
         lane_message.id.value = self._lane(road, section, lane.id)
@@ -103,8 +101,12 @@ class LaneMap:
         ):
             for index, _ in enumerate(lane_edges(section, section.lanes.get(number))):
                 target.add().value = self._ids.of("boundary", road.id, section.index, number, index)
-        key = LaneKey(road.id, section.index, lane.id)
-        after, before = ways.after.get(key, ()), ways.before.get(key, ())
+        assert self._roads is not None
+        graph, key = self._roads.graph, LaneKey(road.id, section.index, lane.id)
+        after, before = (
+            [other for other, link in links.get(key, {}).items() if link["kind"] == "successor"]
+            for links in (graph.adj, graph.pred)
+        )
         for successor in after if ahead else before:
             classification.lane_pairing.add().successor_lane_id.value = self._ids.of("lane", *successor)
         for antecessor in before if ahead else after:
@@ -126,24 +128,6 @@ class LaneMap:
 
     def _lane(self, road: Road, section: LaneSection, number: int) -> int:
         return self._ids.of("lane", road.id, section.index, number)
-
-
-@dataclass(frozen=True)
-class _Ways:
-    """Lanes after and before each lane in driving direction."""
-
-    after: Mapping[LaneKey, list[LaneKey]]
-    before: Mapping[LaneKey, list[LaneKey]]
-
-
-def _successors(roads: RoadNetwork) -> _Ways:
-    after: dict[LaneKey, list[LaneKey]] = {}
-    before: dict[LaneKey, list[LaneKey]] = {}
-    for lane, successor, data in roads.graph.edges(data=True):
-        if data["kind"] == "successor":
-            after.setdefault(lane, []).append(successor)
-            before.setdefault(successor, []).append(lane)
-    return _Ways(after, before)
 
 
 def _neighbor(number: int, step: int) -> int:
