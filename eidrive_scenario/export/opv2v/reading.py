@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -135,53 +135,70 @@ class _Samples:
     poses: dict[int, Array] = field(default_factory=dict)
 
 
+@dataclass
+class _Station:
+    """Poses (4, 4) of the lidar and of the point below the box by frame number; size of the box if a file states it."""
+
+    lidars: dict[int, Array] = field(default_factory=dict)
+    bases: dict[int, Array] = field(default_factory=dict)
+    size: tuple[float, float, float] | None = None
+
+
 def read_scene(folder: Path) -> TrafficScene:
     """Return the scene of a scenario folder: all objects of all stations, and the stations.
 
     The box of a station is that of other stations, of `ego_extent`, or that of a usual car. Its pose is
     `true_ego_pos`, or follows from its lidar. Raise SettingError for damaged files.
     """
-    stations = {int(path.name): _frames(path) for path in _stations(folder)}
-    if sum(map(len, stations.values())) > MAX_FRAMES:
+    files = {int(path.name): _frames(path) for path in _stations(folder)}
+    if sum(map(len, files.values())) > MAX_FRAMES:
         raise SettingError(Diagnostic(f"more than {MAX_FRAMES} frames", "give parts of the folder", str(folder)))
-    first = min(min(frames) for frames in stations.values())
-    last = max(max(frames) for frames in stations.values())
+    numbers = sorted({number for frames in files.values() for number in frames})
     objects: dict[int, _Samples] = {}
-    lidars: dict[int, dict[int, Array]] = {}
-    own: dict[int, dict[int, Array]] = {}
-    extents: dict[int, tuple[float, float, float]] = {}
-    for station, frames in stations.items():
-        lidars[station], own[station] = {}, {}
+    stations: dict[int, _Station] = {}
+    for name, frames in files.items():
+        station = stations[name] = _Station()
         for number, path in frames.items():
             file = _FrameFile(path)
-            lidars[station][number] = pose_matrix(file.numbers(file.data, "lidar_pose", 6))
+            station.lidars[number] = pose_matrix(file.numbers(file.data, "lidar_pose", 6))
             if "vehicles" not in file.data:
                 file.fail("", "vehicles is missing")
-            if "ego_extent" in file.data and station not in extents:
-                extents[station] = file.size(file.data, "ego_extent")
+            if "ego_extent" in file.data and station.size is None:
+                station.size = file.size(file.data, "ego_extent")
             if "true_ego_pos" in file.data:
-                own[station][number] = pose_matrix(file.numbers(file.data, "true_ego_pos", 6))
+                station.bases[number] = pose_matrix(file.numbers(file.data, "true_ego_pos", 6))
             for key in ("vehicles", "pedestrians"):
                 _read_objects(file, key, number, objects)
-    warnings = _add_stations(objects, lidars, own, extents)
+    mobile = {number: station for number, station in stations.items() if number >= 0}
+    warnings = [text for number, station in mobile.items() for text in _add_station(number, station, objects)]
     empty = sorted(path.name for path in _numbered_folders(folder) if int(path.name) not in stations)
     warnings += [f"folder {name} has no frame NUMBER.yaml, so that its station is missing" for name in empty]
 
-    def seconds(number: int) -> float:
-        return (number - first) * FRAME_STEP
+    def name_of(number: int) -> str:
+        return f"Station{number}" if number in stations else f"Vehicle{number}"
 
-    tracks = [_track(_name(number, lidars), samples, seconds) for number, samples in sorted(objects.items())]
-    mobile = [
-        MobileStation(_name(number, lidars), _relative(objects[number], lidars[number]))
-        for number in lidars
-        if number >= 0
-    ]
-    roadside = [
-        RoadsideStation(f"RoadsideUnit{-number}", next(iter(lidars[number].values())))
-        for number in lidars
-        if number < 0
-    ]
-    return TrafficScene(folder_name(folder), seconds(last), tracks, mobile, roadside, warnings)
+    def track(number: int, samples: _Samples) -> Track:
+        frames = sorted(samples.poses)
+        times = np.array([(frame - numbers[0]) * FRAME_STEP for frame in frames])
+        poses = np.stack([samples.poses[frame] for frame in frames])
+        return Track(name_of(number), samples.category, samples.size, times, poses)
+
+    def first_lidar(number: int) -> Array:
+        return next(iter(stations[number].lidars.values()))
+
+    def relative_lidar(number: int) -> Array:
+        first = next(iter(stations[number].lidars))
+        relative: Array = np.linalg.inv(objects[number].poses[first]) @ first_lidar(number)
+        return relative
+
+    return TrafficScene(
+        folder_name(folder),
+        (numbers[-1] - numbers[0]) * FRAME_STEP,
+        [track(number, samples) for number, samples in sorted(objects.items())],
+        [MobileStation(name_of(number), relative_lidar(number)) for number in mobile],
+        [RoadsideStation(f"RoadsideUnit{-number}", first_lidar(number)) for number in stations if number < 0],
+        warnings,
+    )
 
 
 def _read_objects(file: _FrameFile, key: str, frame: int, objects: dict[int, _Samples]) -> None:
@@ -195,49 +212,18 @@ def _read_objects(file: _FrameFile, key: str, frame: int, objects: dict[int, _Sa
         samples.poses[frame] = pose_matrix([*np.add(location, center).tolist(), *angle])
 
 
-def _add_stations(
-    objects: dict[int, _Samples],
-    lidars: Mapping[int, Mapping[int, Array]],
-    own: Mapping[int, Mapping[int, Array]],
-    extents: Mapping[int, tuple[float, float, float]],
-) -> list[str]:
-    """Add the poses of the vehicles with a lidar, which their files do not list, and return warnings."""
-    warnings = []
-    for station, poses in lidars.items():
-        if station < 0:
-            continue
-        if station not in objects:
-            if station in extents:
-                objects[station] = _Samples("", extents[station])
-            else:
-                warnings.append(assumed_size(f"station {station}"))
-                objects[station] = _Samples("car", STATION_SIZE)
-        samples = objects[station]
-        if len(own[station]) < len(poses):
-            warnings.append(f"station {station}: frames lack true_ego_pos, which is derived from lidar_pose")
-        for number, lidar in poses.items():
-            base = own[station].get(number)
-            if base is None:
-                base = lidar.copy()
-                base[2, 3] -= LIDAR_HEIGHT
-            center = base.copy()
-            center[2, 3] += samples.size[2] / 2.0
-            samples.poses.setdefault(number, center)
-    return warnings
-
-
-def _name(number: int, stations: Mapping[int, object]) -> str:
-    return f"Station{number}" if number in stations else f"Vehicle{number}"
-
-
-def _track(name: str, samples: _Samples, seconds_of: Callable[[int], float]) -> Track:
-    numbers = sorted(samples.poses)
-    times = np.array([seconds_of(number) for number in numbers])
-    return Track(name, samples.category, samples.size, times, np.stack([samples.poses[number] for number in numbers]))
-
-
-def _relative(samples: _Samples, lidars: Mapping[int, Array]) -> Array:
-    """Return the pose (4, 4) of a lidar relative to the center of the box of its vehicle, in the first frame."""
-    number, lidar = next(iter(lidars.items()))
-    relative: Array = np.linalg.inv(samples.poses[number]) @ lidar
-    return relative
+def _add_station(number: int, station: _Station, objects: dict[int, _Samples]) -> Iterator[str]:
+    """Add the poses of a vehicle with a lidar, which its files do not list, and yield warnings."""
+    if number not in objects:
+        if station.size is None:
+            yield assumed_size(f"station {number}")
+        objects[number] = _Samples("car", STATION_SIZE) if station.size is None else _Samples("", station.size)
+    samples = objects[number]
+    if len(station.bases) < len(station.lidars):
+        yield f"station {number}: frames lack true_ego_pos, which is derived from lidar_pose"
+    for frame, lidar in station.lidars.items():
+        center = station.bases.get(frame, lidar).copy()
+        if frame not in station.bases:
+            center[2, 3] -= LIDAR_HEIGHT
+        center[2, 3] += samples.size[2] / 2.0
+        samples.poses.setdefault(frame, center)
