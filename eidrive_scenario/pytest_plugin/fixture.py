@@ -17,17 +17,12 @@ from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.pytest_plugin.failures import (
     add_error,
     add_failures,
-    add_properties,
     add_section,
     explain_outcome,
 )
 from eidrive_scenario.pytest_plugin.markers import run_markers, test_name
 from eidrive_scenario.pytest_plugin.option_values import path_beside
-from eidrive_scenario.pytest_plugin.outcome import (
-    properties,
-    rate_properties,
-    run_variant,
-)
+from eidrive_scenario.pytest_plugin.outcome import run_and_report
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant, run_variants
 
 if TYPE_CHECKING:
@@ -193,19 +188,13 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             message = 'run_scenario: no scenario (expected run_scenario("coop/scenario_1") or the marker scenario)'
             pytest.fail(message, pytrace=False)
         variant = case.variant if case is not None else RunVariant(None, 1)
-        replaced = variant.replaced if channel is None and seed is None else ()
-        variant = RunVariant(
-            variant.channel if channel is None else channel,
-            variant.seed if seed is None else seed,
-            replaced,
-            added=variant.added,
-            rate=variant.rate if seed is None else None,
-        )
+        if channel is not None:
+            variant = replace(variant, channel=channel, replaced=())
+        if seed is not None:
+            variant = replace(variant, seed=seed, replaced=(), rate=None)
         try:
             source = resolve_scenario(source) if isinstance(source, str | Path) else source
-            if variant.rate is not None:
-                return _rate_verdict(request.node, source, variant, settings)
-            result = run_variant(request.node, source, variant, **settings)
+            result = run_and_report(request.node, source, variant, settings)
         except InputError as error:
             add_error(request.node, error, request.node.path)
             raise pytest.fail.Exception(printable(str(error)), pytrace=False) from None
@@ -215,32 +204,12 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             if error.__cause__ is not None and location is not None:
                 error.__cause__.__traceback__ = _from_file(error.__cause__.__traceback__, location.file)
             raise error.with_traceback(None) from error.__cause__
-        result = replace(result, warnings=(*result.warnings, *variant.replaced))
-        add_properties(request.node, properties(result))
-        _report_failures(request.node, source, result)
+        if not result.passed:
+            add_section(request.node, explain_outcome(result))
+            add_failures(request.node, result, source if isinstance(source, Path) else request.node.path)
         return result
 
     return run
-
-
-def _rate_verdict(
-    item: pytest.Item, source: Source, variant: RunVariant, settings: Mapping[str, object]
-) -> RateVerdict:
-    """Run the seeds of a test of the success rate, and add the verdict to the report of the test."""
-    from eidrive_scenario.experiments.success_rate import decide_rate
-
-    verdict = decide_rate(lambda seed: run_variant(item, source, replace(variant, seed=seed), **settings), variant.rate)
-    add_properties(item, rate_properties(verdict))
-    _report_failures(item, source, verdict)
-    return verdict
-
-
-def _report_failures(item: pytest.Item, source: Source, result: RunResult | RateVerdict) -> None:
-    """Add the reasons of a failed run to the report of the test."""
-    if result.passed:
-        return
-    add_section(item, explain_outcome(result))
-    add_failures(item, result, source if isinstance(source, Path) else item.path)
 
 
 def _from_file(trace: TracebackType | None, file: str) -> TracebackType | None:

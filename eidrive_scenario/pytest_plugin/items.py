@@ -17,13 +17,14 @@ from eidrive_scenario.pytest_plugin.failures import (
     ScenarioFailed,
     add_error,
     add_failures,
+    add_properties,
     explain_outcome,
     failure_text,
     has_no_verdict,
 )
 from eidrive_scenario.pytest_plugin.markers import keywords, run_markers, test_name
 from eidrive_scenario.pytest_plugin.options import is_selected, max_runs
-from eidrive_scenario.pytest_plugin.outcome import run_file_and_report
+from eidrive_scenario.pytest_plugin.outcome import run_and_report
 from eidrive_scenario.pytest_plugin.variants import RunVariant, run_variants
 
 if TYPE_CHECKING:
@@ -58,7 +59,10 @@ class ScenarioItem(pytest.Item):
         if self.config.getoption("setuponly"):
             return
         try:
-            self._result = run_file_and_report(self, self.path, self.variant, self.run)
+            self._result = run_and_report(self, self.run or self.path, self.variant, file=self.path)
+            if self.run is not None:
+                parameters = self.run.parameters.items()
+                add_properties(self, [(f"parameter.{name}", value) for name, value in parameters])
         except ConstraintError as error:
             if self.run is None:
                 add_error(self, error, self.path)

@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -37,37 +38,34 @@ _NOT_REPEATED = ("out", "record", "report", "max_runs")
 """Options that the command of a test omits, as they do not change its run."""
 
 
-def run_file_and_report(
-    item: pytest.Item, source: Path, variant: RunVariant, run: ConcreteRun | None = None
+def run_and_report(
+    item: pytest.Item,
+    source: Source | ConcreteRun,
+    variant: RunVariant,
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    file: Path | None = None,
 ) -> RunResult | RateVerdict:
-    """Run the scenario of a test, or one run of its distribution, and record its properties. Raise InputError.
-
-    A test of the success rate runs one seed after the other until it decides.
-    """
-    result: RunResult | RateVerdict
-    if variant.rate is None:
-        result = _run_and_report(item, source, run or source, variant, {})
-        add_properties(item, properties(result))
-    else:
-        from eidrive_scenario.experiments.success_rate import decide_rate
-
-        result = decide_rate(
-            lambda seed: _run_and_report(item, source, run or source, replace(variant, seed=seed), {}),
-            variant.rate,
-        )
-        add_properties(item, rate_properties(result))
-    if run is not None:
-        add_properties(item, [(f"parameter.{name}", value) for name, value in run.parameters.items()])
-    return result
-
-
-def run_variant(item: pytest.Item, source: Source, variant: RunVariant, **overrides: Any) -> RunResult:
     """Run a scenario with the options, the variant and `overrides` (fields of RunSettings), in ascending priority.
 
-    The output folder follows the path of the scenario, or without a file the path of the test. Raise InputError.
+    file  path that the output folder follows; None: that of the scenario, or without a file that of the test
+
+    A test of the success rate runs one seed after the other until it decides. The properties of the outcome are added
+    to the report of the test. Raise InputError.
     """
-    file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
-    return _run_and_report(item, file, source, variant, overrides)
+    if file is None:
+        own = item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
+        file = source if isinstance(source, Path) else own
+    if variant.rate is None:
+        result = _run(item, file, source, variant, overrides)
+        result = replace(result, warnings=(*result.warnings, *variant.replaced))
+        add_properties(item, properties(result))
+        return result
+    from eidrive_scenario.experiments.success_rate import decide_rate
+
+    verdict = decide_rate(lambda seed: _run(item, file, source, replace(variant, seed=seed), overrides), variant.rate)
+    add_properties(item, rate_properties(verdict))
+    return verdict
 
 
 def _command(item: pytest.Item, source: Source | ConcreteRun) -> str:
@@ -107,7 +105,7 @@ def _absolute(value: str) -> str:
     return str(path_beside(value, Path.cwd()))
 
 
-def _run_and_report(
+def _run(
     item: pytest.Item,
     file: Path,
     source: Source | ConcreteRun,
