@@ -1,18 +1,307 @@
-"""Environment of Gymnasium over a scenario: one station is controlled."""
+"""Environment of Gymnasium over a scenario, and its part that does not depend on the number of controlled stations."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Unpack
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from eidrive_scenario.driving.step import StationAction, StationPerception
-from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, quoted, suggestion
+from eidrive_scenario.evaluation.criteria_parser import EXITS
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.libraries import gymnasium
-from eidrive_scenario.gym.runs import MAX_SEED, EnvironmentOptions, ScenarioEnvironment
-from eidrive_scenario.gym.station_interface import sum_terms
-from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
-from eidrive_scenario.simulation import RunResult
+from eidrive_scenario.gym.settings import METADATA, RENDER_MODES, ActionSettings, ObservationSettings, RenderSettings
+from eidrive_scenario.gym.station_interface import (
+    InterfaceSettings,
+    RewardSettings,
+    StationInterface,
+    parse_mapping,
+    sum_terms,
+)
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
+from eidrive_scenario.run_options import checked_settings
+from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
+
+if TYPE_CHECKING:
+    from eidrive_scenario.gym.rendering import Renderer
+
+
+MAX_SEED = 2**31
+"""Exclusive bound of the seeds that an environment draws for its runs."""
+OPTIONS = ("seed", "parameters")
+"""Options of `reset`."""
+Outcome = tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]
+"""Observations, rewards, terminated, truncated and information, each by agent."""
+
+
+def _check_steps(max_steps: int | None, ticks_per_step: int) -> None:
+    """Raise SettingError unless both are positive integers."""
+    for name, value in (("max_steps", max_steps), ("ticks_per_step", ticks_per_step)):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+            raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a positive integer"))
+
+
+def _stations(
+    chosen: Sequence[str] | None, controllable: Sequence[str], drivers: Sequence[str], *, single: bool
+) -> tuple[str, ...]:
+    """Return the controlled stations. Raise SettingError if there is none, or if one does not exist."""
+    if not controllable:
+        message = "the scenario has no station"
+        raise SettingError(Diagnostic(message, "give an entity a driving stack: RunSettings(drive='Ego')"))
+    if chosen is not None:
+        unknown = next((name for name in chosen if name not in controllable), None)
+        if unknown is not None:
+            message = f"the scenario has no station {quoted(unknown)}"
+            raise SettingError(Diagnostic(message, suggestion(str(unknown), controllable)))
+        if not chosen:
+            raise SettingError(Diagnostic("no station is selected", f"give stations of {', '.join(controllable)}"))
+        return tuple(dict.fromkeys(chosen))
+    candidates = drivers or (controllable if single else ())
+    if not candidates:
+        raise SettingError(Diagnostic("the scenario has no station that drives", "name the stations"))
+    if single and len(candidates) > 1:
+        if "Ego" in candidates:
+            return ("Ego",)
+        message = f"the scenario has the stations {', '.join(candidates)}"
+        raise SettingError(Diagnostic(message, "select one by station=NAME"))
+    return tuple(candidates) if not single else (candidates[0],)
+
+
+class EnvironmentOptions(TypedDict, total=False):
+    """Arguments that the environments of one and of several stations share; see EidriveEnv."""
+
+    observation: ObservationSettings | Mapping[str, Any] | None
+    action: str | ActionSettings | Mapping[str, Any] | tuple[Any, ...] | list[Any] | None
+    reward: RewardSettings | Mapping[str, Any] | None
+    settings: RunSettings | None
+    max_steps: int | None
+    ticks_per_step: int
+    terminate_on_collision: bool
+    render_mode: str | None
+    render: RenderSettings | Mapping[str, Any] | None
+
+
+class ScenarioEnvironment:
+    """Environment over a scenario, of any number of controlled stations."""
+
+    metadata: dict[str, Any] = METADATA
+    agents: list[str]
+    """Controlled stations in the world, which need an action in the next step."""
+
+    def _set_up(
+        self,
+        scenario: Scenario | Source | ConcreteRun,
+        stations: Sequence[str] | None,
+        *,
+        single: bool,
+        observation: Any = None,
+        action: Any = None,
+        reward: Any = None,
+        settings: RunSettings | None = None,
+        max_steps: int | None = None,
+        ticks_per_step: int = 1,
+        terminate_on_collision: bool = True,
+        render_mode: str | None = None,
+        render: Any = None,
+    ) -> None:
+        """Load the scenario, and build the interfaces of its stations and the renderer.
+
+        stations  controlled stations; None: the default of the environment
+
+        The other arguments are those of EidriveEnv. Raise InputError if the scenario or a setting is invalid, or if it
+        has no such station.
+        """
+        interfaces = InterfaceSettings.parse(observation, action, reward)
+        self._source = scenario if isinstance(scenario, Scenario | ConcreteRun) else load_scenario(scenario)
+        _check_steps(max_steps, ticks_per_step)
+        self._settings = checked_settings(settings)
+        self._ticks_per_step = ticks_per_step
+        self._duration = None if max_steps is None else max_steps * ticks_per_step * self._settings.dt
+        with Simulation(self._source, settings=self._settings, load_weights=False) as simulation:
+            controllable, drivers = tuple(simulation.stack.controllable), tuple(simulation.stack.possible_drivers)
+            names = _stations(stations, controllable, drivers, single=single)
+            self._interfaces = {name: StationInterface(name, interfaces, simulation) for name in names}
+        self._planners = {
+            name: interface.planner for name, interface in self._interfaces.items() if interface.planner is not None
+        }
+        self._colliding = [name for name in names if terminate_on_collision and name in drivers]
+        self._new_episode(DEFAULT_SEED, self._settings, load_weights=False).close()
+        self.render_mode = render_mode
+        self._renderer = build_renderer(render_mode, render, names[0])
+        self.metadata = {**self.metadata, "render_fps": 1.0 / (self._settings.dt * ticks_per_step)}
+        self._episode: Episode | None = None
+        self.agents = []
+        self._left = set[str]()
+        """Stations that have left the world in this episode, and may have returned without an agent."""
+
+    def _new_episode(self, seed: int, settings: RunSettings, *, load_weights: bool = True) -> Episode:
+        return Episode(
+            self._source,
+            seed,
+            settings,
+            planners=self._planners,
+            colliding=self._colliding,
+            load_weights=load_weights,
+        )
+
+    def _start(self, drawn_seed: int, options: Mapping[str, Any] | None) -> Episode:
+        """Start an episode at the first tick in which a controlled station is present, or that has ended.
+
+        drawn_seed  seed of the run, unless the options contain one
+
+        The steps are counted from that tick on. Raise SettingError for unknown options, and for the reward of a
+        criterion that the run does not have.
+        """
+        self.close()
+        self._left = set()
+        given = options or {}
+        unknown = next((key for key in given if key not in OPTIONS), None)
+        if unknown is not None:
+            raise SettingError(Diagnostic(f"reset has the option {quoted(unknown)}", suggestion(str(unknown), OPTIONS)))
+        settings, parameters = self._settings, given.get("parameters", {})
+        if not isinstance(parameters, Mapping):
+            raise SettingError(Diagnostic(f"parameters is {quoted(parameters)}", "give a mapping of names to values"))
+        if parameters:
+            settings = replace(settings, parameters={**settings.parameters, **parameters})
+        episode = self._new_episode(given.get("seed", drawn_seed), settings)
+        try:
+            criteria = [*EXITS, *(criterion.name for criterion in episode.simulation.criteria)]
+            for interface in self._interfaces.values():
+                interface.rewards.check_criteria(criteria)
+            episode.begin()
+            while episode.result is None and not self._present(episode):
+                episode.advance(lambda perceived: {})
+            if self._duration is not None and episode.result is None:
+                episode.limit_time(self._duration)
+        except BaseException:
+            episode.close()
+            raise
+        self._episode, self.agents = episode, self._present(episode)
+        return episode
+
+    def _begin(self, episode: Episode) -> dict[str, Any]:
+        """Begin an episode for the agents; return its seed, time [s] and parameters."""
+        for name in self.agents:
+            self._interfaces[name].begin(episode)
+        if self._renderer is not None:
+            self._renderer.begin(episode)
+        simulation = episode.simulation
+        info = {"seed": simulation.seed, "time": episode.start.view.time}
+        return {**info, "parameters": dict(simulation.scenario.parameters)}
+
+    def _present(self, episode: Episode) -> list[str]:
+        """Return the agents of the current tick."""
+        return [name for name in self._interfaces if name in episode.perceived and name not in self._left]
+
+    def _step(self, actions: Mapping[str, Any]) -> Outcome:
+        """Apply the actions of the agents for one step; return its outcome by agent.
+
+        Raise SettingError if an agent has no action or one that its space does not contain, SimulationError before
+        `reset` and after the end.
+        """
+        episode = self._episode
+        if episode is None or not self.agents:
+            raise SimulationError("the environment has no running episode; call reset")
+        self._check_agents(actions)
+        acting, decided = self.agents, dict[str, StationAction]()
+
+        def decide(perceived: Mapping[str, StationPerception]) -> Mapping[str, StationAction]:
+            # The rows of shared objects belong to one tick: they are selected again in each.
+            live = [name for name in acting if name in perceived and name not in self._left]
+            for name in live:
+                if name not in decided or decided[name].share is not None:
+                    decided[name] = self._interfaces[name].decoder.decode(actions[name], perceived[name])
+            return {name: decided[name] for name in live}
+
+        terms: dict[str, list[dict[str, float]]] = {name: [] for name in acting}
+        for _ in range(self._ticks_per_step):
+            live = [name for name in acting if name in episode.perceived and name not in self._left]
+            routes = {name: self._interfaces[name].route(episode.perceived[name]) for name in live}
+            transition = episode.advance(decide)
+            for name in live:
+                terms[name].append(self._interfaces[name].reward_terms(transition, routes[name], episode))
+            self._left.update(name for name in acting if name not in episode.perceived)
+            if episode.result is not None:
+                break
+        while episode.result is None and not self._present(episode):
+            episode.advance(lambda perceived: {})
+        return self._outcome(episode, acting, terms)
+
+    def _check_agents(self, actions: Mapping[str, Any]) -> None:
+        """Raise SettingError unless the actions are those of the agents."""
+        missing = next((name for name in self.agents if name not in actions), None)
+        if missing is not None:
+            raise SettingError(Diagnostic(f"agent {missing!r} has no action", "give an action of each agent"))
+        unknown = next((name for name in actions if name not in self.agents), None)
+        if unknown is not None:
+            raise SettingError(Diagnostic(f"{unknown!r} is not an agent", suggestion(str(unknown), self.agents)))
+
+    def _outcome(self, episode: Episode, acting: list[str], terms: Mapping[str, list[dict[str, float]]]) -> Outcome:
+        """Return the outcome of a step for the agents that acted, and for those that entered the world in it."""
+        result = episode.result
+        self.agents = [] if result is not None else self._present(episode)
+        entering = [name for name in self.agents if name not in acting]
+        for name in entering:
+            self._interfaces[name].begin(episode)
+        outcome: Outcome = {}, {}, {}, {}, {}
+        observations, rewards, ends, limits, infos = outcome
+        for name in [*acting, *entering]:
+            interface, has_left = self._interfaces[name], name in self._left
+            reward_terms = [*terms.get(name, ())]
+            info: dict[str, Any] = {"time": episode.start.view.time}
+            if result is not None:
+                reward_terms.append(interface.rewards.terms_of_end(result))
+                info |= {
+                    "result": result,
+                    "end_reason": result.end_reason,
+                    "passed": result.passed,
+                    "trace_hash": result.trace_hash,
+                    "criteria": {verdict.name: verdict.passed for verdict in result.criteria},
+                }
+            info["reward_terms"] = summed = sum_terms(reward_terms)
+            truncated = episode.is_truncated and not has_left
+            terminated = not truncated and (result is not None or has_left)
+            observations[name] = interface.encoder.zeros() if has_left else interface.observe(episode)
+            rewards[name], ends[name], limits[name], infos[name] = sum(summed.values()), terminated, truncated, info
+        return outcome
+
+    def render(self) -> Any:
+        """Return the picture (height, width, 3) of the current instant, uint8 in the order red, green, blue.
+
+        It is that of `eidrive view --png`, around the first controlled station. Return None with a warning without a
+        render mode. Raise SimulationError before `reset`.
+        """
+        if self._renderer is None:
+            gymnasium.logger.warn("the environment has no render mode; create it with render_mode='rgb_array'")
+            return None
+        if self._episode is None:
+            raise SimulationError("the environment has no episode; call reset")
+        return self._renderer.picture()
+
+    def close(self) -> None:
+        """Free the world of the running episode, and end its agents."""
+        self.agents = []
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None
+
+
+def build_renderer(mode: str | None, settings: Any, station: str) -> Renderer | None:
+    """Return the renderer of a mode with RenderSettings or a mapping of them; None without a mode.
+
+    station  station that the pictures follow
+
+    Raise SettingError for an unknown mode or an invalid setting.
+    """
+    parsed = parse_mapping(RenderSettings, settings, "render")
+    if mode is None:
+        return None
+    if mode not in RENDER_MODES:
+        raise SettingError(Diagnostic(f"render_mode is {quoted(mode)}", f"give {' or '.join(RENDER_MODES)}, or None"))
+    from eidrive_scenario.gym.rendering import Renderer  # imports OpenCV
+
+    return Renderer(station, parsed)
 
 
 class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
@@ -44,9 +333,8 @@ class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
         **options: Unpack[EnvironmentOptions],
     ) -> None:
         self._set_up(scenario, None if station is None else (station,), single=True, **options)
-        ((self.station, self._interface),) = self._runs.interfaces.items()
-        self.observation_space = self._interface.encoder.space
-        self.action_space = self._interface.decoder.space
+        ((self.station, interface),) = self._interfaces.items()
+        self.observation_space, self.action_space = interface.encoder.space, interface.decoder.space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; return its first observation, and its seed, time [s] and parameters.
@@ -54,13 +342,11 @@ class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
         If the station enters the world later, the run advances until then. Raise SettingError if it never does.
         """
         super().reset(seed=seed)
-        self.close()
-        drawn = int(self.np_random.integers(MAX_SEED))
-        episode = self._episode = self._runs.start(drawn, options)
-        if self.station not in episode.perceived:
+        episode = self._start(int(self.np_random.integers(MAX_SEED)), options)
+        if not self.agents:
             raise SettingError(Diagnostic(f"station {self.station!r} never enters the world", "select another one"))
-        info = self._begin(episode, [self.station])
-        return self._interface.observe(episode), info
+        info = self._begin(episode)
+        return self._interfaces[self.station].observe(episode), info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Apply an action for one step; return observation, reward, terminated, truncated and information.
@@ -70,51 +356,6 @@ class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
 
         Raise SettingError if the action is not in the space, SimulationError before `reset` and after the end.
         """
-        episode = self._running_episode()
-        interface, name = self._interface, self.station
-        decided: StationAction | None = None
-
-        def decide(perceived: Mapping[str, StationPerception]) -> Mapping[str, StationAction]:
-            # The rows of shared objects belong to one tick: they are selected again in each.
-            nonlocal decided
-            if name not in perceived:
-                return {}
-            if decided is None or decided.share is not None:
-                decided = interface.decode(action, perceived[name])
-            return {name: decided}
-
-        terms = []
-        for _ in range(self._runs.ticks_per_step):
-            route = interface.route(episode.perceived[name])
-            transition = episode.advance(decide)
-            terms.append(interface.reward_terms(transition, route, episode))
-            if episode.result is not None or name not in episode.perceived:
-                break
-        observation = interface.observe(episode)
-        has_left = episode.result is None and name not in episode.perceived
-        while has_left and episode.result is None:
-            episode.advance(lambda perceived: {})
-        info: dict[str, Any] = {"time": episode.start.view.time}
-        if episode.result is not None:
-            terms.append(interface.rewards.terms_of_end(episode.result))
-            info |= final_info(episode.result)
-        info["reward_terms"] = summed = sum_terms(terms)
-        ended = episode.result is not None
-        truncated = episode.is_truncated and not has_left
-        return observation, sum(summed.values()), ended and not truncated, truncated, info
-
-    def _running_episode(self) -> Episode:
-        if self._episode is None or self._episode.result is not None:
-            raise SimulationError("the environment has no running episode; call reset")
-        return self._episode
-
-
-def final_info(result: RunResult) -> dict[str, Any]:
-    """Return the information about the end of an episode: the result of its run, and parts of it."""
-    return {
-        "result": result,
-        "end_reason": result.end_reason,
-        "passed": result.passed,
-        "trace_hash": result.trace_hash,
-        "criteria": {verdict.name: verdict.passed for verdict in result.criteria},
-    }
+        name = self.station
+        observations, rewards, ends, limits, infos = self._step({name: action})
+        return observations[name], rewards[name], ends[name], limits[name], infos[name]

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
-from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
+from eidrive_scenario.driving.step import AgentStep, StationPerception
 from eidrive_scenario.errors import NOT_JUDGED, Diagnostic, SettingError, suggestion
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.extensions.settings import S, Settings, parse_settings
@@ -111,10 +111,6 @@ class StationInterface:
         speed = perceived.ego.speed if requested is None else requested
         self.decoder.reset(speed, self.spec.max_steering)
         self.encoder.receive(perceived)
-
-    def decode(self, action: Any, perceived: StationPerception) -> StationAction:
-        """Return the decisions of an action. Raise SettingError if it is not in the space."""
-        return self.decoder.decode(action, perceived)
 
     def observe(self, episode: Episode) -> Any:
         """Return the observation; zeros if the station is not present."""
