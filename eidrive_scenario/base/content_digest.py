@@ -76,14 +76,10 @@ def _encoder(kind: type[Any]) -> _Encoder:
     for types, encoder in _ENCODERS:
         if issubclass(kind, types):
             return encoder
-    name = f"{kind.__module__}.{kind.__qualname__}".encode()
-    names: tuple[str, ...] = ()
-    if is_dataclass(kind):
-        names = tuple(field.name for field in fields(kind))
-    elif issubclass(kind, pydantic.BaseModel):
-        names = tuple(kind.model_fields)
-    else:
+    if not is_dataclass(kind) and not issubclass(kind, pydantic.BaseModel):
         raise TypeError(f"{kind.__name__}: a value of this type has no digest")
+    name = f"{kind.__module__}.{kind.__qualname__}".encode()
+    names = [field.name for field in fields(kind)] if is_dataclass(kind) else [*kind.model_fields]
 
     def add_fields(hash_: _Hash, value: object) -> None:
         hash_.update(b"C%d %b%d " % (len(name), name, len(names)))
@@ -93,33 +89,9 @@ def _encoder(kind: type[Any]) -> _Encoder:
     return add_fields
 
 
-def _none(hash_: _Hash, value: None) -> None:
-    hash_.update(b"N")
-
-
-def _boolean(hash_: _Hash, value: bool) -> None:
-    hash_.update(b"T" if value else b"F")
-
-
-def _integer(hash_: _Hash, value: int) -> None:
-    hash_.update(b"i%d " % value)
-
-
-def _number(hash_: _Hash, value: float) -> None:
-    hash_.update(b"d" + _NUMBER.pack(value))
-
-
 def _text(hash_: _Hash, value: str) -> None:
     data = value.encode()
     hash_.update(b"s%d " % len(data) + data)
-
-
-def _bytes(hash_: _Hash, value: bytes) -> None:
-    hash_.update(b"b%d " % len(value) + value)
-
-
-def _member(hash_: _Hash, value: Enum) -> None:
-    _text(hash_, f"{type(value).__qualname__}.{value.name}")
 
 
 def _array(hash_: _Hash, value: Any) -> None:
@@ -144,14 +116,14 @@ def _sequence(hash_: _Hash, value: tuple[object, ...] | list[object]) -> None:
 
 
 _ENCODERS: tuple[tuple[type | tuple[type, ...], _Encoder], ...] = (
-    (type(None), _none),
-    (Enum, _member),
-    (bool, _boolean),
+    (type(None), lambda hash_, value: hash_.update(b"N")),
+    (Enum, lambda hash_, value: _text(hash_, f"{type(value).__qualname__}.{value.name}")),
+    (bool, lambda hash_, value: hash_.update(b"T" if value else b"F")),
     ((np.ndarray, np.generic), _array),
-    (int, _integer),
-    (float, _number),
+    (int, lambda hash_, value: hash_.update(b"i%d " % value)),
+    (float, lambda hash_, value: hash_.update(b"d" + _NUMBER.pack(value))),
     (str, _text),
-    (bytes, _bytes),
+    (bytes, lambda hash_, value: hash_.update(b"b%d " % len(value) + value)),
     (Mapping, _mapping),
     ((tuple, list), _sequence),
 )
