@@ -18,7 +18,7 @@ import traceback
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 from eidrive_scenario.base.wall_limit import Limit, LimitReached, current_limit
@@ -71,7 +71,7 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
     """
     if isinstance(error, InputError | KeyboardInterrupt | ExtensionError | WallLimitError):
         return
-    calls = list(_calls(error.__traceback__))
+    calls = [_Call(frame, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     if isinstance(error, LimitReached):
         limit = current_limit()
         seconds = 0.0 if limit is None else limit.seconds
@@ -133,17 +133,18 @@ def _extension_place(
         subject = call.subject
         if any(subject is observer for observer in observers) and not is_built_in(type(subject)):
             extensions.append((index, Registration("observer", type(subject).__name__, "")))
-        elif subject is not _ABSENT and (registration := _registration(subject)) is not None:
-            extensions.append((index, registration))
-    third_party = [entry for entry in extensions if not _is_ours(calls[entry[0]].subject)] or _by_file(calls)
+        elif subject is not _ABSENT and (registered := registration(_class_of(subject))) is not None:
+            extensions.append((index, registered))
+    third_party = [entry for entry in extensions if not is_built_in(_class_of(calls[entry[0]].subject))] or _by_file(
+        calls
+    )
     if not third_party and not extensions:
         return None
     index, (kind, name, value) = (third_party or extensions)[0]
     at = _innermost_own(calls, index)
-    if at is None:
-        file, line = _definition(calls[index].subject)
-        return ExtensionPlace(kind, name, value, _subject_of(calls), time, file, line, calls[index].function)
-    return ExtensionPlace(kind, name, value, _subject_of(calls), time, at.file, at.line, at.function)
+    file, line = _definition(calls[index].subject) if at is None else (at.file, at.line)
+    function = (at or calls[index]).function
+    return ExtensionPlace(kind, name, value, _subject_of(calls), time, file, line, function)
 
 
 def _wall_limit_error(
@@ -167,17 +168,8 @@ def traceback_from_extension(error: ExtensionError) -> str:
     return "".join(shown)
 
 
-def _calls(trace: TracebackType | None) -> Iterator[_Call]:
-    for frame, line in traceback.walk_tb(trace):
-        yield _Call(frame, line)
-
-
-def _registration(subject: Any) -> Registration | None:
-    return registration(subject if isinstance(subject, type) else type(subject))
-
-
-def _is_ours(subject: Any) -> bool:
-    return is_built_in(subject if isinstance(subject, type) else type(subject))
+def _class_of(subject: Any) -> type:
+    return subject if isinstance(subject, type) else type(subject)
 
 
 def _by_file(calls: Sequence[_Call]) -> list[tuple[int, Registration]]:
@@ -197,7 +189,7 @@ def _innermost_own(calls: Sequence[_Call], index: int) -> _Call | None:
     if calls[index].file in third_party_files():
         own = _files_of(str(calls[index].frame.f_globals.get("__name__")))
     else:
-        own = _files_of((subject if isinstance(subject, type) else type(subject)).__module__)
+        own = _files_of(_class_of(subject).__module__)
     return next((call for call in reversed(calls[index:]) if _is_within(call, own)), None)
 
 
@@ -240,7 +232,7 @@ def _error_subject(instance: Any) -> str:
 def _place_of_method(error: InvalidResult, calls: Sequence[_Call], time: float | None) -> ExtensionPlace:
     """Return the definition of the method that returned an invalid result."""
     extension = error.extension
-    kind, name, value = _registration(extension) or ("extension", type(extension).__name__, "")
+    kind, name, value = registration(_class_of(extension)) or ("extension", type(extension).__name__, "")
     subject = _error_subject(extension) or _subject_of(calls)
     method = getattr(extension, error.method, None)
     file, line = _definition(method if inspect.isroutine(method) else extension)
