@@ -120,11 +120,17 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
     A duplicate key is an error, as one of its values would be lost. Raise SettingError with the line of the error,
     counted from `line` if given.
     """
+    return _load(text, source, line, quote)[0]
+
+
+def _load(text: str, source: str, line: int | None, quote: bool) -> tuple[Any, dict[str, int]]:
+    """Return the data of a text as `load_yaml`, and the line of each key, from 0."""
     if len(text) > MAX_YAML:
         diagnostic = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
         raise SettingError(diagnostic)
     try:
-        return _copy(_parsed(text)[0])
+        data, lines = _parsed(text)
+        return _copy(data), lines
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         error_line = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
@@ -137,14 +143,18 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
         raise SettingError(Diagnostic(message, "put it in quotes", source, line)) from error
 
 
-def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
-    """Return the content of a YAML file and the line of each of its keys. Raise SettingError if it is invalid."""
+def load_yaml_file(path: Path, hint: str = "give the path of a YAML file") -> tuple[Any, dict[str, int]]:
+    """Return the content of a YAML file and the line of each of its keys. Raise SettingError if it is invalid.
+
+    hint  of the error for a file that cannot be read
+    """
     try:
         text = read_regular_file(path, 4 * MAX_YAML).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = "the file is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
-        raise SettingError(Diagnostic(f"cannot read: {reason}", "give the path of a YAML file", str(path))) from error
-    return load_yaml(text, source=str(path), quote=False), key_lines(text)
+        raise SettingError(Diagnostic(f"cannot read: {reason}", hint, str(path))) from error
+    data, lines = _load(text, str(path), None, quote=False)
+    return data, {key: line + 1 for key, line in lines.items()}
 
 
 def key_lines(text: str, first: int = 1) -> dict[str, int]:

@@ -26,8 +26,7 @@ from eidrive_scenario.export.traffic_recording.scene import (
     assumed_size,
     folder_name,
 )
-from eidrive_scenario.files.bounded import read_regular_file, reason_of
-from eidrive_scenario.files.yaml_text import MAX_YAML, key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import load_yaml_file
 
 FRAME_STEP = 0.05
 """Time between successive frame numbers [s]."""
@@ -67,22 +66,16 @@ class _FrameFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        try:
-            self._text = read_regular_file(path, 4 * MAX_YAML).decode("utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = "the file is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
-            raise SettingError(Diagnostic(f"cannot read: {reason}", _HINT, str(path))) from error
-        data = load_yaml(self._text, source=str(path), quote=False)
+        data, self._lines = load_yaml_file(path, _HINT)
         if not isinstance(data, Mapping):
             self.fail("", "no mapping of keys")
         self.data: Mapping[Any, Any] = data
 
     def fail(self, key: str, message: str) -> NoReturn:
         """Raise SettingError at a key, whose parts are separated by dots."""
-        lines = key_lines(self._text)
-        while key and key not in lines:
+        while key and key not in self._lines:
             key = key.rpartition(".")[0]
-        raise SettingError(Diagnostic(message, _HINT, str(self._path), lines.get(key)))
+        raise SettingError(Diagnostic(message, _HINT, str(self._path), self._lines.get(key)))
 
     def numbers(self, owner: Mapping[Any, Any], key: str, count: int, within: str = "") -> tuple[float, ...]:
         """Return a list of numbers."""
