@@ -149,6 +149,14 @@ def running_line(trace: TracebackType | None) -> str:
     return f"{frames[-1].filename}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
 
 
+def signal_name(number: int) -> str:
+    """Return the name of a signal, such as `SIGKILL`, or `signal 40` for one without a name."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"signal {number}"
+
+
 class _LimitedBlock:
     """Context manager of a limit; it sets none within the block of another limit of its thread.
 

@@ -105,7 +105,9 @@ def _wait(child: int) -> int:
 def _exit_code(status: int, finished: int, what: str) -> int:
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
-        echo(f"{what} aborted: its process was ended by {signal.Signals(-code).name}", err=True)
+        from eidrive_scenario.base.wall_limit import signal_name
+
+        echo(f"{what} aborted: its process was ended by {signal_name(-code)}", err=True)
         return ABORTED
     if code != ABORTED and not os.read(finished, 1):
         echo(f"{what} aborted: an extension ended its process (os._exit)", err=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import subprocess
 import tempfile
 from contextlib import suppress
@@ -18,7 +17,7 @@ from typing import IO, Any
 
 import pytest
 
-from eidrive_scenario.base.wall_limit import LastResort, Limit, set_last_resort
+from eidrive_scenario.base.wall_limit import LastResort, Limit, set_last_resort, signal_name
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.hung_runs import describe_report, last_resort
 from eidrive_scenario.pytest_plugin import markers
@@ -138,12 +137,7 @@ def _end_of(node: Any) -> str:
         code = node.gateway._io.popen.wait(WAIT)
     except (AttributeError, subprocess.TimeoutExpired):  # a worker on another machine, or another version of execnet
         return "ended: it was killed, or native code crashed"
-    if code >= 0:
-        return f"ended with exit code {code}"
-    try:
-        return f"was ended by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"was ended by signal {-code}"
+    return f"ended with exit code {code}" if code >= 0 else f"was ended by {signal_name(-code)}"
 
 
 class _Notes:

@@ -17,7 +17,7 @@ from faulty_extensions import line_of, write_scenario
 from threads import run_in_thread
 
 from eidrive_scenario.base import wall_limit
-from eidrive_scenario.base.wall_limit import LastResort, current_limit, limit_wall_time, set_last_resort
+from eidrive_scenario.base.wall_limit import LastResort, current_limit, limit_wall_time, set_last_resort, signal_name
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import Frame, read_recording
@@ -232,3 +232,9 @@ def test_limit_beyond_the_timers_of_the_system_is_not_reached(tmp_path: Path) ->
 def test_line_of_finds_the_package_line(package: Path) -> None:
     text = (package / "faulty.py").read_text().splitlines()
     assert "sys.exit(0)" in text[line_of("sys.exit(0)") - 1]
+
+
+def test_signal_name_of_a_real_time_signal_is_its_number() -> None:
+    """Python names the first and the last real-time signal only."""
+    assert signal_name(signal.SIGKILL) == "SIGKILL"
+    assert signal_name(signal.SIGRTMIN + 3) == f"signal {signal.SIGRTMIN + 3}"
