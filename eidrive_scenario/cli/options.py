@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial, wraps
 from pathlib import Path
@@ -123,29 +124,32 @@ STANDARD_OUTPUT = "-"
 """Value of `--log` for standard output. All other options refuse it, as a file of this name is rarely meant."""
 MOST_SEEDS = 1_000_000
 """Maximum number of seeds of an option."""
+_SEEDS = re.compile(r"(\d{1,40})(?:-(\d{1,40}))?")
+_SHARD = re.compile(r"(\d{1,9})/(\d{1,9})")
+"""Patterns of limited length: Python does not convert texts of thousands of digits to integers."""
 
 
 def parse_seeds(option: str, text: str) -> list[int]:
     """Return the seeds of a text such as `1-10`, `3` or `1,2,5-8`. Raise SettingError for another text."""
     seeds: list[int] = []
     for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
+        match = _SEEDS.fullmatch(part.strip())
+        first, last = (int(match[1]), int(match[2] or match[1])) if match is not None else (1, 0)
+        if last < first:
             raise SettingError(Diagnostic(f"{option}: no seeds (got {quoted(text)}; expected 1-10 or 1,2,5)"))
-        if dash and int(last) - int(first) >= MOST_SEEDS:
+        if len(seeds) + last - first >= MOST_SEEDS:
             raise SettingError(Diagnostic(f"{option}: more than {MOST_SEEDS} seeds (got {quoted(text)})"))
-        seeds += range(int(first), int(last or first) + 1)
+        seeds += range(first, last + 1)
     return seeds
 
 
 def parse_shard(text: str) -> tuple[int, int]:
     """Return number and count of `2/8`. Raise SettingError unless the number is within 1 … count."""
-    number, slash, count = text.partition("/")
-    if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
-        raise SettingError(
-            Diagnostic(f"--shard: no part of a whole (got {quoted(text)}; expected I/N, from 1/N to N/N)")
-        )
-    return int(number), int(count)
+    match = _SHARD.fullmatch(text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        message = f"--shard: no part of a whole (got {quoted(text)}; expected I/N, from 1/N to N/N)"
+        raise SettingError(Diagnostic(message))
+    return int(match[1]), int(match[2])
 
 
 def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
