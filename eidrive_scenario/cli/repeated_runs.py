@@ -87,13 +87,11 @@ def _check_not_varied(expansion: DistributionExpansion, parameters: Mapping[str,
 
 def rate_test(at_least: float, confidence: float, repeat: int) -> RatioTest:
     """Return the test of a required rate; `repeat` above 1 is its limit. Raise SettingError for invalid options."""
+    if not 0.5 < confidence < 1.0:
+        raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0.5 and 1"))
     try:
         return test_of_rate(at_least, confidence=confidence, limit=repeat if repeat > 1 else LIMIT)
     except ValueError as error:
-        if "confidence" in str(error):
-            raise SettingError(
-                Diagnostic(f"--confidence is {confidence}", "give a number between 0.5 and 1")
-            ) from error
         raise SettingError(Diagnostic(f"--success-rate is {at_least}", "give a rate between 0 and 1")) from error
 
 

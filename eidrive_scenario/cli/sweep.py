@@ -107,7 +107,7 @@ def sweep(
         start_server()  # First, as it imports for as long as the imports below
 
     from eidrive_scenario.base.content_digest import package_versions
-    from eidrive_scenario.cli.sweep_search import ProgressDisplay, Search, check_search_options
+    from eidrive_scenario.cli.sweep_search import ProgressDisplay, Search
     from eidrive_scenario.experiments.repetitions import cores
     from eidrive_scenario.experiments.run_folder import check_writable
     from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis, points_of, with_types
@@ -131,11 +131,9 @@ def sweep(
         return with_types(axes, path, is_distribution=kind == "distribution")
 
     axes = typed(parse_axes(vary or []))
-    search = None
-    check_search_options(find_boundary is not None, falsify, bound, tolerance, objective)
-    if falsify or find_boundary is not None:
-        (boundary,) = (None,) if find_boundary is None else typed([parse_axis(find_boundary)])
-        search = Search.of(axes, boundary, bound, tolerance, falsify, objective, runs, chosen)
+    boundary = None if find_boundary is None else typed([parse_axis(find_boundary)])[0]
+    search = Search.of(axes, boundary, bound, tolerance, falsify, objective, runs, chosen)
+    if search is not None:
         axes, runs, chosen = search.fixed, None, chosen or [1]
         if shard is not None or design != "grid":
             raise SettingError(Diagnostic("a search has neither shards nor a design", "remove --shard and --design"))

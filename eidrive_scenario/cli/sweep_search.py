@@ -25,20 +25,7 @@ MOST_RUNS = 200
 """Default maximum number of runs of a search."""
 BOUND = 0.5
 """Default success rate at the boundary."""
-
-
-def check_search_options(
-    finds_boundary: bool, falsifies: bool, bound: float | None, tolerance: float | None, objective: str | None
-) -> None:
-    """Raise SettingError for an option of a search that is not requested."""
-    options = (
-        ("--bound", bound, finds_boundary, "--find-boundary"),
-        ("--tolerance", tolerance, finds_boundary, "--find-boundary"),
-        ("--objective", objective, falsifies, "--falsify"),
-    )
-    for name, value, is_requested, search in options:
-        if value is not None and not is_requested:
-            raise SettingError(Diagnostic(f"{name} without {search} has no effect", f"add {search}, or remove {name}"))
+_SEEDS = "--seeds does not fit to the search"
 
 
 @dataclass(frozen=True)
@@ -69,34 +56,42 @@ class Search:
         objective: str | None,
         runs: int | None,
         seeds: Sequence[int] | None = None,
-    ) -> Self:
-        """Return the search of these options. Raise SettingError for options that do not fit together."""
-        if boundary is not None and falsified:
-            raise SettingError(Diagnostic("--find-boundary and --falsify are two searches", "give one of them"))
-        if seeds is not None and (boundary is not None or len(seeds) != 1):
-            hint = (
-                "remove it: each run has another seed" if boundary is not None else "give one seed, which all runs have"
-            )
-            raise SettingError(Diagnostic("--seeds does not fit to the search", hint))
-        bound = BOUND if bound is None else bound
+    ) -> Self | None:
+        """Return the search of these options, None without one. Raise SettingError for options that do not fit."""
+        for name, given, is_requested, option in (
+            ("--bound", bound, boundary is not None, "--find-boundary"),
+            ("--tolerance", tolerance, boundary is not None, "--find-boundary"),
+            ("--objective", objective, falsified, "--falsify"),
+        ):
+            if given is not None and not is_requested:
+                hint = f"add {option}, or remove {name}"
+                raise SettingError(Diagnostic(f"{name} without {option} has no effect", hint))
         space = tuple(axis for axis in axes if axis.is_interval or len(axis.values) > 1)
         fixed = tuple(axis for axis in axes if axis not in space)
         most = runs or MOST_RUNS
         if boundary is None:
-            return cls(None, bound, math.nan, space, fixed, objective, most)
-        axis = boundary
-        check_different([*axes, axis])
-        if not axis.is_interval:
-            raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is not an interval", "expected NAME=LOW:HIGH"))
+            if seeds is not None and falsified and len(seeds) != 1:
+                raise SettingError(Diagnostic(_SEEDS, "give one seed, which all runs have"))
+            return cls(None, BOUND, math.nan, space, fixed, objective, most) if falsified else None
+        if falsified:
+            raise SettingError(Diagnostic("--find-boundary and --falsify are two searches", "give one of them"))
+        if seeds is not None:
+            raise SettingError(Diagnostic(_SEEDS, "remove it: each run has another seed"))
+        check_different([*axes, boundary])
+        if not boundary.is_interval:
+            message = f"--find-boundary: {boundary.name} is not an interval"
+            raise SettingError(Diagnostic(message, "expected NAME=LOW:HIGH"))
         if space:
             hint = "give each axis of --vary one value, or use a sweep for each"
             raise SettingError(Diagnostic(f"--find-boundary: {space[0].name} varies, too", hint))
+        bound = BOUND if bound is None else bound
         if not 0.0 < bound < 1.0:
             raise SettingError(Diagnostic(f"--bound is {bound}", "give a success rate between 0 and 1"))
-        least = max(0.02 * (axis.high - axis.low), 0.5 * axis.is_whole) if tolerance is None else tolerance
+        width = boundary.high - boundary.low
+        least = max(0.02 * width, 0.5 * boundary.is_whole) if tolerance is None else tolerance
         if not 0.0 < least < math.inf:
             raise SettingError(Diagnostic(f"--tolerance is {tolerance}", "give a positive number"))
-        return cls(axis, bound, least, (), fixed, objective, most)
+        return cls(boundary, bound, least, (), fixed, objective, most)
 
     @property
     def axes(self) -> tuple[Axis, ...]:

@@ -142,7 +142,8 @@ def test_most_different_are_far_apart(plan: SweepPlan) -> None:
 
 def test_lists_of_one_value_are_no_space() -> None:
     axes = parse_axes(["kind=a", "Speed=1:2"])
-    search = Search.of(axes, None, 0.5, None, True, None, None)
+    search = Search.of(axes, None, None, None, True, None, None)
+    assert search is not None
     assert [axis.name for axis in search.space] == ["Speed"]
     assert [axis.name for axis in search.fixed] == ["kind"]
 
