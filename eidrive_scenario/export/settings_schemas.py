@@ -81,18 +81,15 @@ def _with_kind(definition: Schema, name: str, *, required: bool) -> Schema:
     return {**definition, "properties": properties, "required": [*others, *(["kind"] if required else [])]}
 
 
-def _selection(models: _Models, part: str, default: str) -> list[Schema]:
-    """Return the schemas of the settings `PART_settings` under the condition that `PART` names the extension."""
-    cases = []
-    for name in models.names(SELECTED[part]):
-        condition: Schema = {"properties": {part: {"const": name}}}
-        if name != default:  # an omitted property fulfills the condition
-            condition["required"] = [part]
-        settings = models.reference(SELECTED[part], name)
-        if part == "planner":  # properties of the stack may be the settings that it requires
-            settings = {key: value for key, value in models.definition("planners", name).items() if key != "required"}
-        cases.append({"if": condition, "then": {"properties": {f"{part}_settings": settings}}})
-    return cases
+def _cases(key: str, default: str, schemas: Mapping[str, Schema]) -> list[Schema]:
+    """Return schemas under the condition that the property `key` has their name; an omitted one has the default."""
+    return [
+        {
+            "if": {"properties": {key: {"const": name}}} | ({} if name == default else {"required": [key]}),
+            "then": schema,
+        }
+        for name, schema in schemas.items()
+    ]
 
 
 def _stack(warn: Warn) -> Schema:
@@ -102,12 +99,17 @@ def _stack(warn: Warn) -> Schema:
     properties = dict(schema["properties"])
     conditions: list[Schema] = []
     for part, group in SELECTED.items():
-        also = [NO_PLANNER] if part == "planner" else []
         given = properties[part].get("default")
-        properties[part] = {"enum": [*models.names(group), *also], "type": "string"}
+        settings = {name: models.reference(group, name) for name in models.names(group)}
+        names = [*settings]
+        if part == "planner":  # properties of the stack may be the settings that it requires
+            own = {name: models.definition(group, name) for name in names}
+            settings = {name: {key: own[name][key] for key in own[name] if key != "required"} for name in names}
+            names.append(NO_PLANNER)
+        properties[part] = {"enum": names, "type": "string"}
         properties[f"{part}_settings"] = _FREE
-        default = DEFAULT_PLANNER if given is None else given
-        conditions += _selection(models, part, default)
+        schemas = {name: {"properties": {f"{part}_settings": schema}} for name, schema in settings.items()}
+        conditions += _cases(part, DEFAULT_PLANNER if given is None else given, schemas)
     for name in models.names("planners"):
         for key, setting in models.definition("planners", name).get("properties", {}).items():
             alternatives = properties.setdefault(key, {"anyOf": []}).get("anyOf", [])
@@ -147,16 +149,11 @@ def _channel(warn: Warn) -> Schema:
     """Return the schema of a channel profile."""
     models = _Models(["channels"], warn, ChannelProfile)
     default = ChannelProfile.model_fields["model"].default
-    conditions = []
-    for name in models.names("channels"):
-        condition: Schema = {"properties": {"model": {"const": name}}}
-        if name != default:
-            condition["required"] = ["model"]
-        conditions.append({"if": condition, "then": models.reference("channels", name)})
+    schemas = {name: models.reference("channels", name) for name in models.names("channels")}
     return {
         "type": "object",
-        "properties": {**models.common[0]["properties"], "model": {"enum": models.names("channels"), "type": "string"}},
-        "allOf": conditions,
+        "properties": {**models.common[0]["properties"], "model": {"enum": list(schemas), "type": "string"}},
+        "allOf": _cases("model", default, schemas),
         _DEFINITIONS: models.definitions,
     }
 
