@@ -37,7 +37,6 @@ from eidrive_scenario.run_options import RunSettings, check_seconds
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.statistics.sequential import RatioTest
     from eidrive_scenario.openscenario import ConcreteRun
-    from eidrive_scenario.recording import Explanation
     from eidrive_scenario.reporting.live.live_view import LiveView
     from eidrive_scenario.simulation import RunResult
 
@@ -264,11 +263,12 @@ class _Runs:
     def _execute(self, source: Path | ConcreteRun, seed: int) -> int:
         """Execute and print one run, and return its exit code."""
         from eidrive_scenario.experiments.single_run import run_and_save
+        from eidrive_scenario.recording import Explanation
 
         parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
         suffixes = [*parts, f"seed-{seed}"] if len(self.seeds) > 1 else parts
         log = self.log
-        explanations = _explanations(self.explain)
+        explanations = [Explanation(name) for name in self.explain]
         result = run_and_save(
             source,
             seed=seed,
@@ -307,14 +307,6 @@ class _Runs:
             show(result, varied=varied)
         if result.folder is not None:
             echo(f"files: {result.folder}", err=self.json)
-
-
-def _explanations(names: Sequence[str]) -> list[Explanation]:
-    if not names:
-        return []
-    from eidrive_scenario.recording import Explanation
-
-    return [Explanation(name) for name in names]
 
 
 def _with_suffixes(path: Path, suffixes: list[str]) -> Path:

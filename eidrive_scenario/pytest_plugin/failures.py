@@ -80,18 +80,14 @@ def add_failures(item: pytest.Item, result: RunResult | RateVerdict, file: Path)
     record = record_of(item)
     for failure in failures_of(result):
         record.essence = record.essence or essence(result)
-        _add_failed_run(record, failure, file)
-
-
-def _add_failed_run(record: RunRecord, result: RunResult, file: Path) -> None:
-    record.reasons += reasons(result)
-    record.commands += [result.command] if result.command else []
-    if result.recording is not None:
-        record.attachments.append(str(result.recording))
-    if result.folder is not None:
-        record.attachments.append(str(result.folder / "result.json"))
-    failed = [verdict.name for verdict in result.criteria if not verdict.passed]
-    record.place_at(file, line_of_criterion(file, failed[0]) if failed else None)
+        record.reasons += reasons(failure)
+        record.commands += [failure.command] if failure.command else []
+        if failure.recording is not None:
+            record.attachments.append(str(failure.recording))
+        if failure.folder is not None:
+            record.attachments.append(str(failure.folder / "result.json"))
+        failed = [verdict.name for verdict in failure.criteria if not verdict.passed]
+        record.place_at(file, line_of_criterion(file, failed[0]) if failed else None)
 
 
 def add_error(item: pytest.Item, error: BaseException, file: Path) -> None:
@@ -172,18 +168,15 @@ class ScenarioFailed(Exception):
         self.result = result
 
 
-def explain_rate(verdict: RateVerdict) -> str:
-    """Return the reason of a failed or undecided test of the success rate, with its first failed runs."""
-    shown = [explain(failure) for failure in verdict.failures[:_SHOWN_FAILURES]]
-    more = len(verdict.failures) - len(shown)
-    return "\n\n".join([str(verdict), *shown, *([f"and {more} more failed runs"] if more else [])])
-
-
 def explain_outcome(result: RunResult | RateVerdict) -> str:
-    """Return the reason of a failed run, or of a failed test of the success rate."""
+    """Return the reason of a failed run, or of a failed or undecided test of the success rate with its first ones."""
     from eidrive_scenario.simulation import RunResult
 
-    return printable(explain(result) if isinstance(result, RunResult) else explain_rate(result))
+    if isinstance(result, RunResult):
+        return printable(explain(result))
+    shown = [explain(failure) for failure in failures_of(result)]
+    more = len(result.failures) - len(shown)
+    return printable("\n\n".join([str(result), *shown, *([f"and {more} more failed runs"] if more else [])]))
 
 
 def explain(result: RunResult) -> str:

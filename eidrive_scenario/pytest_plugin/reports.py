@@ -150,17 +150,12 @@ _MAX_REASON = 300
 _OUTCOMES = ("passed", "failed", "error", "skipped", "xfailed", "xpassed", "rerun")
 
 
-def is_active() -> bool:
-    """Whether the process is a step of GitHub Actions."""
-    return os.environ.get("GITHUB_ACTIONS") == "true"
-
-
 def show_annotations(terminalreporter: Any, config: pytest.Config) -> None:
-    """Print one error annotation per failed test of a scenario, and append the job summary.
+    """Print one error annotation per failed test of a scenario, and append the job summary, in GitHub Actions.
 
     Workers of pytest-xdist write neither: their controller has all reports.
     """
-    if not is_active() or hasattr(config, "workerinput"):
+    if os.environ.get("GITHUB_ACTIONS") != "true" or hasattr(config, "workerinput"):
         return
     reports = _failed(terminalreporter)
     if reports and not config.pluginmanager.hasplugin(_PLUGIN):
