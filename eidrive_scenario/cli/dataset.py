@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -19,12 +18,6 @@ if TYPE_CHECKING:
     from eidrive_scenario.export.opv2v.dataset import ExportedRun
 
 
-class DatasetFormat(StrEnum):
-    """Formats of datasets."""
-
-    opv2v = "opv2v"
-
-
 @takes_run_options("dataset", at="out", before={"allow_torchscript": "help_all"})
 def dataset(
     settings: RunSettings,
@@ -32,7 +25,7 @@ def dataset(
         list[str] | None,
         typer.Argument(metavar="[SCENARIO]...", help=".xosc files or library names; all runs of a distribution."),
     ] = None,
-    format: Annotated[DatasetFormat, typer.Option(help="Format of the dataset.")] = DatasetFormat.opv2v,
+    format: Annotated[Literal["opv2v"], typer.Option(help="Format of the dataset.")] = "opv2v",
     seeds: Annotated[
         str | None, typer.Option(metavar="A-B|A,B", help="Seeds of each scenario.", show_default="1")
     ] = None,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -45,15 +44,8 @@ def judge(
     raise typer.Exit(judgement.exit_code)
 
 
-class TableName(StrEnum):
-    """Tables of a run for CSV and Parquet files."""
-
-    actors = "actors"
-    objects = "objects"
-    plans = "plans"
-    messages = "messages"
-    transitions = "transitions"
-    verdicts = "verdicts"
+TableName = Literal["actors", "objects", "plans", "messages", "transitions", "verdicts"]
+"""Tables of a run for CSV and Parquet files."""
 
 
 def export(
@@ -72,7 +64,7 @@ def export(
     ] = None,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as CSV.")] = None,
     parquet: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as Parquet.")] = None,
-    table: Annotated[TableName, typer.Option(help="Table of --csv and --parquet.")] = TableName.actors,
+    table: Annotated[TableName, typer.Option(help="Table of --csv and --parquet.")] = "actors",
 ) -> None:
     """Write a recorded run as files of other tools.
 
@@ -90,8 +82,8 @@ def export(
         "--osi": (osi, write_osi),
         "--foxglove": (foxglove, write_foxglove),
         "--mcap": (mcap, write_with_topics),
-        "--csv": (csv, partial(write_csv, table=table.value)),
-        "--parquet": (parquet, partial(write_parquet, table=table.value)),
+        "--csv": (csv, partial(write_csv, table=table)),
+        "--parquet": (parquet, partial(write_parquet, table=table)),
     }
     given = {option: (path, write) for option, (path, write) in writers.items() if path is not None}
     if not given:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -13,17 +12,8 @@ from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.cli.output import echo, print_warnings
 
 
-class SchemaKind(StrEnum):
-    """Kinds of files with a schema."""
-
-    stack = "stack"
-    channel = "channel"
-    criteria = "criteria"
-    weather = "weather"
-
-
 def schema(
-    kind: Annotated[SchemaKind, typer.Argument(help="Kind of the YAML files.")],
+    kind: Annotated[Literal["stack", "channel", "criteria", "weather"], typer.Argument(help="Kind of the YAML files.")],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="File of the schema.", show_default="print it")
     ] = None,
@@ -39,7 +29,7 @@ def schema(
 
     check_output_paths({"--out": out}, [])
     warnings: list[str] = []
-    text = json.dumps(settings_schema(kind.value, warnings.append), indent=1, allow_nan=False)
+    text = json.dumps(settings_schema(kind, warnings.append), indent=1, allow_nan=False)
     print_warnings(warnings)
     if out is None:
         echo(text)

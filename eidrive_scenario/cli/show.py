@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -18,30 +17,15 @@ PictureSize = Annotated[
 ]
 
 
-class Names(StrEnum):
-    """Kinds of names that `eidrive list` prints."""
-
-    scenarios = "scenarios"
-    catalogs = "catalogs"
-    channels = "channels"
-    weather = "weather"
-    detectors = "detectors"
-    fusion = "fusion"
-    planners = "planners"
-    sensors = "sensors"
-    trackers = "trackers"
-    vehicle_controllers = "vehicle_controllers"
-    controllers = "controllers"
-    criteria = "criteria"
-    actions = "actions"
-    conditions = "conditions"
-    commands = "commands"
-    rules = "rules"
-    roads = "roads"
-    properties = "properties"
+Names = Literal[
+    "scenarios", "catalogs", "channels", "weather", "detectors", "fusion", "planners", "sensors", "trackers",
+    "vehicle_controllers", "controllers", "criteria", "actions", "conditions", "commands", "rules", "roads",
+    "properties",
+]  # fmt: skip
+"""Kinds of names that `eidrive list` prints."""
 
 
-def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")] = Names.scenarios) -> None:
+def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")] = "scenarios") -> None:
     """List names of the library or of installed extensions.
 
     Example: eidrive list channels
@@ -49,35 +33,34 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     from eidrive_scenario.extensions import library
     from eidrive_scenario.extensions.registry import registry
 
-    if what is Names.scenarios:
-        lines = _columns(
-            [(scenario.name, scenario.family, scenario.description) for scenario in library.describe_scenarios()]
-        )
-    elif what is Names.channels:
-        lines = [*library.names("channels"), "none"]
-    elif what is Names.weather:
-        lines = library.names("weather")
-    elif what is Names.catalogs:
-        lines = _catalog_lines()
-    elif what is Names.rules:
-        from eidrive_scenario.checks.scenario_checks import ALL_RULES
+    match what:
+        case "scenarios":
+            lines = _columns([(each.name, each.family, each.description) for each in library.describe_scenarios()])
+        case "channels":
+            lines = [*library.names("channels"), "none"]
+        case "weather":
+            lines = library.names("weather")
+        case "catalogs":
+            lines = _catalog_lines()
+        case "rules":
+            from eidrive_scenario.checks.scenario_checks import ALL_RULES
 
-        lines = _columns([(rule.name, rule.level.value, rule.summary) for rule in ALL_RULES])
-    elif what is Names.roads:
-        lines = _road_lines()
-    elif what is Names.properties:
-        from eidrive_scenario.cli.property_list import Property, properties
+            lines = _columns([(rule.name, rule.level.value, rule.summary) for rule in ALL_RULES])
+        case "roads":
+            lines = _road_lines()
+        case "properties":
+            from eidrive_scenario.cli.property_list import Property, properties
 
-        warnings: list[str] = []
-        lines = _columns([[name.upper() for name in Property._fields], *properties(warnings.append)])
-        print_warnings(warnings)
-    elif what is Names.criteria:
-        from eidrive_scenario.evaluation.criterion import describe_criteria
+            warnings: list[str] = []
+            lines = _columns([[name.upper() for name in Property._fields], *properties(warnings.append)])
+            print_warnings(warnings)
+        case "criteria":
+            from eidrive_scenario.evaluation.criterion import describe_criteria
 
-        lines = _columns([(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()])
-    else:
-        extensions = registry(what.value)
-        lines = _columns([(name, extensions.value(name)) for name in extensions])
+            lines = _columns([(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()])
+        case _:
+            extensions = registry(what)
+            lines = _columns([(name, extensions.value(name)) for name in extensions])
     for line in lines:
         echo(line)
 
