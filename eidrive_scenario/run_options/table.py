@@ -107,6 +107,24 @@ def _option(form: Form, help: str, default: Any = None, **declared: Any) -> Any:
     return field(default=default, metadata=metadata)
 
 
+def _with_batches(help: str) -> Mapping[str, Mapping[str, Any]]:
+    """Return the commands of an option with this help in those of many runs."""
+    return {"run": {}, "sweep": {"help": help}, "dataset": {"help": help}}
+
+
+def _selection(noun: str, stations: str, commands: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Return the field of an option that selects an extension for these stations by its name."""
+    text = f"{noun} of all {stations}"
+    return _option(
+        Text((str,), f"the name of a {noun}"),
+        f"{text.capitalize()}.",
+        commands=commands,
+        detail="stations",
+        in_row=True,
+        pytest=PytestForm(metavar="NAME", help=f"{text} (default: the file's own)", is_named=True),
+    )
+
+
 _PLACE: tuple[type, ...] = (str, os.PathLike)
 _RARE: Mapping[str, Any] = {"rare": True}
 _RUN: Mapping[str, Mapping[str, Any]] = {"run": {}}
@@ -147,11 +165,7 @@ class RunSettings:
     channel: str | Path | Mapping[str, Any] | None = _option(
         Text((*_PLACE, Mapping), "the name, the file or the mapping of a channel profile", (".yaml", ".yml")),
         "Channel profile: name, file or YAML; none: no cooperation.",
-        commands={
-            "run": {},
-            "sweep": {"help": "Channel profile of all runs."},
-            "dataset": {"help": "Channel profile of all runs."},
-        },
+        commands=_with_batches("Channel profile of all runs."),
         detail="channel_profile",
         pytest=PytestForm(
             metavar="A,B",
@@ -159,34 +173,9 @@ class RunSettings:
             "cooperation; repeatable",
         ),
     )
-    detector: str | None = _option(
-        Text((str,), "the name of a detector"),
-        "Detector of all stations.",
-        commands=_RUN_AND_DATASET,
-        detail="stations",
-        in_row=True,
-        pytest=PytestForm(metavar="NAME", help="detector of all stations (default: the file's own)", is_named=True),
-    )
-    fusion: str | None = _option(
-        Text((str,), "the name of a fusion method"),
-        "Fusion method of all stations.",
-        commands=_RUN_AND_DATASET,
-        detail="stations",
-        in_row=True,
-        pytest=PytestForm(
-            metavar="NAME", help="fusion method of all stations (default: the file's own)", is_named=True
-        ),
-    )
-    planner: str | None = _option(
-        Text((str,), "the name of a planner"),
-        "Planner of all driven stations.",
-        commands={"run": {}, "check": {}, "dataset": _RARE},
-        detail="stations",
-        in_row=True,
-        pytest=PytestForm(
-            metavar="NAME", help="planner of all driven stations (default: the file's own)", is_named=True
-        ),
-    )
+    detector: str | None = _selection("detector", "stations", _RUN_AND_DATASET)
+    fusion: str | None = _selection("fusion method", "stations", _RUN_AND_DATASET)
+    planner: str | None = _selection("planner", "driven stations", {"run": {}, "check": {}, "dataset": _RARE})
     weather: str | Path | None = _option(
         Text(_PLACE, "the name or the file of a weather preset", None),
         "Weather preset: name or file.",
@@ -208,11 +197,7 @@ class RunSettings:
         Assignments("a mapping of names to values"),
         "Parameter of the scenario; repeatable.",
         flag="--param",
-        commands={
-            "run": {},
-            "sweep": {"help": "Parameter of all runs; repeatable."},
-            "dataset": {"help": "Parameter of all runs; repeatable."},
-        },
+        commands=_with_batches("Parameter of all runs; repeatable."),
         pytest=None,
     )
     user_values: Mapping[str, str] = _option(
