@@ -143,10 +143,10 @@ def check_catalog(path: Path, ignored: Collection[str] = ()) -> CheckReport:
     an unknown name.
     """
     check_rule_names(ignored)
-    return CheckReport.collect(_diagnostics(path))
+    return CheckReport.collect(_catalog_diagnostics(path))
 
 
-def _diagnostics(path: Path) -> Iterator[tuple[Level, Diagnostic]]:
+def _catalog_diagnostics(path: Path) -> Iterator[tuple[Level, Diagnostic]]:
     collector = DiagnosticCollector()
     try:
         document = open_document(path)

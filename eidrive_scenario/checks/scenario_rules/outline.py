@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 from lxml import etree
@@ -195,7 +195,7 @@ class Outline:
         """Return the names to which elements refer, by kind ("entity", "variable", …)."""
         references: dict[str, set[str]] = {}
         for element in self.elements:
-            for kind, name_field in _reference_fields(type(element)):
+            for kind, name_field in _reference_fields(type(element)):  # type: ignore[arg-type]  # a class, not an element
                 name = getattr(element, name_field, None)
                 if isinstance(name, str):
                     references.setdefault(kind, set()).add(name)
@@ -234,18 +234,8 @@ def _is_placing(action: model.PrivateAction) -> bool:
     return any(isinstance(below, model.TeleportAction | model.FollowTrajectoryAction) for below in action.walk())
 
 
+@cache
 def _reference_fields(cls: type[model.Element]) -> tuple[tuple[str, str], ...]:
     """Return the kinds to which attributes of a class refer in any version, and the names of their fields."""
-    reference_fields = _REFERENCE_FIELDS.get(cls)
-    if reference_fields is None:
-        pairs = [
-            (rule.points_to, rule.field)
-            for version in VERSIONS
-            for rule in rules(cls, version).attributes.values()
-            if rule.points_to
-        ]
-        reference_fields = _REFERENCE_FIELDS[cls] = tuple(dict.fromkeys(pairs))
-    return reference_fields
-
-
-_REFERENCE_FIELDS: dict[type[model.Element], tuple[tuple[str, str], ...]] = {}
+    attributes = [rule for version in VERSIONS for rule in rules(cls, version).attributes.values()]
+    return tuple(dict.fromkeys((rule.points_to, rule.field) for rule in attributes if rule.points_to))
