@@ -115,7 +115,9 @@ def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
             heading, justify="right" if heading in ("value", "limit") else "left", no_wrap=heading != "reason"
         )
     for verdict in criteria:
-        table.add_row(*_row(verdict))
+        mark = Text("passed", style="green") if verdict.passed else Text("failed", style="red")
+        quantities = [Text(quantity_text(number, verdict.unit)) for number in (verdict.value, verdict.limit)]
+        table.add_row(Text(verdict.name), mark, *quantities, Text(verdict.reason))
     out.print(table)
     for verdict in criteria:
         if verdict.violation_state:
@@ -123,17 +125,6 @@ def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
             out.print(Text(f"{verdict.name}: {title}"))
             for line in lines:
                 out.print(Text(f"  {line}"))
-
-
-def _row(verdict: Verdict) -> tuple[Text, ...]:
-    mark = Text("passed", style="green") if verdict.passed else Text("failed", style="red")
-    return (
-        Text(verdict.name),
-        mark,
-        Text(quantity_text(verdict.value, verdict.unit)),
-        Text(quantity_text(verdict.limit, verdict.unit)),
-        Text(verdict.reason),
-    )
 
 
 def storyboard_tree(storyboard: Storyboard) -> Tree:

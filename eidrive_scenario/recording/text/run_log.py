@@ -183,9 +183,6 @@ class FinalState:
         if frame.changes:
             self._observe_changes(frame.changes)
 
-    def close(self) -> None:
-        """Do nothing: no file is open."""
-
     def _observe_changes(self, changes: tuple[StateChange, ...]) -> None:
         end = next(
             (change for change in changes if change.kind == _STORYBOARD and change.after is ElementState.COMPLETE), None
