@@ -36,7 +36,6 @@ CLOSING = 30.0
 """Time in which an interrupted run has to close its files before the last resort [s]."""
 LONGEST = 1e9
 """Limit that replaces longer ones, which exceed the timers of some systems [s]. No run takes 30 years."""
-_SIGNAL: int | None = getattr(signal, "SIGUSR2", None)
 
 
 class LimitReached(BaseException):
@@ -209,7 +208,7 @@ class _Watchdog:
     def __init__(self, limit: Limit) -> None:
         self.limit = limit
         self._target = threading.get_ident()
-        self._by_signal = _SIGNAL is not None and threading.current_thread() is threading.main_thread()
+        self._by_signal = threading.current_thread() is threading.main_thread()
         self._before: Callable[[int, FrameType | None], object] | int | None = None
         self._is_postponed = False
         """Whether the last interruption fell into the beginning or the end of the block, or into saving notes."""
@@ -219,8 +218,8 @@ class _Watchdog:
 
     def start(self) -> None:
         """Watch the run from now on."""
-        if self._by_signal and _SIGNAL is not None:
-            self._before = signal.signal(_SIGNAL, self._interrupted)
+        if self._by_signal:
+            self._before = signal.signal(signal.SIGUSR2, self._interrupted)
         _dump_later(self.limit.seconds + 2.0 * GRACE)
         self._thread.start()
 
@@ -236,8 +235,8 @@ class _Watchdog:
         self._thread.join(REPEAT)
         if _last_resort is not None and _last_resort.dump is not None:
             faulthandler.cancel_dump_traceback_later()
-        if self._by_signal and _SIGNAL is not None:
-            signal.signal(_SIGNAL, signal.SIG_DFL if self._before is None else self._before)
+        if self._by_signal:
+            signal.signal(signal.SIGUSR2, signal.SIG_DFL if self._before is None else self._before)
 
     def _watch(self) -> None:
         if self._ended.wait(self.limit.seconds):
@@ -260,8 +259,8 @@ class _Watchdog:
         with self._lock:
             if self._ended.is_set() or not self.limit.armed:
                 return
-            if self._by_signal and _SIGNAL is not None:
-                signal.pthread_kill(self._target, _SIGNAL)
+            if self._by_signal:
+                signal.pthread_kill(self._target, signal.SIGUSR2)
             elif _is_protected(sys._current_frames().get(self._target)):
                 self._is_postponed = True
             else:

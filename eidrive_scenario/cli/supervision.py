@@ -21,7 +21,7 @@ from eidrive_scenario.errors import ABORTED, EidriveError, SimulationError, Wall
 if TYPE_CHECKING:
     from eidrive_scenario.base.wall_limit import Limit
 
-_FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+_FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _DEATH_SIGNAL = 1
 """Option PR_SET_PDEATHSIG of prctl(2)."""
 _allowed = False
@@ -43,9 +43,9 @@ def supervise(
     subject  description of the run in progress, which the parent gets before it reports
     what     subject of messages: run or check
 
-    Without `fork`, or outside the process of the command line, only runs that return to the interpreter are limited.
+    Outside the process of the command line, only runs that return to the interpreter are limited.
     """
-    if not _allowed or not hasattr(os, "fork"):
+    if not _allowed:
         return
     import ctypes
 
@@ -96,7 +96,7 @@ def _content(file: BinaryIO) -> str:
 
 def _wait(child: int) -> int:
     """Wait for a child, forward all signals except ignored ones, and return its status."""
-    for number in [getattr(signal, name) for name in _FORWARDED]:
+    for number in _FORWARDED:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda received, frame: os.kill(child, received))
     return os.waitpid(child, 0)[1]

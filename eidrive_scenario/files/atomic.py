@@ -41,7 +41,7 @@ class FileLock:
         """Return the lock, or None if it is held elsewhere. Raise OSError if the file cannot be created."""
         while True:
             created = not path.exists()
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0), 0o644)
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
             try:
                 if not _lock(descriptor, created):
                     os.close(descriptor)

@@ -85,7 +85,7 @@ class McapFile:
         if os.path.exists(path) and not is_regular_file(path):
             raise InputError(Diagnostic("cannot read: not a regular file", "give an MCAP recording", str(path)))
         try:
-            self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+            self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
             status = os.fstat(self._descriptor)
         except OSError as error:
             suffixes = (".mcap",) if path.suffix else ()  # a folder of a run has none
