@@ -25,13 +25,12 @@ class Seal:
     def add_metadata(self, metadata: Mapping[str, str]) -> None:
         """Add the metadata of the run."""
         for text in (f"{len(metadata)}", *(text for entry in metadata.items() for text in entry)):
-            self._add_text(text)
+            self._add(text.encode())
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Add an attached file."""
-        self._add_text(name)
-        self._sha.update(struct.pack("<Q", len(data)))
-        self._sha.update(data)
+        self._add(name.encode())
+        self._add(data)
 
     def add_frame(self, sequence: int, log_time: int, data: bytes) -> None:
         """Add a frame: its tick, its time [ns] and its JSON text."""
@@ -43,8 +42,7 @@ class Seal:
         """Return the entries of the last metadata record of the recording."""
         return {"frames": str(self.frames), "sha256": self._sha.hexdigest()}
 
-    def _add_text(self, text: str) -> None:
-        data = text.encode()
+    def _add(self, data: bytes) -> None:
         self._sha.update(struct.pack("<Q", len(data)))
         self._sha.update(data)
 

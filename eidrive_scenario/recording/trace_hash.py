@@ -88,18 +88,13 @@ class TraceHash:
             self._sha.update(self._columns(part) if isinstance(part, OutcomeBlock) else self._rows(part))
 
     def _rows(self, links: Sequence[LinkEvent]) -> bytes:
-        return b"".join([self._row(link) for link in links])
-
-    def _row(self, link: LinkEvent) -> bytes:
-        return _OUTCOME.pack(
-            self._word(link.sender),
-            self._word(link.receiver),
-            self._word(link.outcome, link.reason),
-            link.number,
-            link.sent,
-            math.inf if link.arrives is None else link.arrives,
-            link.size,
-        )
+        rows = []
+        for link in links:
+            sender, receiver = self._word(link.sender), self._word(link.receiver)
+            arrives = math.inf if link.arrives is None else link.arrives
+            outcome = self._word(link.outcome, link.reason)
+            rows.append(_OUTCOME.pack(sender, receiver, outcome, link.number, link.sent, arrives, link.size))
+        return b"".join(rows)
 
     def _columns(self, block: OutcomeBlock) -> bytes:
         table = block.columns()
