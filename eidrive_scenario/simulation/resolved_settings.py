@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -175,11 +175,12 @@ def _scenario_files(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
 def _setting_files(values: tuple[Mapping[str, Any] | None, ...], scenario: Scenario) -> Iterator[tuple[str, str, str]]:
     """Yield kind, name and digest of the files that settings refer to: delay traces, weights, ASN.1 modules."""
     folder = scenario.path.parent if scenario.path is not None else Path()
-    for value in values:
-        for name in _named_files(value):
-            file = next((path for path in (folder / name, Path(name)) if is_regular_file(path)), None)
-            if file is not None:
-                yield "setting", file.name, _digest(file)
+    names: list[str | Path] = []
+    _with_files(values, names.append)
+    for name in names:
+        file = next((path for path in (folder / name, Path(name)) if is_regular_file(path)), None)
+        if file is not None:
+            yield "setting", file.name, _digest(file)
 
 
 def _digest(path: Path) -> str:
@@ -191,28 +192,19 @@ def _digest(path: Path) -> str:
 
 def _without_folders(value: Any) -> Any:
     """Return settings with file names without folders, so that equal settings are equal on any machine."""
+    return _with_files(value, lambda name: Path(name).name)
+
+
+def _with_files(value: Any, convert: Callable[[str | Path], Any], *, is_file: bool = False) -> Any:
+    """Return settings with converted file names.
+
+    is_file  whether the value names one or several files
+    """
     if isinstance(value, Mapping):
-        return {key: _names_only(item) if key in _FILE_KEYS else _without_folders(item) for key, item in value.items()}
-    return [_without_folders(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def _names_only(value: Any) -> Any:
+        return {key: _with_files(part, convert, is_file=key in _FILE_KEYS) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_names_only(item) for item in value]
-    return Path(value).name if isinstance(value, str | Path) else _without_folders(value)
-
-
-def _named_files(value: Any) -> Iterator[str]:
-    """Yield the file names in settings, as written there."""
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            if key in _FILE_KEYS:
-                yield from (str(name) for name in (item if isinstance(item, list | tuple) else [item]) if name)
-            else:
-                yield from _named_files(item)
-    elif isinstance(value, list | tuple):
-        for item in value:
-            yield from _named_files(item)
+        return [_with_files(part, convert, is_file=is_file) for part in value]
+    return convert(value) if is_file and isinstance(value, str | Path) else value
 
 
 def _plain(value: Any) -> Any:
