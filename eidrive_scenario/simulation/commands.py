@@ -191,15 +191,11 @@ class RunState(msgspec.Struct):
 
     def take_executed(self) -> tuple[ExecutedCommand, ...]:
         """Return the commands since the last call."""
-        if not self.executed:
-            return ()
-        executed, self.executed = tuple(self.executed), []
-        return executed
+        executed, self.executed = self.executed, []
+        return tuple(executed)
 
     def trailers_in(self, view: WorldView) -> Mapping[str, str]:
         """Return the trailer of each towing vehicle of which both are present."""
-        if not self.trailers:
-            return {}
         return {front: back for front, back in self.trailers.items() if front in view and back in view}
 
     def record(self, kind: str, content: str) -> None:

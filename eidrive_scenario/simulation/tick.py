@@ -9,7 +9,7 @@ import msgspec
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
+from eidrive_scenario.storyboard.state.commands import Commands, ExternalPose
 from eidrive_scenario.world.view import WorldView
 
 
@@ -49,15 +49,11 @@ class OutsideInputs(msgspec.Struct):
 
     def take_poses(self) -> Mapping[str, ExternalPose]:
         """Return the poses, which apply to one tick."""
-        if not self.poses:
-            return NONE
         poses, self.poses = self.poses, {}
         return poses
 
     def take_actions(self) -> Mapping[str, StationAction]:
         """Return the decisions, which apply to one tick."""
-        if not self.actions:
-            return NONE
         actions, self.actions = self.actions, {}
         return actions
 
