@@ -9,9 +9,7 @@ INSTALL = f"install it: {install_command('gym')}"
 """Hint of the error for a missing library."""
 
 try:
-    import gymnasium
-    from gymnasium import spaces
+    import gymnasium as gymnasium
+    from gymnasium import spaces as spaces
 except ImportError as error:
     raise SettingError(Diagnostic("Gymnasium is not installed", INSTALL)) from error
-
-__all__ = ["INSTALL", "gymnasium", "spaces"]
