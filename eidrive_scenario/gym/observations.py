@@ -206,16 +206,10 @@ def _pixels(points: Array, settings: GridSettings) -> NDArray[Any]:
     return np.rint(np.clip(scaled, -1e6, 1e6)).astype(np.int32)
 
 
-EGO_COLUMNS = (
-    "speed", "acceleration", "yaw_rate", "requested_speed", "request_known", "throttle", "brake", "steering",
-)  # fmt: skip
-"""Entries of the part `ego`: SI units; the control is that of the last step."""
 _EGO_HIGH = np.array([MAX_SPEED, 20.0, math.pi, MAX_SPEED, 1.0, 1.0, 1.0, math.pi / 2.0])
 _EGO_LOW = np.array([-MAX_SPEED, -20.0, -math.pi, 0.0, 0.0, 0.0, 0.0, -math.pi / 2.0])
-ROUTE_COLUMNS = ("known", "x", "y")
-"""Columns of the part `route`: whether the route has this point, and its position in the frame of the vehicle [m]."""
-SENDER_COLUMNS = ("known", "age")
-"""Columns of the part `senders`: whether a message was received, and the age of the newest one [s]."""
+"""Bounds of the part `ego` in SI units: speed, acceleration, yaw rate, requested speed and whether it is known; throttle,
+brake and steering of the last step."""
 
 Part = Callable[[StationPerception], Sequence[float] | NDArray[Any]]
 """Conversion that returns the first values of a part, in one dimension; the others are 0."""
