@@ -20,6 +20,7 @@ from eidrive_scenario.openscenario.reading.parsing import open_document
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.scenario import EntitySelections, Scenario
 from eidrive_scenario.openscenario.validation.names import LEVELS, ReferenceMatch
+from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 
 WORD = re.compile(r"\w+")
 """Pattern of words that may be names of parameters, variables or entities in the text of a command."""
@@ -150,12 +151,8 @@ class Outline:
     @cached_property
     def trailers(self) -> frozenset[str]:
         """Return entities that another one tows; they are present with it."""
-        towed: set[str] = set()
-        for element in self.elements:
-            if isinstance(element, model.Trailer):
-                towed |= {element.trailer.name} if element.trailer else set()
-                towed |= {element.trailer_ref.entity_ref} if element.trailer_ref else set()
-        return frozenset(towed)
+        trailers = map(declared_trailer, self.scenario.entities.values())
+        return frozenset(name for name in trailers if name is not None)
 
     @cached_property
     def at_start(self) -> frozenset[str]:
