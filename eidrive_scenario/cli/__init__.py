@@ -9,7 +9,7 @@ criterion judges the run.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -57,39 +57,32 @@ class CommandTable(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         """Return a command. Raise KeyError if none has this name."""
         if name not in self._created:
-            function = _function(name)
             from eidrive_scenario.cli.options import ShortHelp
 
+            if name in FUNCTIONS:  # first, so that no package replaces a command of the engine
+                module, _, function = FUNCTIONS[name].partition(":")
+                command = getattr(import_module(f"eidrive_scenario.cli.{module}"), function)
+            elif name in _added():
+                command = _added().load(name)
+            else:
+                raise KeyError(name)
             app = typer.Typer(add_completion=False)
-            app.command(name=name, cls=ShortHelp if name in _SHORT else None)(function)
+            app.command(name=name, cls=ShortHelp if name in _SHORT else None)(command)
             self._created[name] = get_command(app)
         return self._created[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter([*FUNCTIONS, *(name for name in _added() if name not in FUNCTIONS)])
+        return iter(dict.fromkeys([*FUNCTIONS, *_added()]))
 
     def __len__(self) -> int:
         return len(list(iter(self)))
 
 
 def _added() -> Registry:
-    """Return the commands of other packages."""
-    from eidrive_scenario.extensions.registry import (
-        registry,  # late: a command of the engine does not read entry points
-    )
+    """Return the commands of other packages. It is imported late: a command of the engine reads no entry points."""
+    from eidrive_scenario.extensions.registry import registry
 
     return registry("commands")
-
-
-def _function(name: str) -> Callable[..., Any]:
-    """Return the function of a command. Those of the engine come first, so that no package replaces them."""
-    if name not in FUNCTIONS:
-        if name not in _added():
-            raise KeyError(name)
-        function: Callable[..., Any] = _added().load(name)
-        return function
-    module, _, function_name = FUNCTIONS[name].partition(":")
-    return getattr(import_module(f"eidrive_scenario.cli.{module}"), function_name)  # type: ignore[no-any-return]
 
 
 class _Commands(Guarded):

@@ -208,8 +208,8 @@ def _pixels(points: Array, settings: GridSettings) -> NDArray[Any]:
 
 _EGO_HIGH = np.array([MAX_SPEED, 20.0, math.pi, MAX_SPEED, 1.0, 1.0, 1.0, math.pi / 2.0])
 _EGO_LOW = np.array([-MAX_SPEED, -20.0, -math.pi, 0.0, 0.0, 0.0, 0.0, -math.pi / 2.0])
-"""Bounds of the part `ego` in SI units: speed, acceleration, yaw rate, requested speed and whether it is known; throttle,
-brake and steering of the last step."""
+"""Bounds of the part `ego` in SI units: speed, acceleration, yaw rate, requested speed, whether there is one, and
+throttle, brake and steering of the last step."""
 
 Part = Callable[[StationPerception], Sequence[float] | NDArray[Any]]
 """Conversion that returns the first values of a part, in one dimension; the others are 0."""
