@@ -154,15 +154,14 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
         return
     signals = set(context.roads.signals)
     for element in context.elements:
-        if isinstance(element, model.TrafficSignalState):
-            name = element.traffic_signal_id
-        elif isinstance(element, model.TrafficSignalStateAction | model.TrafficSignalCondition):
-            name = element.name
-        else:
-            continue
-        if name not in signals and _ADDRESS not in name:
-            hint = suggestion(name, signals) if signals else "the road file defines none"
-            yield at(element, f"traffic signal {name!r} does not exist in the road network", hint)
+        match element:
+            case (
+                model.TrafficSignalState(traffic_signal_id=name)
+                | model.TrafficSignalStateAction(name=name)
+                | model.TrafficSignalCondition(name=name)
+            ) if name not in signals and _ADDRESS not in name:
+                hint = suggestion(name, signals) if signals else "the road file defines none"
+                yield at(element, f"traffic signal {name!r} does not exist in the road network", hint)
 
 
 def conflict_areas_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:

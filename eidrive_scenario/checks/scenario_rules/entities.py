@@ -99,15 +99,14 @@ def self_references(context: LintContext) -> Iterator[Diagnostic]:
     """Yield distance and synchronization actions that refer to their own actor."""
     for action, actors in context.performances:
         for element in action.walk():
-            if isinstance(element, model.LateralDistanceAction | model.LongitudinalDistanceAction):
-                other = element.entity_ref
-            elif isinstance(element, model.SynchronizeAction):
-                other = element.master_entity_ref
-            else:
-                continue
-            if other in actors:
-                kind = type(element).__name__
-                yield at(element, f"{kind} of {other!r} refers to {other!r} itself", "specify another entity")
+            match element:
+                case (
+                    model.LateralDistanceAction(entity_ref=other)
+                    | model.LongitudinalDistanceAction(entity_ref=other)
+                    | model.SynchronizeAction(master_entity_ref=other)
+                ) if other in actors:
+                    kind = type(element).__name__
+                    yield at(element, f"{kind} of {other!r} refers to {other!r} itself", "specify another entity")
 
 
 def unknown_traffic(context: LintContext) -> Iterator[Diagnostic]:

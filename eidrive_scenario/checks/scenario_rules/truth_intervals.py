@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.checks.scenario_rules.outline import Outline
@@ -122,40 +121,24 @@ OPEN = TruthIntervals()
 
 def truth_intervals(condition: model.Condition, outline: Outline) -> TruthIntervals:
     """Return the intervals in which a condition can hold that does not depend on storyboard states."""
-    by_entity, by_value = condition.by_entity_condition, condition.by_value_condition
-    if by_entity is not None:
-        return _of_entities(by_entity, outline)
-    leaf = next(iter(by_value.children()), None) if by_value is not None else None
-    evaluate = _BY_VALUE.get(type(leaf))
-    if evaluate is None or is_criterion(condition):
+    if condition.by_entity_condition is not None:
+        return _of_entities(condition.by_entity_condition, outline)
+    if condition.by_value_condition is None or is_criterion(condition):
         return OPEN
-    return evaluate(leaf, outline)
+    match next(iter(condition.by_value_condition.children()), None):
+        case model.SimulationTimeCondition(rule=rule, value=value):
+            intervals = times_that_satisfy(rule, value)
+            return TruthIntervals(intervals, True) if intervals else never("the simulation time is never negative")
+        case model.ParameterCondition(parameter_ref=name) if not _sets_parameter(outline, name):
+            # Steady, but not certain: the user may choose the constant value
+            return TruthIntervals(steady=f"no action sets the parameter {name!r}")
+        case model.TimeOfDayCondition() if not any(isinstance(part, model.TimeOfDay) for part in outline.elements):
+            return never("no EnvironmentAction sets the time of day")
+    return OPEN
 
 
-def _time(leaf: model.SimulationTimeCondition, _: Outline) -> TruthIntervals:
-    intervals = times_that_satisfy(leaf.rule, leaf.value)
-    return TruthIntervals(intervals, True) if intervals else never("the simulation time is never negative")
-
-
-def _parameter(leaf: model.ParameterCondition, outline: Outline) -> TruthIntervals:
-    """Return steady intervals unless an action sets the parameter; the user may choose its constant value."""
-    name = leaf.parameter_ref
-    if any(isinstance(action, model.ParameterAction) and action.parameter_ref == name for action in outline.elements):
-        return OPEN
-    return TruthIntervals(steady=f"no action sets the parameter {name!r}")
-
-
-def _time_of_day(_: model.TimeOfDayCondition, outline: Outline) -> TruthIntervals:
-    if any(isinstance(element, model.TimeOfDay) for element in outline.elements):
-        return OPEN
-    return never("no EnvironmentAction sets the time of day")
-
-
-_BY_VALUE: Mapping[type[Element] | type[None], Callable[[Any, Outline], TruthIntervals]] = {
-    model.SimulationTimeCondition: _time,
-    model.ParameterCondition: _parameter,
-    model.TimeOfDayCondition: _time_of_day,
-}
+def _sets_parameter(outline: Outline, name: str) -> bool:
+    return any(isinstance(part, model.ParameterAction) and part.parameter_ref == name for part in outline.elements)
 
 
 def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> TruthIntervals:
