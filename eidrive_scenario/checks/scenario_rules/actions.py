@@ -30,10 +30,9 @@ def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
     for node in context.nodes:
         if not isinstance(node.element, model.Event) or not context.actors(node):
             continue
-        leaves = [(action, _with_duration(action)) for action in node.element.action]
-        for (first, first_leaf), (second, second_leaf) in combinations(leaves, 2):
-            shared = _domains(first_leaf) & _domains(second_leaf)
-            if shared:
+        domains = [(action, _domains(action)) for action in node.element.action]
+        for (first, of_first), (second, of_second) in combinations(domains, 2):
+            if shared := of_first & of_second:
                 yield at(
                     second,
                     f"action {second.name!r} immediately ends action {first.name!r} of the same event: both control "
@@ -42,21 +41,11 @@ def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
                 )
 
 
-def _with_duration(action: model.Action) -> model.Element | None:
-    """Return the specific action of a private action that has a duration."""
-    if action.private_action is None:
-        return None
-    leaf = next((element for element in action.private_action.walk() if type(element) in _DOMAINS), None)
-    if leaf is None or any(
-        isinstance(element, model.TransitionDynamics) and is_immediate(element) for element in leaf.walk()
-    ):
-        return None
-    return leaf
-
-
-def _domains(leaf: model.Element | None) -> set[str]:
-    """Return the control domains of a specific action with a duration."""
-    if leaf is None:
+def _domains(action: model.Action) -> set[str]:
+    """Return the control domains of a private action that has a duration."""
+    elements = () if action.private_action is None else action.private_action.walk()
+    leaf = next((element for element in elements if type(element) in _DOMAINS), None)
+    if leaf is None or any(isinstance(part, model.TransitionDynamics) and is_immediate(part) for part in leaf.walk()):
         return set()
     domains = {_DOMAINS[type(leaf)]}
     if isinstance(leaf, model.FollowTrajectoryAction) and leaf.time_reference.timing is not None:
