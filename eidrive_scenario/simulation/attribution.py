@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from types import FrameType
-from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from eidrive_scenario.base.wall_limit import Limit, LimitReached, current_limit
 from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
@@ -90,30 +90,19 @@ Result = TypeVar("Result")
 Parameters = ParamSpec("Parameters")
 
 
-class Attributed(Protocol):
-    """An object whose methods call extensions."""
-
-    def attribute(self, error: BaseException) -> None:
-        """Raise ExtensionError if an extension raised the error; return otherwise."""
-
-
-Caller = TypeVar("Caller", bound=Attributed)
-
-
-def attributed(
-    method: Callable[Concatenate[Caller, Parameters], Result],
-) -> Callable[Concatenate[Caller, Parameters], Result]:
-    """Let a method raise ExtensionError where an extension that it calls raises an exception."""
+def attributed(method: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Let a method of a Simulation raise ExtensionError where an extension that it calls raises an exception."""
 
     @functools.wraps(method)
-    def call(self: Caller, *given: Parameters.args, **named: Parameters.kwargs) -> Result:
+    def call(*given: Parameters.args, **named: Parameters.kwargs) -> Result:
         try:
-            return method(self, *given, **named)
+            return method(*given, **named)
         except BaseException as error:
-            self.attribute(error)
+            simulation: Any = given[0]
+            simulation.attribute(error)
             raise
 
-    return cast("Callable[Concatenate[Caller, Parameters], Result]", call)
+    return call
 
 
 def wall_limit_error(
