@@ -11,14 +11,15 @@ from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, q
 from eidrive_scenario.evaluation.criteria_parser import EXITS
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.libraries import gymnasium
-from eidrive_scenario.gym.settings import METADATA, RENDER_MODES, ActionSettings, ObservationSettings, RenderSettings
-from eidrive_scenario.gym.station_interface import (
-    InterfaceSettings,
-    RewardSettings,
-    StationInterface,
-    parse_mapping,
-    sum_terms,
+from eidrive_scenario.gym.settings import (
+    METADATA,
+    RENDER_MODES,
+    ActionSettings,
+    ObservationSettings,
+    RenderSettings,
+    parse_actions,
 )
+from eidrive_scenario.gym.station_interface import RewardSettings, StationInterface, parse_mapping, sum_terms
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
 from eidrive_scenario.run_options import checked_settings
 from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
@@ -112,7 +113,9 @@ class ScenarioEnvironment:
         The other arguments are those of EidriveEnv. Raise InputError if the scenario or a setting is invalid, or if it
         has no such station.
         """
-        interfaces = InterfaceSettings.parse(observation, action, reward)
+        observed = parse_mapping(ObservationSettings, observation, "observation")
+        actions = None if action is None else parse_actions(action)
+        rewarded = parse_mapping(RewardSettings, reward, "reward")
         self._source = scenario if isinstance(scenario, Scenario | ConcreteRun) else load_scenario(scenario)
         _check_steps(max_steps, ticks_per_step)
         self._settings = checked_settings(settings)
@@ -121,7 +124,7 @@ class ScenarioEnvironment:
         with Simulation(self._source, settings=self._settings, load_weights=False) as simulation:
             controllable, drivers = tuple(simulation.stack.controllable), tuple(simulation.stack.possible_drivers)
             names = _stations(stations, controllable, drivers, single=single)
-            self._interfaces = {name: StationInterface(name, interfaces, simulation) for name in names}
+            self._interfaces = {name: StationInterface(name, observed, actions, rewarded, simulation) for name in names}
         self._planners = {
             name: interface.planner for name, interface in self._interfaces.items() if interface.planner is not None
         }

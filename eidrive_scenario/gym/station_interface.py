@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -32,31 +31,6 @@ from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
 
-@dataclass(frozen=True)
-class InterfaceSettings:
-    """Settings of the interfaces of an environment."""
-
-    observation: ObservationSettings
-    actions: tuple[ActionSettings, ...] | None
-    """None selects the default action of the station."""
-    reward: RewardSettings
-
-    @classmethod
-    def parse(cls, observation: Any, action: Any, reward: Any) -> InterfaceSettings:
-        """Return the settings from mappings or settings; None selects the defaults. Raise SettingError."""
-        return cls(
-            parse_mapping(ObservationSettings, observation, "observation"),
-            None if action is None else parse_actions(action),
-            parse_mapping(RewardSettings, reward, "reward"),
-        )
-
-    def actions_of(self, *, drives: bool) -> tuple[ActionSettings, ...]:
-        """Return the actions of a station: by default the target speed, or sending for one that does not drive."""
-        if self.actions is None:
-            return parse_actions("target_speed" if drives else "send")
-        return self.actions
-
-
 def parse_mapping(model: type[S], given: Any, source: str) -> S:
     """Return settings from a mapping, settings or None, which selects the defaults. Raise SettingError."""
     if isinstance(given, model):
@@ -69,13 +43,21 @@ def parse_mapping(model: type[S], given: Any, source: str) -> S:
 class StationInterface:
     """Observations, actions and rewards of one station, over all episodes of an environment.
 
+    actions     None: the target speed, or sending for a station that does not drive
     simulation  any run of the scenario, for entities and settings
     """
 
-    def __init__(self, name: str, settings: InterfaceSettings, simulation: Simulation) -> None:
+    def __init__(
+        self,
+        name: str,
+        observation: ObservationSettings,
+        actions: tuple[ActionSettings, ...] | None,
+        reward: RewardSettings,
+        simulation: Simulation,
+    ) -> None:
         self.name = name
         drives = name in simulation.stack.possible_drivers
-        self.actions = settings.actions_of(drives=drives)
+        self.actions = actions or parse_actions("target_speed" if drives else "send")
         driving = [action.kind for action in self.actions if action.kind in DRIVING]
         if driving and not drives:
             message = f"action {driving[0]!r} drives, and the station {name!r} does not"
@@ -83,9 +65,9 @@ class StationInterface:
         self.spec: ActorSpec = actor_spec(name, simulation.scenario.entities[name])
         """Body of the station, which the parameters of an episode may select."""
         senders = [station for station in simulation.stack.controllable if station != name]
-        self.encoder = ObservationEncoder(settings.observation, senders)
+        self.encoder = ObservationEncoder(observation, senders)
         self.decoder = ActionDecoder(self.actions)
-        self.rewards = Rewards(settings.reward, name)
+        self.rewards = Rewards(reward, name)
         self._needs_route = drives and (self.encoder.needs_route or self.rewards.needs_route)
         self._planner: RoutePlanner | None = None
         self._route: tuple[float, PathPart | None] = -1.0, None
