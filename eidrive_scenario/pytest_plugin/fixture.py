@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
@@ -38,14 +38,6 @@ _NAMES: Mapping[str, str] = {
     "roads": "an OpenDRIVE file",
 }
 """Descriptions of files that are no scenarios, by definition."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """Run that the marker requests."""
-
-    source: Path
-    variant: RunVariant
 
 
 class RunScenario(Protocol):
@@ -84,7 +76,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     config = metafunc.config
     cases = [
         pytest.param(
-            Case(path, variant),
+            (path, variant),
             id=f"{test_name(config, path)}-{variant}",
             marks=tuple(run_markers(config, path, variant.selectors, None)),
         )
@@ -177,17 +169,17 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
     therefore a failure of the test, and an error of a `.xosc` file as a test item. Invalid input fails the test with
     file and line.
     """
-    case: Case | None = getattr(request, "param", None)
+    marked: tuple[Path | None, RunVariant] = getattr(request, "param", (None, RunVariant(None, 1)))
 
     def run(
         source: Source | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
     ) -> RunResult | RateVerdict:
         __tracebackhide__ = True  # a failure shows the calling line of the test
-        source = case.source if source is None and case is not None else source
+        path, variant = marked
+        source = path if source is None else source
         if source is None:
             message = 'run_scenario: no scenario (expected run_scenario("coop/scenario_1") or the marker scenario)'
             pytest.fail(message, pytrace=False)
-        variant = case.variant if case is not None else RunVariant(None, 1)
         if channel is not None:
             variant = replace(variant, channel=channel, replaced=())
         if seed is not None:
