@@ -23,12 +23,18 @@ def _environment() -> Environment:
     )
 
 
-def render_page(template: str, **values: Any) -> str:
-    """Return the HTML of a template of this package. Text is escaped, except `markupsafe.Markup`."""
-    return _environment().get_template(template).render(**values)
+def render_page(template: str | Path, **values: Any) -> str:
+    """Return the HTML of a template of this package, or of a file, which may extend one of them.
+
+    Text is escaped, except `markupsafe.Markup`.
+    """
+    environment = _environment()
+    if isinstance(template, str):
+        return environment.get_template(template).render(**values)
+    return environment.from_string(template.read_text(encoding="utf-8")).render(**values)
 
 
-def write_page(out: Path, template: str, **values: Any) -> Path:
+def write_page(out: Path, template: str | Path, **values: Any) -> Path:
     """Render a template to the file `out`, create its folder if necessary, and return `out`.
 
     Raise SettingError if the file cannot be written.

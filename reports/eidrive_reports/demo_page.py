@@ -155,7 +155,7 @@ def write_demo(
     return write_run_report(
         runs,
         out,
-        template="demo.html.jinja",
+        template=Path(__file__).with_name("demo.html.jinja"),
         title="Cooperative perception of an occluded car",
         colors=COLORS,
         seeds=len(links.cells[0].seeds),

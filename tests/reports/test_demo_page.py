@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
+import eidrive_reports
 import numpy as np
 import pytest
 from eidrive_reports.demo_page import DemoSite, PageImage, _speed, write_demo
@@ -22,6 +24,7 @@ from eidrive_reports.paper import (
 )
 from lxml import html
 
+from eidrive_scenario import reporting
 from eidrive_scenario.experiments.statistics.intervals import wilson
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
@@ -69,6 +72,19 @@ def page(street: Callable[..., list[Frame]], tmp_path_factory: pytest.TempPathFa
         out, [run], table(LINKS), table(OWN), stories, dict.fromkeys(SCENARIOS, site), watched=1, footer="version 1"
     )
     return out.read_text(encoding="utf-8")
+
+
+def test_styles_of_studies_use_the_colors_of_both_schemes() -> None:
+    """`style.css` of the engine defines each variable for a light and a dark scheme."""
+    style = (Path(reporting.__file__).parent / "templates" / "style.css").read_text(encoding="utf-8")
+    templates = [
+        path.read_text(encoding="utf-8") for path in Path(eidrive_reports.__file__).parent.rglob("*.html.jinja")
+    ]
+    assert len(templates) == 3
+    fixed = re.compile(r"(?:color|background|border)[^;:}]*:[^;}]*#[0-9a-f]{3}")
+    assert not [color for text in templates for color in fixed.findall(text)]
+    used = {name for text in templates for name in re.findall(r"var\((--\w+)", text)}
+    assert used <= {*re.findall(r"(--\w+): #", style), "--arm"}
 
 
 def test_demo_page_has_no_external_resources(page: str) -> None:

@@ -49,7 +49,7 @@ def write_run_report(
     *,
     omitted: Sequence[str] = (),
     unjudged: Sequence[str] = (),
-    template: str = "report.html.jinja",
+    template: str | Path = "report.html.jinja",
     **values: Any,
 ) -> Path:
     """Write a page about results in the format of `--json`, and return its path.

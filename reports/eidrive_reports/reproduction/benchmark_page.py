@@ -49,7 +49,7 @@ def write_benchmark_page(out: Path) -> Path:
         hint = f"run `eidrive reproduce {NAME}` again"
         raise SettingError(Diagnostic(f"the file is damaged: {error!r}", hint, str(path))) from error
     origin = ", ".join(origin_texts(read_provenance(out).get(NAME, {})))
-    return write_page(out / PAGE, "benchmark.html.jinja", origin=origin, **values)
+    return write_page(out / PAGE, Path(__file__).with_name("benchmark.html.jinja"), origin=origin, **values)
 
 
 def _groups(rows: Sequence[_Row], field: str) -> dict[str, list[_Row]]:

@@ -65,7 +65,8 @@ def write_paper_page(out: Path) -> Path:
     origins = read_provenance(out)
     parts = [_part(out, name, origins.get(name, {})) for name in PARTS if (out / f"{name}.json").is_file()]
     title = "Reproduction of the EI-Drive paper"
-    return write_page(out / PAGE, "reproduction.html.jinja", title=title, parts=parts, duration=_duration(origins))
+    template = Path(__file__).with_name("reproduction.html.jinja")
+    return write_page(out / PAGE, template, title=title, parts=parts, duration=_duration(origins))
 
 
 def _duration(origins: Mapping[str, Mapping[str, Any]]) -> str:

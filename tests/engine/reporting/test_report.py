@@ -313,7 +313,6 @@ def test_style_defines_all_colors_for_both_schemes() -> None:
     assert not [found for page in pages for found in fixed.findall(page)]
     assert {name for page in pages for name in re.findall(r"var\((--\w+)", page)} <= {
         *named[0],
-        "--arm",
         "--share",
         "--least",
     }
