@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
@@ -15,17 +14,15 @@ from eidrive_scenario.reporting.storyboard_diagram.layout import (
     TEXT,
     TITLE,
     Arrow,
+    Box,
     BoxLine,
-    DiagramLayout,
-    Placed,
     Role,
-    TextLine,
+    columns_of,
     init_boxes,
     layout_diagram,
-    sized,
     stop_lines,
     story_boxes,
-    text_lines,
+    wrapped_lines,
 )
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
@@ -54,18 +51,17 @@ def write_storyboard_diagram(storyboard: Storyboard, out: Path) -> Path:
 def storyboard_diagram(storyboard: Storyboard) -> str:
     """Return the SVG of a storyboard: Init at the top, one column per level, and arrows to dependent elements."""
     stories = story_boxes(storyboard)
-    width = max(layout_diagram(stories, MARGIN, 0.0).width, MARGIN + 3 * INIT_WIDTH + 2 * GAP)
+    width = max(columns_of(stories, MARGIN)[1], MARGIN + 3 * INIT_WIDTH + 2 * GAP)
     head, y = _head(storyboard, width)
     init, y = _init(storyboard, y, width)
     layout = layout_diagram(stories, MARGIN, y + 52.0)
-    parts = [*head, *init, *_columns(layout, y + 34.0)]
-    for story in layout.stories:
-        for placed in story.walk():
-            parts += [_wire(placed, child) for child in placed.children]
+    boxes = [box for story in stories for box in story.walk()]
+    parts = [*head, *init]
+    for kind, x in layout.columns.items():
+        parts.append(_text(x, y + 34.0, KINDS[kind][0], weight=700, color=KINDS[kind][1]))
+    parts += [_wire(box, child) for box in boxes for child in box.children]
     parts += [_arrow(arrow, ARROWS[number % len(ARROWS)]) for number, arrow in enumerate(layout.arrows)]
-    for story in layout.stories:
-        for placed in story.walk():
-            parts += _box(placed)
+    parts += [part for box in boxes for part in _box(box)]
     full, height = width + MARGIN, layout.height + MARGIN
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{full:.0f}" height="{height:.0f}" '
@@ -93,7 +89,7 @@ def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
     y = MARGIN + 60
     first, *others = stop_lines(storyboard)
     shown = [BoxLine(first.role, f"The run stops {first.lead}", first.text), *others]
-    for line in text_lines(shown, width - MARGIN):
+    for line in wrapped_lines(shown, width - MARGIN):
         parts.append(_line(MARGIN, y, line))
         y += LEADING
     return parts, y + 8
@@ -104,26 +100,21 @@ def _init(storyboard: Storyboard, y: float, width: float) -> tuple[list[str], fl
     boxes = init_boxes(storyboard)
     if not boxes:
         return [], y
-    parts = [_text(MARGIN, y + 12, "Init", size=TEXT, weight=700, color=MUTED)]
+    parts = [_text(MARGIN, y + 12, "Init", weight=700, color=MUTED)]
     columns = max(1, int((width - MARGIN + GAP) // (INIT_WIDTH + GAP)))
     y += 22.0
     for first in range(0, len(boxes), columns):
         row = boxes[first : first + columns]
-        cards = [sized(box, MARGIN + n * (INIT_WIDTH + GAP), y, INIT_WIDTH) for n, box in enumerate(row)]
-        parts += [part for card in cards for part in _box(card)]
-        y += max(card.height for card in cards) + GAP
+        for number, box in enumerate(row):
+            box.x, box.y = MARGIN + number * (INIT_WIDTH + GAP), y
+            parts += _box(box)
+        y += max(box.height for box in row) + GAP
     return parts, y
 
 
-def _columns(layout: DiagramLayout, y: float) -> Iterator[str]:
-    for kind, x in layout.columns.items():
-        yield _text(x, y, KINDS[kind][0], size=TEXT, weight=700, color=KINDS[kind][1])
-
-
-def _box(placed: Placed) -> list[str]:
-    name, color = KINDS[placed.box.kind]
-    x, y, width, height = placed.x, placed.y, placed.width, placed.height
-    path = " / ".join(placed.box.path)
+def _box(box: Box) -> list[str]:
+    (name, color), path = KINDS[box.kind], " / ".join(box.path)
+    x, y, width, height = box.x, box.y, box.width, box.height
     parts = [
         f"<g><title>{escape(f'{name}: {path}')}</title>",
         f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="5" fill="{color}" '
@@ -131,23 +122,22 @@ def _box(placed: Placed) -> list[str]:
         f'<path d="M{x + 1.5:.1f} {y + 4:.1f}v{height - 8:.1f}" stroke="{color}" stroke-width="3"/>',
     ]
     base = y + PADDING + TITLE - 2
-    for number, title in enumerate(placed.title):
+    for number, title in enumerate(box.title_lines):
         parts.append(_text(x + PADDING, base + number * LEADING, title, size=TITLE, weight=700))
-    if placed.box.remark:
-        parts.append(_text(x + width - PADDING, base, placed.box.remark, color=color, anchor="end"))
-    base += LEADING * len(placed.title) + 4
-    for number, line in enumerate(placed.lines):
+    if box.remark:
+        parts.append(_text(x + width - PADDING, base, box.remark, color=color, anchor="end"))
+    base += LEADING * len(box.title_lines) + 4
+    for number, line in enumerate(box.text_lines):
         parts.append(_line(x + PADDING, base + number * LEADING, line))
     return [*parts, "</g>"]
 
 
-def _line(x: float, y: float, line: TextLine) -> str:
-    color = ROLES[line.source.role]
-    text = _text(x + line.indent, y, line.text, weight=600 if line.source.role is Role.ACTORS else 400)
-    return (_text(x, y, line.lead, color=color, weight=600) if line.lead else "") + text
+def _line(x: float, y: float, line: BoxLine) -> str:
+    text = _text(x + line.indent, y, line.text, weight=600 if line.role is Role.ACTORS else 400)
+    return (_text(x, y, line.lead, color=ROLES[line.role], weight=600) if line.lead else "") + text
 
 
-def _wire(parent: Placed, child: Placed) -> str:
+def _wire(parent: Box, child: Box) -> str:
     x0, x1 = parent.x + parent.width, child.x
     y0, y1 = parent.middle, child.middle
     bend = x0 + 12.0
@@ -162,13 +152,13 @@ def _arrow(arrow: Arrow, color: str) -> str:
     """Draw an arrow from the lower left of the source, along its lane, to the first trigger line of the target."""
     source, target = arrow.source, arrow.target
     y0 = source.y + source.height - 9.0
-    y1 = target.middle + LEADING + 4.0 if target.lines else target.middle + 6.0
+    y1 = target.middle + LEADING + 4.0 if target.text_lines else target.middle + 6.0
     turn = 6.0 if y1 > y0 else -6.0
     curve = (
         f"M{source.x:.1f} {y0:.1f}H{arrow.lane + 6:.1f}q-6 0 -6 {turn:.1f}V{y1 - turn:.1f}q0 {turn:.1f} 6 {turn:.1f}"
         f"H{target.x:.1f}"
     )
-    title = f"{target.box.title} depends on {source.box.title}"
+    title = f"{target.title} depends on {source.title}"
     return (
         f'<g class="arrow"><title>{escape(title)}</title><path d="{curve}" fill="none" stroke="{color}" '
         f'marker-end="url(#tip)"/><circle cx="{source.x:.1f}" cy="{y0:.1f}" r="2.6" fill="{color}"/></g>'

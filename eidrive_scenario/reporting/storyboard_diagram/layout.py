@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 from eidrive_scenario.openscenario.model import StoryboardElementStateCondition
 from eidrive_scenario.openscenario.validation.names import ReferenceMatch
@@ -86,11 +88,21 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class BoxLine:
-    """Line of a box: a leading word (when, and, or, stops when, …) and its text."""
+    """Line of a box: a leading word (when, and, or, stops when, …), the text, and its indent [px] once wrapped."""
 
     role: Role
     lead: str
     text: str
+    indent: float = 0.0
+
+
+TITLE, TEXT, LEADING = 13.0, 11.5, 16.0
+"""Font sizes and line height [px]."""
+PADDING, GAP, GUTTER, LANE = 10.0, 12.0, 40.0, 9.0
+"""Distances inside a box, between boxes, between columns, and between parallel arrows [px]."""
+COLUMNS = {"story": 165.0, "act": 230.0, "maneuverGroup": 190.0, "maneuver": 150.0, "event": 340.0, "action": 330.0}
+"""Widths of the boxes of each column [px]."""
+INIT_WIDTH = 300.0
 
 
 @dataclass
@@ -104,12 +116,42 @@ class Box:
     lines: tuple[BoxLine, ...] = ()
     children: list[Box] = field(default_factory=list)
     waits_for: tuple[Path, ...] = ()
+    x: float = 0.0
+    y: float = 0.0
+    """Upper left corner [px], which `layout_diagram` sets."""
 
     def walk(self) -> Iterator[Box]:
         """Yield this box and all its descendants."""
         yield self
         for child in self.children:
             yield from child.walk()
+
+    @property
+    def width(self) -> float:
+        """Width of the box [px], which depends on its kind."""
+        return COLUMNS.get(self.kind, INIT_WIDTH)
+
+    @cached_property
+    def title_lines(self) -> list[str]:
+        """The title, wrapped to the width beside the remark."""
+        remark = width_of(self.remark, TEXT) + 8.0 if self.remark else 0.0
+        return wrap_text(self.title, self.width - 2 * PADDING - remark, TITLE) or [""]
+
+    @cached_property
+    def text_lines(self) -> list[BoxLine]:
+        """The lines, wrapped to the width."""
+        return wrapped_lines(self.lines, self.width - 2 * PADDING)
+
+    @property
+    def height(self) -> float:
+        """Height of the box [px]."""
+        between = 4.0 if self.text_lines else 0.0
+        return 2 * PADDING + LEADING * (len(self.title_lines) + len(self.text_lines)) + between - 3.0
+
+    @property
+    def middle(self) -> float:
+        """Vertical position of connecting lines, at the title of the box [px]."""
+        return self.y + PADDING + LEADING / 2
 
 
 def story_boxes(storyboard: Storyboard) -> list[Box]:
@@ -209,65 +251,12 @@ def _action_lines(action: ActionElement) -> list[BoxLine]:
     return [BoxLine(Role.CONTENT, "", text) for text in dict.fromkeys(behavior.describe() for behavior in behaviors)]
 
 
-def has_maneuvers(boxes: list[Box]) -> bool:
-    """True if any maneuver has a separate box."""
-    return any(box.kind == ManeuverElement.kind for story in boxes for box in story.walk())
-
-
-TITLE, TEXT, LEADING = 13.0, 11.5, 16.0
-"""Font sizes and line height [px]."""
-PADDING, GAP, GUTTER, LANE = 10.0, 12.0, 40.0, 9.0
-"""Distances inside a box, between boxes, between columns, and between parallel arrows [px]."""
-WIDTHS = {"story": 165.0, "act": 230.0, "maneuverGroup": 190.0, "maneuver": 150.0, "event": 340.0, "action": 330.0}
-INIT_WIDTH = 300.0
-
-
-@dataclass(frozen=True)
-class TextLine:
-    """Drawn line: the leading word on the first of several lines, the text, and its indent [px]."""
-
-    source: BoxLine
-    lead: str
-    text: str
-    indent: float
-
-
-@dataclass
-class Placed:
-    """Box with its position [px] and its drawn lines."""
-
-    box: Box
-    x: float
-    y: float
-    width: float
-    title: list[str]
-    lines: list[TextLine]
-    children: list[Placed] = field(default_factory=list)
-
-    @property
-    def height(self) -> float:
-        """Height of the box [px]."""
-        between = 4.0 if self.lines else 0.0
-        return 2 * PADDING + LEADING * (len(self.title) + len(self.lines)) + between - 3.0
-
-    @property
-    def middle(self) -> float:
-        """Vertical position of connecting lines, at the title of the box [px]."""
-        return self.y + PADDING + LEADING / 2
-
-    def walk(self) -> Iterator[Placed]:
-        """Yield this box and all its descendants."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
-
-
 @dataclass(frozen=True)
 class Arrow:
     """Arrow from an element to a dependent element of its level, in a lane left of the column [px]."""
 
-    source: Placed
-    target: Placed
+    source: Box
+    target: Box
     lane: float
 
 
@@ -275,95 +264,77 @@ class Arrow:
 class DiagramLayout:
     """All boxes and arrows, and the size of the diagram [px]."""
 
-    stories: list[Placed]
+    stories: Sequence[Box]
     arrows: list[Arrow]
     columns: dict[str, float]
     width: float
     height: float
 
 
+def columns_of(stories: Sequence[Box], x: float) -> tuple[dict[str, float], float]:
+    """Return the left ends of the columns with boxes from `x` on, and the right end of the last one [px].
+
+    Beside each column is a lane for each of its arrows, up to 8.
+    """
+    lanes = Counter(target.kind for _, target in _dependencies(stories))
+    has_maneuvers = any(box.kind == ManeuverElement.kind for story in stories for box in story.walk())
+    columns: dict[str, float] = {}
+    for kind, width in COLUMNS.items():
+        if kind != ManeuverElement.kind or has_maneuvers:
+            columns[kind] = x + min(lanes[kind], 8) * LANE
+            x = columns[kind] + width + GUTTER
+    return columns, x - GUTTER
+
+
 def layout_diagram(stories: Sequence[Box], x: float, y: float) -> DiagramLayout:
     """Arrange the stories vertically, with the given upper left corner [px]."""
-    lanes = _lanes(stories)
-    columns: dict[str, float] = {}
-    right = x
-    for kind, width in WIDTHS.items():
-        if kind == "maneuver" and not has_maneuvers(list(stories)):
-            continue
-        right += lanes.get(kind, 0) * LANE
-        columns[kind] = right
-        right += width + GUTTER
-    placed = []
-    bottom = y
+    columns, right = columns_of(stories, x)
     for story in stories:
-        tree, bottom = _place(story, columns, bottom)
-        placed.append(tree)
-        bottom += GAP
-    boxes = {node.box.path: node for tree in placed for node in tree.walk()}
-    return DiagramLayout(placed, _arrows(boxes, columns), columns, right - GUTTER, bottom)
+        y = _place(story, columns, y) + GAP
+    return DiagramLayout(stories, _arrows(stories, columns), columns, right, y)
 
 
-def text_lines(lines: Sequence[BoxLine], width: float) -> list[TextLine]:
-    """Return the lines of a box, wrapped to a width [px]. Leading words are bold."""
-    shown = []
+def wrapped_lines(lines: Sequence[BoxLine], width: float) -> list[BoxLine]:
+    """Return the lines of a box, wrapped to a width [px]. Leading words are bold, and on the first of several lines."""
+    wrapped = []
     for line in lines:
         indent = width_of(line.lead + " ", TEXT, bold=True) if line.lead else 0.0
         for number, part in enumerate(wrap_text(line.text, width - indent, TEXT) or [""]):
-            shown.append(TextLine(line, line.lead if number == 0 else "", part, indent))
-    return shown
+            wrapped.append(BoxLine(line.role, line.lead if number == 0 else "", part, indent))
+    return wrapped
 
 
-def sized(box: Box, x: float, y: float, width: float) -> Placed:
-    """Return a box at a position, with its text wrapped to its width."""
-    inside = width - 2 * PADDING
-    remark = width_of(box.remark, TEXT) + 8.0 if box.remark else 0.0
-    title = wrap_text(box.title, inside - remark, TITLE) or [""]
-    return Placed(box, x, y, width, title, text_lines(box.lines, inside))
-
-
-def _place(box: Box, columns: dict[str, float], y: float) -> tuple[Placed, float]:
-    """Place a box and its descendants, and return it with the lower end of its area [px]."""
-    placed = sized(box, columns[box.kind], y, WIDTHS[box.kind])
+def _place(box: Box, columns: Mapping[str, float], y: float) -> float:
+    """Place a box and its descendants, and return the lower end of its area [px]."""
+    box.x, box.y = columns[box.kind], y
     below = y
     for child in box.children:
-        tree, below = _place(child, columns, below)
-        placed.children.append(tree)
-        below += GAP
-    bottom = max(placed.y + placed.height, below - GAP if box.children else y)
-    return placed, bottom
+        below = _place(child, columns, below) + GAP
+    return max(y + box.height, below - GAP)
 
 
-def _pairs(boxes: dict[Path, Placed]) -> Iterator[tuple[Placed, Placed]]:
-    for target in boxes.values():
-        for path in target.box.waits_for:
-            source = boxes.get(path)
-            if source is not None and source is not target and source.box.kind == target.box.kind:
-                yield source, target
+def _dependencies(stories: Sequence[Box]) -> list[tuple[Box, Box]]:
+    """Return each box that another box of its level waits for, with the other one."""
+    boxes = {box.path: box for story in stories for box in story.walk()}
+    return [
+        (source, target)
+        for target in boxes.values()
+        for path in target.waits_for
+        if (source := boxes.get(path)) is not None and source is not target and source.kind == target.kind
+    ]
 
 
-def _lanes(stories: Sequence[Box]) -> dict[str, int]:
-    """Return the number of lanes of each column: the number of its arrows, up to 8."""
-    kinds = {box.path: box.kind for story in stories for box in story.walk()}
-    count: dict[str, int] = {}
-    for story in stories:
-        for box in story.walk():
-            own = sum(kinds.get(path) == box.kind and path != box.path for path in box.waits_for)
-            count[box.kind] = count.get(box.kind, 0) + own
-    return {kind: min(number, 8) for kind, number in count.items()}
-
-
-def _arrows(boxes: dict[Path, Placed], columns: dict[str, float]) -> list[Arrow]:
+def _arrows(stories: Sequence[Box], columns: Mapping[str, float]) -> list[Arrow]:
     """Assign each arrow to the first free lane. Short arrows come first, so they are next to the boxes."""
-    pairs = sorted(_pairs(boxes), key=lambda pair: abs(pair[0].y - pair[1].y))
-    taken: dict[str, list[list[tuple[float, float]]]] = {}
+    occupied: dict[str, list[list[tuple[float, float]]]] = {}
     arrows = []
-    for source, target in pairs:
+    for source, target in sorted(_dependencies(stories), key=lambda pair: abs(pair[0].y - pair[1].y)):
         low, high = sorted((source.y, target.y))
-        lanes = taken.setdefault(target.box.kind, [])
-        free = (n for n, used in enumerate(lanes) if all(high < a or low > b for a, b in used))
+        lanes = occupied.setdefault(target.kind, [])
+        free = (n for n, spans in enumerate(lanes) if all(high < a or low > b for a, b in spans))
         number = next(free, len(lanes))
         if number == len(lanes):
             lanes.append([])
         lanes[number].append((low, high))
-        arrows.append(Arrow(source, target, columns[target.box.kind] - 10.0 - LANE * (number % 9)))
+        arrows.append(Arrow(source, target, columns[target.kind] - 10.0 - LANE * (number % 9)))
     return arrows

@@ -30,9 +30,9 @@ from eidrive_scenario.reporting.storyboard_diagram.layout import (
     layout_diagram,
     stop_lines,
     story_boxes,
-    text_lines,
     width_of,
     wrap_text,
+    wrapped_lines,
 )
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
@@ -104,7 +104,7 @@ def test_layout_boxes_do_not_overlap(layout: DiagramLayout) -> None:
     assert len(boxes) == 1 + 2 + 2 + 2 + 6 + 6
     for one, other in combinations(boxes, 2):
         beside = one.x + one.width < other.x or other.x + other.width < one.x
-        assert beside or one.y + one.height < other.y or other.y + other.height < one.y, (one.box.path, other.box.path)
+        assert beside or one.y + one.height < other.y or other.y + other.height < one.y, (one.path, other.path)
     assert max(box.x + box.width for box in boxes) == layout.width
     assert max(box.y + box.height for box in boxes) < layout.height
 
@@ -117,21 +117,21 @@ def test_layout_children_are_right_of_parents_at_equal_height(layout: DiagramLay
 
 
 def test_layout_parallel_arrows_have_separate_lanes(layout: DiagramLayout) -> None:
-    pairs = [(arrow.source.box.title, arrow.target.box.title) for arrow in layout.arrows]
+    pairs = [(arrow.source.title, arrow.target.title) for arrow in layout.arrows]
     assert sorted(pairs) == [("a", "b"), ("a", "c"), ("b", "c"), ("c", "d")]
     for one, other in combinations(layout.arrows, 2):
         if one.lane == other.lane:
             spans = sorted(sorted((arrow.source.y, arrow.target.y)) for arrow in (one, other))
             assert spans[0][1] < spans[1][0]
     events = layout.columns["event"]
-    group = max(box.x + box.width for story in layout.stories for box in story.walk() if box.box.kind == "maneuver")
+    group = max(box.x + box.width for story in layout.stories for box in story.walk() if box.kind == "maneuver")
     assert all(group < arrow.lane < events for arrow in layout.arrows)
 
 
 def test_layout_lines_fit_into_boxes(layout: DiagramLayout) -> None:
     for story in layout.stories:
         for box in story.walk():
-            for line in box.lines:
+            for line in box.text_lines:
                 assert line.indent + width_of(line.text, 11.5) <= box.width - 20
 
 
@@ -166,12 +166,12 @@ def test_wrap_text_keeps_letters_within_width(width: float) -> None:
 
 
 @pytest.mark.parametrize("lead", ["The run stops when", "stops when", "maneuver", "or when", "when", "and"])
-def test_text_lines_indent_exceeds_width_of_bold_lead(lead: str) -> None:
+def test_wrapped_lines_indent_exceeds_width_of_bold_lead(lead: str) -> None:
     """The leading word is drawn bold; DejaVu Sans Bold is wider than Helvetica Bold."""
     font = get_font(findfont("DejaVu Sans:bold"))
     font.set_size(11.5, 72)
     font.set_text(lead)
-    (line,) = text_lines([BoxLine(Role.STOP, lead, "x")], 500.0)
+    (line,) = wrapped_lines([BoxLine(Role.STOP, lead, "x")], 500.0)
     assert line.indent > font.get_width_height()[0] / 64.0
 
 
