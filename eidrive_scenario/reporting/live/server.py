@@ -26,22 +26,17 @@ _BATCH = 128
 """Maximum number of events that are passed on together."""
 
 
-class Client:
-    """Connected page, with the number of events that were sent to it."""
-
-    def __init__(self, position: int) -> None:
-        self.position = position
-
-
 class Feed:
     """Server-sent events of one run. Each client receives all events in order, at its own speed.
+
+    clients  number of connected clients
 
     `add` never waits for a client. All methods may be called from any thread.
     """
 
     def __init__(self) -> None:
         self._events: list[bytes] = []
-        self._clients: set[Client] = set()
+        self.clients = 0
         self._changed = threading.Condition()
         self._is_stopped = False
 
@@ -52,49 +47,36 @@ class Feed:
             self._events.append(f"id: {len(self._events)}\nevent: {kind}\ndata: {text}\n\n".encode())
             self._changed.notify_all()
 
-    def next_events(self, client: Client, timeout: float) -> list[bytes] | None:
-        """Return the next events of a client, empty after `timeout` [s] without one. Return None after the last one."""
+    def next_events(self, position: int, timeout: float) -> list[bytes] | None:
+        """Return the events after the first `position`, none after `timeout` [s] without one; None after the last."""
         with self._changed:
-            self._changed.wait_for(lambda: len(self._events) > client.position or self._is_stopped, timeout)
-            events = self._events[client.position : client.position + _BATCH]
-            if not events and self._is_stopped:
-                return None
-            return events
-
-    def advance(self, client: Client, count: int) -> None:
-        """Note that a number of events was sent to a client."""
-        with self._changed:
-            client.position += count
-            self._changed.notify_all()
+            self._changed.wait_for(lambda: len(self._events) > position or self._is_stopped, timeout)
+            events = self._events[position : position + _BATCH]
+            return None if not events and self._is_stopped else events
 
     @contextmanager
-    def client(self, position: int) -> Iterator[Client]:
-        """Count a client during the block, which has already received `position` events."""
-        client = Client(position)
-        with self._changed:
-            self._clients.add(client)
-            self._changed.notify_all()
+    def connected(self) -> Iterator[None]:
+        """Count a client during the block."""
+        self._count(1)
         try:
-            yield client
+            yield
         finally:
-            with self._changed:
-                self._clients.discard(client)
-                self._changed.notify_all()
+            self._count(-1)
 
-    @property
-    def clients(self) -> int:
-        """Number of connected clients."""
-        return len(self._clients)
+    def _count(self, change: int) -> None:
+        with self._changed:
+            self.clients += change
+            self._changed.notify_all()
 
     def wait_for_client(self, timeout: float | None) -> bool:
         """Wait until a client is connected, at most `timeout` [s]. Return whether one is."""
         with self._changed:
-            return self._changed.wait_for(lambda: bool(self._clients), timeout)
+            return self._changed.wait_for(lambda: self.clients > 0, timeout)
 
     def wait_until_alone(self) -> None:
         """Wait until no client is connected."""
         with self._changed:
-            while self._clients:
+            while self.clients:
                 self._changed.wait(1.0)  # a wait without a timeout cannot be interrupted on Windows
 
     def stop(self, timeout: float) -> None:
@@ -103,7 +85,7 @@ class Feed:
         with self._changed:
             self._is_stopped = True
             self._changed.notify_all()
-            self._changed.wait_for(lambda: not self._clients, max(0.0, deadline - time.monotonic()))
+            self._changed.wait_for(lambda: not self.clients, max(0.0, deadline - time.monotonic()))
 
 
 HOST = "127.0.0.1"
@@ -221,19 +203,19 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open")
             return
         newest = self.headers.get("Last-Event-ID", "")
-        with feed.client(int(newest) + 1 if re.fullmatch(r"\d{1,9}", newest, re.ASCII) else 0) as client:
+        position = int(newest) + 1 if re.fullmatch(r"\d{1,9}", newest, re.ASCII) else 0
+        with feed.connected():
             self._send_headers("text/event-stream")
-            while (events := feed.next_events(client, HEARTBEAT)) is not None and self._send(client, events):
-                pass
+            while (events := feed.next_events(position, HEARTBEAT)) is not None and self._send(events):
+                position += len(events)
 
-    def _send(self, client: Client, events: list[bytes]) -> bool:
+    def _send(self, events: list[bytes]) -> bool:
         """Send events, or a comment without events. Return False if the page is closed."""
         with selectors.DefaultSelector() as selector:
             selector.register(self.connection, selectors.EVENT_READ)
             if selector.select(0.0) and not self.connection.recv(1, socket.MSG_PEEK):
                 return False
         self.wfile.write(b"".join(events) or b":\n\n")
-        self.server.feed.advance(client, len(events))
         return True
 
     def _send_headers(self, content_type: str, length: int | None = None) -> None:
