@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -98,19 +97,12 @@ def _reason(event: LinkEvent) -> str:
     return shorten(f"{reason}, behind {', '.join(event.blockers) or 'the ground or a building'}", 200)
 
 
-@dataclass
-class _Element:
-    """Element of the storyboard with the start, the end and the reason of each interval in which it was running."""
-
-    kind: str
-    intervals: list[list[Any]] = field(default_factory=list)
-
-
 class Timeline:
     """Intervals in which the elements of a storyboard were running, by path, in the order of their first start."""
 
     def __init__(self) -> None:
-        self._elements: dict[str, _Element] = {}
+        self._elements: dict[str, tuple[str, list[list[Any]]]] = {}
+        """Kind and intervals by path; an interval is [start, end or None, reason of the start, of the end]."""
         self._changed: set[str] = set()
 
     def observe(self, changes: Iterable[StateChange]) -> None:
@@ -122,23 +114,18 @@ class Timeline:
             starts = change.after is ElementState.RUNNING and change.before is not ElementState.RUNNING
             ends = change.before is ElementState.RUNNING and change.after is not ElementState.RUNNING
             if starts:
-                element = self._elements.setdefault(change.path, _Element(change.kind))
-                element.intervals.append([time, None, change.why, ""])
+                _, intervals = self._elements.setdefault(change.path, (change.kind, []))
+                intervals.append([time, None, change.why, ""])
                 self._changed.add(change.path)
             elif ends and change.path in self._elements:
-                interval = self._elements[change.path].intervals[-1]
-                interval[1], interval[3] = time, change.why
+                _, intervals = self._elements[change.path]
+                intervals[-1][1], intervals[-1][3] = time, change.why
                 self._changed.add(change.path)
 
     def take(self) -> list[list[Any]]:
-        """Return [path, kind, intervals] of each element with a change since the last call.
-
-        An interval is [start, end or None, reason of the start, of the end].
-        """
+        """Return [path, kind, intervals] of each element with a change since the last call."""
         changed, self._changed = self._changed, set()
-        if not changed:
-            return []
-        return [[path, element.kind, element.intervals] for path, element in self._elements.items() if path in changed]
+        return [[path, *self._elements[path]] for path in self._elements if path in changed] if changed else []
 
 
 _LARGEST_PAGE = 64 * 2**20
@@ -163,21 +150,6 @@ def describe_error(error: Exception) -> str:
     return shorten(str(diagnostics[0]) if diagnostics else f"{type(error).__name__}: {error}", 300)
 
 
-class _Budget:
-    """Limit of the size of a page."""
-
-    def __init__(self, report: DamageReport | None) -> None:
-        self._left = _LARGEST_PAGE
-        self._report = report
-
-    def take(self, size: int, time: float) -> bool:
-        """Reserve a number of bytes. Return False if the limit is exceeded."""
-        self._left -= size
-        if self._left < 0 and self._report is not None:
-            self._report.add("the recording is too large for one page", f"shown up to {time:.2f} s")
-        return self._left >= 0
-
-
 class ReplayBuilder:
     """Builder of the data of a replay from the frames of a run, which can be taken in parts.
 
@@ -199,8 +171,12 @@ class ReplayBuilder:
         self._models, self._light = models or ActorModels(), light or LightChanges()
         self._builders: dict[str, SnapshotBuilder] = {}
         self._series, self._messages, self._timeline = SeriesBuilder(), MessageList(), Timeline()
-        self._budget, self._width = _Budget(report), 0
-        self._actors: set[str] = set()
+        self._left = _LARGEST_PAGE
+        """Number of bytes that the page may still contain."""
+        self._width = 0
+        """Number of columns of the series."""
+        self.actors: set[str] = set()
+        """Names of the actors of all frames."""
         self._stations: set[str] = set()
         self._frames = 0
         self._part = _empty_part()
@@ -221,8 +197,11 @@ class ReplayBuilder:
             return
         added = len(part["stations"].keys() - self._stations) + self._series.width - self._width
         self._width = self._series.width
-        if not self._budget.take(_size(part) + _VALUE * self._width + _ABSENT * added * self._frames, frame.view.time):
+        self._left -= _size(part) + _VALUE * self._width + _ABSENT * added * self._frames
+        if self._left < 0:
             self.is_full = True
+            if self._report is not None:
+                self._report.add("the recording is too large for one page", f"shown up to {frame.view.time:.2f} s")
             return
         self._append(part, frame)
         self._series.keep()
@@ -240,11 +219,6 @@ class ReplayBuilder:
         if complete and self._messages.omitted and self._report is not None:
             shown = f"the first {self._messages.count} are shown"
             self._report.add("the page does not show all messages", shown)
-
-    @property
-    def actors(self) -> frozenset[str]:
-        """Names of the actors of all frames."""
-        return frozenset(self._actors)
 
     def take(self) -> Data:
         """Return the data of the frames since the last call, in the format of `replay_data`.
@@ -271,8 +245,8 @@ class ReplayBuilder:
         part["changes"].extend(added["changes"])
         part["contacts"].extend(added["contacts"])
         for name, actor in added["actors"].items():
-            if name not in self._actors:
-                self._actors.add(name)
+            if name not in self.actors:
+                self.actors.add(name)
                 offset = tuple(frame.view.offset[frame.view.row(name)].round(3).tolist())
                 part["actors"][name] = actor | self._models.describe(
                     name, actor["category"], tuple(actor["size"]), offset
