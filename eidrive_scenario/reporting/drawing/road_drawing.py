@@ -186,11 +186,6 @@ def _drawn(parts: Iterable[tuple[_Part, Sequence[_Edges]]], window: Window | Non
     return RoadDrawing(tuple(lanes), tuple(markings))
 
 
-def recorded_roads(recording: Recording) -> RoadDrawing:
-    """Return the roads in the attachments of a recording, with houses; an empty drawing without a road file."""
-    return _recorded_drawing(recorded_network(recording))
-
-
 def recorded_network(recording: Recording) -> RoadNetwork | None:
     """Return the road network in the attachments of a recording, None without one. Raise InputError."""
     text = recording.attachments.get(ROAD_FILE)
@@ -216,9 +211,6 @@ def network_drawing(network: RoadNetwork | None) -> RoadDrawing:
         return RoadDrawing()
     houses = tuple((house_outline(house), house.size[2]) for house in buildings(network))
     return replace(road_drawing(network.roads.values()), houses=houses)
-
-
-_recorded_drawing = lru_cache(maxsize=1)(network_drawing)
 
 
 def house_outline(house: Building) -> Array:

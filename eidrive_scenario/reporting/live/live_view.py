@@ -13,26 +13,26 @@ from numbers import Real
 from subprocess import DEVNULL
 from typing import TYPE_CHECKING, Any, Self
 
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError, SimulationError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, quoted
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
-from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
-from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.live.server import Feed, LiveServer
 from eidrive_scenario.reporting.page import render_page
-from eidrive_scenario.reporting.replay.frame_data import (
-    UNDRAWABLE,
-    Data,
-    ReplayBuilder,
-    describe_error,
-    packed,
-    replay_data,
-)
+from eidrive_scenario.reporting.replay.frame_data import Data, ReplayBuilder, packed, replay_data
 from eidrive_scenario.reporting.replay.light import LightChanges, parse_weather
-from eidrive_scenario.reporting.replay.models import ActorModels, street_models
-from eidrive_scenario.reporting.replay.page import TEMPLATE, decisive_instant, page_values, station_settings
+from eidrive_scenario.reporting.replay.models import ActorModels
+from eidrive_scenario.reporting.replay.page import (
+    TEMPLATE,
+    RunOfPage,
+    decisive_instant,
+    drawn_roads,
+    page_values,
+    run_title,
+    station_settings,
+    street_of,
+)
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
 from eidrive_scenario.simulation.recorded_outcome import bodies
@@ -173,31 +173,21 @@ class LiveView:
         models = ActorModels(bodies(simulation.scenario), settings.get("stations"))
         light = LightChanges(parse_weather(settings.get("weather_profile")))
         self._builder = ReplayBuilder(self._report, station_settings(settings), models, light)
-        self._values = page_values(
-            simulation.scenario.name,
-            simulation.seed,
+        run = RunOfPage(
+            run_title(simulation.scenario.name, simulation.seed),
+            run_facts(settings),
             settings,
-            facts=run_facts(settings),
-            command=command_of_source(simulation.scenario, simulation.seed, simulation.settings),
+            command_of_source(simulation.scenario, simulation.seed, simulation.settings),
+            replay_data([]),
             result=None,
-            roads=self._roads(simulation),
-            street=_street(simulation),
-            data=replay_data([]),
-            images={},
-            live=True,
         )
+        roads, street = drawn_roads(lambda: simulation.roads, self._report), street_of(lambda: simulation.roads)
+        self._values = page_values(run, roads=roads, street=street, images={}, live=True)
         self._announce(self.address)
         if self._browser:
             open_in_browser(self.address)
         threading.Thread(target=self._send_regularly, name="eidrive live frames", daemon=True).start()
         self._feed.wait_for_client(self._wait)
-
-    def _roads(self, simulation: Simulation) -> RoadDrawing:
-        try:
-            return network_drawing(simulation.roads)
-        except (InputError, *UNDRAWABLE) as error:
-            self._report.add("roads are not drawn", describe_error(error))
-            return RoadDrawing()
 
     def observe(self, frame: Frame) -> None:
         """Add a frame, and delay the run until the next one is due.
@@ -273,13 +263,6 @@ class LiveView:
             if self._page[0] is not values:
                 self._page = values, render_page(TEMPLATE, **values).encode(errors="replace")
             return self._page[1]
-
-
-def _street(simulation: Simulation) -> Data:
-    try:
-        return street_models(simulation.roads)
-    except (InputError, *UNDRAWABLE):  # as `_roads` reports
-        return street_models(None)
 
 
 def _write_address(address: str) -> None:

@@ -6,6 +6,7 @@ import math
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from subprocess import PIPE, Popen
 from tempfile import TemporaryDirectory
@@ -19,16 +20,16 @@ from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.drawing.image_canvas import Image
+from eidrive_scenario.reporting.drawing.road_drawing import recorded_network
 from eidrive_scenario.reporting.drawing.snapshot_picture import EXTENT, draw_snapshot, snapshot_picture
-from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
+from eidrive_scenario.reporting.drawing.top_view import Window
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, scene_figure
 from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
-from eidrive_scenario.reporting.replay.page import decisive_instant, readable_roads, run_settings, station_settings
+from eidrive_scenario.reporting.replay.page import decisive_instant, drawn_roads, run_settings, station_settings
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
-from eidrive_scenario.world.view import WorldView
 
 FILM_SIZE, GIF_SIZE = (1280, 720), (640, 360)
 """Width and height of films and GIF files [pixels]."""
@@ -55,17 +56,19 @@ class RecordedStation:
             report.add(line)
         self._recording = recording
         self._settings = station_settings(run_settings(recording, report))
-        self.roads: RoadDrawing = readable_roads(recording, report)
+        self.roads = drawn_roads(partial(recorded_network, recording), report)
         series = SeriesBuilder()
         self.times: list[float] = []
         """Times of the frames [s]."""
         driven: dict[str, None] = {}
         stations: dict[str, None] = {}
         actors: dict[str, tuple[float, float]] = {}
+        """Positions at which the actors enter the world [m]."""
         for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
             if math.isfinite(frame.view.time):
                 self.times.append(frame.view.time)
-            _add_entries(actors, frame.view)
+            for actor, (x, y, _) in zip(frame.view.names, frame.view.centers.tolist(), strict=True):
+                actors.setdefault(actor, (x, y) if math.isfinite(x + y) else (0.0, 0.0))
             stations.update(dict.fromkeys(frame.steps))
             driven.update(dict.fromkeys(key for key, step in frame.steps.items() if step.control is not None))
             try:
@@ -85,16 +88,6 @@ class RecordedStation:
         self.decisive: float = min(max(instant, self.times[0]), self.times[-1])
         """Decisive instant [s]; at most that of the last frame of an incomplete recording."""
         self.damage = report.lines()
-
-    def snapshots(self) -> Iterator[StationSnapshot]:
-        """Yield the snapshot of each frame."""
-        builder = SnapshotBuilder(self.name, self._settings.get(self.name, DEFAULT_SETTINGS))
-        for frame in self._recording.frames(lambda reason: None):
-            try:
-                snapshot = builder.observe(frame)
-            except UNDRAWABLE:
-                continue
-            yield snapshot
 
     def figure(self, time: float | None = None, size: Size = DEFAULT_SIZE) -> Figure:
         """Return the picture of the last frame up to a time [s], by default up to the decisive instant.
@@ -133,37 +126,29 @@ class RecordedStation:
                 hint = "write pictures with --png, or the page"
                 raise InputError(Diagnostic(f"the film has more than {MOST_PICTURES} pictures", hint))
             if wanted > shown:
-                picture = self._draw(snapshot, center, size)
-                if picture is not None:
-                    for _ in range(wanted - shown):
-                        yield picture
-                    shown = wanted
+                try:
+                    picture = snapshot_picture(snapshot, self.roads, center, size=size)
+                except UNDRAWABLE:
+                    continue
+                for _ in range(wanted - shown):
+                    yield picture
+                shown = wanted
 
     def _centered(self) -> Iterator[tuple[StationSnapshot, tuple[float, float]]]:
         """Yield the snapshots at finite times, with the last or else the first position of the station [m]."""
         center = self._entry
-        for snapshot in self.snapshots():
+        builder = SnapshotBuilder(self.name, self._settings.get(self.name, DEFAULT_SETTINGS))
+        for frame in self._recording.frames(lambda reason: None):
+            try:
+                snapshot = builder.observe(frame)
+            except UNDRAWABLE:
+                continue
             if not math.isfinite(snapshot.time):
                 continue
             if self.name in snapshot.view:
                 x, y = snapshot.view.centers[snapshot.view.row(self.name), :2].tolist()
                 center = (x, y) if math.isfinite(x + y) else center
             yield snapshot, center
-
-    def _draw(self, snapshot: StationSnapshot, center: tuple[float, float], size: tuple[int, int]) -> Image | None:
-        """Return the picture of a snapshot, or None if it cannot be drawn."""
-        try:
-            return snapshot_picture(snapshot, self.roads, center, size=size)
-        except UNDRAWABLE:
-            return None
-
-
-def _add_entries(actors: dict[str, tuple[float, float]], view: WorldView) -> None:
-    """Add the actors that enter the world in this view, with their positions [m]."""
-    for name in view.names:
-        if name not in actors:
-            x, y = view.centers[view.row(name), :2].tolist()
-            actors[name] = (x, y) if math.isfinite(x + y) else (0.0, 0.0)
 
 
 def write_gif(station: RecordedStation, path: Path) -> None:

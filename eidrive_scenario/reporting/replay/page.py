@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -23,7 +23,7 @@ from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, is_partial
 from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.reporting.drawing.road_drawing import recorded_network, recorded_roads
+from eidrive_scenario.reporting.drawing.road_drawing import network_drawing, recorded_network
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, is_broken
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.replay.colors import COLORS
@@ -34,6 +34,7 @@ from eidrive_scenario.reporting.replay.series import closest_approach
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, run_of_recording
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.recorded_outcome import BODIES, CONTEXT, TRAILERS, recorded_bodies, recorded_outcome
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
@@ -68,61 +69,70 @@ def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
 TEMPLATE = "replay/page.html.jinja"
 
 
+@dataclass(frozen=True)
+class RunOfPage:
+    """Run as a page shows it.
+
+    facts     facts about the run that the page lists
+    settings  resolved settings of the run; empty if they are unknown
+    data      of all frames, see `replay_data`; of no frame for a live page
+    complete  whether the run has ended, or is still in progress
+    folder    name of the folder of its recording
+    """
+
+    title: str
+    facts: Mapping[str, str]
+    settings: Mapping[str, Any]
+    command: str
+    data: Data
+    result: ReportedRun | None
+    complete: bool = True
+    folder: str = ""
+
+
 def page_values(
-    scenario: str,
-    seed: int,
-    settings: Mapping[str, Any],
+    run: RunOfPage,
     *,
-    facts: Mapping[str, str],
-    command: str,
-    result: ReportedRun | None,
     roads: RoadDrawing,
     street: Data,
-    data: Data,
     images: Mapping[str, Any],
     notices: Sequence[str] = (),
-    complete: bool = True,
     live: bool = False,
     other: RunOfPage | None = None,
-    labels: tuple[str, str] = ("", ""),
     library: str = "",
 ) -> dict[str, Any]:
     """Return the values of the template `TEMPLATE`.
 
-    settings  resolved settings of the run; empty if they are unknown
-    facts     facts about the run that the page lists
     street    see `street_models`
-    data      of all frames, see `replay_data`; of no frame for a live page
     images    see `camera_files`
     notices   damage of a recording, or what a live page does not show
-    complete  whether the run has ended, or is still in progress
     live      whether the page receives the data of the frames from a server
     other     run that the page shows over this one
-    labels    what distinguishes this run and the other one
     library   address of a file with three.js; "" if the page contains it
     """
-    shown = {**packed(data), "roads": _roads(roads), "street": street, "colors": COLORS, "images": images}
+    shown = {**packed(run.data), "roads": _roads(roads), "street": street, "colors": COLORS, "images": images}
     if other is not None:
         shown["other"] = packed(overlay(other.data))
     return {
-        "title": _title(scenario, seed),
-        "result": result,
-        "facts": facts,
-        "settings": json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
-        "command": command,
+        "title": run.title,
+        "result": run.result,
+        "facts": run.facts,
+        "settings": json.dumps(run.settings, indent=1, ensure_ascii=False) if run.settings else "",
+        "command": run.command,
         "notices": notices,
-        "complete": complete,
+        "complete": run.complete and (other is None or other.complete),
         "live": live,
         "data": shown,
         "three": [] if library else three_library(),
         "library": library,
         "other": other,
-        "differences": [] if other is None else _differences(facts, other.facts),
-        "labels": labels,
+        "differences": [] if other is None else _differences(run.facts, other.facts),
+        "labels": ("", "") if other is None else _labels(run, other),
     }
 
 
-def _title(scenario: str, seed: int) -> str:
+def run_title(scenario: str, seed: int) -> str:
+    """Return the title of a run in a page."""
     return f"{shorten(scenario, 200)}, seed {seed}"
 
 
@@ -134,6 +144,18 @@ def _differences(facts: Mapping[str, str], others: Mapping[str, str]) -> list[tu
         for name in names
         if facts.get(name) != others.get(name)
     ]
+
+
+def _labels(run: RunOfPage, other: RunOfPage) -> tuple[str, str]:
+    """Return the first short facts in which two runs differ, or the names of their folders without one."""
+    differences = [
+        (name, *values) for name, *values in _differences(run.facts, other.facts) if max(map(len, values)) <= 40
+    ]
+    shown = [entry for entry in differences if entry[0] not in ("scenario", "seed")][:2]
+    if not shown:
+        return run.folder, other.folder
+    first, second = (", ".join(f"{name} {values[side]}" for name, *values in shown) for side in (0, 1))
+    return first, second
 
 
 def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[str]) -> dict[str, Any] | None:
@@ -173,18 +195,6 @@ class Replay:
     damage: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class RunOfPage:
-    """Recorded run as a page shows it: title, facts, settings, data of all frames, and verdicts of its result."""
-
-    title: str
-    facts: Mapping[str, str]
-    settings: Mapping[str, Any]
-    data: Data
-    result: ReportedRun | None
-    complete: bool
-
-
 def make_replay(
     recording: Recording,
     out: Path,
@@ -201,47 +211,28 @@ def make_replay(
     damage. Raise InputError if no frame can be read, or the roads of the recordings differ.
     """
     report, others_report = DamageReport(), DamageReport()
-    roads = readable_roads(recording, report)
+    network = partial(recorded_network, recording)
+    roads = drawn_roads(network, report)
     second = None
     if other is not None:
-        if _roads(readable_roads(other, others_report))["levels"] != _roads(roads)["levels"]:
+        others_roads = drawn_roads(partial(recorded_network, other), others_report)
+        if _roads(others_roads)["levels"] != _roads(roads)["levels"]:
             reason = f"the roads differ from those of {recording.path}"
             hint = "give two recordings on the same roads, or write a page of each"
             raise InputError(Diagnostic(reason, hint, str(other.path)))
         second = _read_run(other, others_report)
     run = _read_run(recording, report)
-    labels = ("", "") if other is None or second is None else _labels(recording, run.facts, other, second.facts)
     damage = (*report.lines(), *(f"{other.path}: {line}" for line in others_report.lines() if other is not None))
     values = page_values(
-        recording.scenario or recording.path.stem,
-        recording.seed,
-        run.settings,
-        facts=run.facts,
-        command=recording.metadata.get("command", ""),
-        result=run.result,
-        notices=damage,
-        complete=run.complete and (second is None or second.complete),
+        run,
         roads=roads,
-        street=_readable_street(recording),
-        data=run.data,
+        street=street_of(network),
         images=camera_files(recording.path.parent, out.parent),
+        notices=damage,
         other=second,
-        labels=labels,
         library=library,
     )
     return Replay(write_page(out, TEMPLATE, **values), damage)
-
-
-def _labels(
-    recording: Recording, facts: Mapping[str, str], other: Recording, others: Mapping[str, str]
-) -> tuple[str, str]:
-    """Return the first short facts in which two runs differ, or the names of their folders without one."""
-    differences = [(name, *values) for name, *values in _differences(facts, others) if max(map(len, values)) <= 40]
-    shown = [entry for entry in differences if entry[0] not in ("scenario", "seed")][:2]
-    if not shown:
-        return shorten(recording.path.parent.name, 100), shorten(other.path.parent.name, 100)
-    first, second = (", ".join(f"{name} {values[side]}" for name, *values in shown) for side in (0, 1))
-    return first, second
 
 
 def _read_run(recording: Recording, report: DamageReport) -> RunOfPage:
@@ -263,8 +254,16 @@ def _read_run(recording: Recording, report: DamageReport) -> RunOfPage:
     if result is not None and result.trace_hash != trace.hexdigest():
         report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
     data["decisive"] = decisive_instant(data, result, data["actors"])
-    title = _title(recording.scenario or recording.path.stem, recording.seed)
-    return RunOfPage(title, _facts(recording, settings), settings, data, result, not is_partial(recording.path))
+    return RunOfPage(
+        run_title(recording.scenario or recording.path.stem, recording.seed),
+        _facts(recording, settings),
+        settings,
+        recording.metadata.get("command", ""),
+        data,
+        result,
+        not is_partial(recording.path),
+        shorten(recording.path.parent.name, 100),
+    )
 
 
 def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:
@@ -287,23 +286,25 @@ def _final_links(recording: Recording, report: DamageReport) -> tuple[LinkEvent,
     return () if outcome is None else outcome.final_links
 
 
-def readable_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
-    """Return the roads of a recording, without those that cannot be read, which are added to the report."""
+_UNREADABLE = (InputError, *UNDRAWABLE, MemoryError, RecursionError)
+# Recordings of a batch often have the same roads
+_drawing, _street = lru_cache(maxsize=1)(network_drawing), lru_cache(maxsize=1)(street_models)
+
+
+def drawn_roads(network: Callable[[], RoadNetwork | None], report: DamageReport) -> RoadDrawing:
+    """Return the drawing of a network, without roads if it cannot be read or drawn, which is added to the report."""
     try:
-        return recorded_roads(recording)
-    except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
+        return _drawing(network())
+    except _UNREADABLE as error:
         report.add("roads are not drawn", describe_error(error))
         return RoadDrawing()
 
 
-_recorded_street = lru_cache(maxsize=1)(street_models)  # recordings of a batch often have the same roads
-
-
-def _readable_street(recording: Recording) -> Data:
-    """Return the models of the roads of a recording; bare ground for those that `readable_roads` reports."""
+def street_of(network: Callable[[], RoadNetwork | None]) -> Data:
+    """Return the models of the roads of a network; bare ground for those that `drawn_roads` reports."""
     try:
-        return _recorded_street(recorded_network(recording))
-    except (InputError, *UNDRAWABLE, MemoryError, RecursionError):
+        return _street(network())
+    except _UNREADABLE:
         return street_models(None)
 
 
