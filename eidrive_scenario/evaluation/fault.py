@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.base.geometry import points_in_polygon, points_of_boxes
 from eidrive_scenario.evaluation.actor_tracking import LaneTracker, corners
 from eidrive_scenario.roads.objects import crosswalks
-from eidrive_scenario.world.view import ActorState, WorldView
+from eidrive_scenario.world.view import WorldView
 
 STOPPED = 0.05
 """Maximum speed of a stopped actor [m/s]."""
@@ -49,23 +49,23 @@ def side_of(body: Sequence[float], x: float, y: float, other: Sequence[float] | 
         "left": abs(body[4] / 2.0 - left),
         "right": abs(body[4] / 2.0 + left),
     }
-    end: Side = "front" if ahead >= 0.0 else "rear"
-    flank: Side = "left" if left >= 0.0 else "right"
-    if other is not None and max(distances[end], distances[flank]) < CORNER:
-        along, across = _overlaps(body, other)
-        return end if along < across else flank
+    if other is not None:
+        center_ahead, center_left, reach_ahead, reach_left = _relative(body, other)
+        end: Side = "front" if ahead >= 0.0 else "rear"
+        flank: Side = "left" if left >= 0.0 else "right"
+        if max(distances[end], distances[flank]) < CORNER:
+            return end if reach_ahead - abs(center_ahead) < reach_left - abs(center_left) else flank
     return min(distances, key=lambda side: distances[side])
 
 
-def _overlaps(body: Sequence[float], other: Sequence[float]) -> tuple[float, float]:
-    """Return the overlaps of two bodies along and across the first one [m]; negative for gaps."""
+def _relative(body: Sequence[float], other: Sequence[float]) -> tuple[float, float, float, float]:
+    """Return the center of another body (7,) ahead and left of this one, and its distances along both axes at which
+    the projections of the bodies touch [m]."""
     dx, dy = other[0] - body[0], other[1] - body[1]
     cos, sin = math.cos(body[6]), math.sin(body[6])
-    turned = other[6] - body[6]
-    c, s = abs(math.cos(turned)), abs(math.sin(turned))
-    along = (body[3] + c * other[3] + s * other[4]) / 2.0 - abs(cos * dx + sin * dy)
-    across = (body[4] + s * other[3] + c * other[4]) / 2.0 - abs(cos * dy - sin * dx)
-    return along, across
+    c, s = abs(math.cos(other[6] - body[6])), abs(math.sin(other[6] - body[6]))
+    reach_ahead, reach_left = body[3] + c * other[3] + s * other[4], body[4] + s * other[3] + c * other[4]
+    return cos * dx + sin * dy, cos * dy - sin * dx, reach_ahead / 2.0, reach_left / 2.0
 
 
 def approached_side(before: WorldView, of: str, other: str) -> Side | None:
@@ -76,17 +76,14 @@ def approached_side(before: WorldView, of: str, other: str) -> Side | None:
     It is the face across whose axis the bodies are separated the longest. The point of contact does not tell it: two
     faces that touch are reported by a corner, and the bodies move on until the end of the time step.
     """
-    body, there = before.plain_boxes[before.rows[of]], before.plain_boxes[before.rows[other]]
+    body = before.plain_boxes[before.rows[of]]
     own, their = before.states[before.rows[of]], before.states[before.rows[other]]
     cos, sin = math.cos(body[6]), math.sin(body[6])
-    dx, dy = there[0] - body[0], there[1] - body[1]
     vx, vy = their.velocity_x - own.velocity_x, their.velocity_y - own.velocity_y
-    turn = there[6] - body[6]
-    along = abs(math.cos(turn)) * there[3] + abs(math.sin(turn)) * there[4]
-    across = abs(math.sin(turn)) * there[3] + abs(math.cos(turn)) * there[4]
+    ahead, left, reach_ahead, reach_left = _relative(body, before.plain_boxes[before.rows[other]])
     ways: tuple[tuple[float, float, float, tuple[Side, Side]], ...] = (
-        (cos * dx + sin * dy, cos * vx + sin * vy, (body[3] + along) / 2.0, ("front", "rear")),
-        (cos * dy - sin * dx, cos * vy - sin * vx, (body[4] + across) / 2.0, ("left", "right")),
+        (ahead, cos * vx + sin * vy, reach_ahead, ("front", "rear")),
+        (left, cos * vy - sin * vx, reach_left, ("left", "right")),
     )
     longest, side = 0.0, None
     for offset, speed, reach, (positive, negative) in ways:
@@ -105,21 +102,29 @@ def judge_impact(
     before  frame before the contact, whose speeds count; `view` if the actors were not present there
     lanes   lanes under the actor; None without roads: a lateral contact is then not its fault
     """
-    row = view.rows[of]
+
+    def speeds(name: str) -> tuple[float, float]:
+        """Return the speed of an actor before the contact, which changes it, and that along its heading [m/s]."""
+        source = before if before is not None and name in before.rows else view
+        state = source.states[source.rows[name]]
+        vx, vy = state.velocity_x, state.velocity_y
+        return math.hypot(vx, vy), math.cos(state.yaw) * vx + math.sin(state.yaw) * vy
+
+    row, (speed, longitudinal_speed) = view.rows[of], speeds(of)
     partner = view.plain_boxes[view.rows[other]] if other in view.rows else None
     side = None
     if before is not None and of in before.rows and other in before.rows:
         side = approached_side(before, of, other)
     side = side or side_of(view.plain_boxes[row], x, y, partner)
-    if _speed(view, before, of) <= STOPPED:
+    if speed <= STOPPED:
         obstruction = None if lanes is None else _obstruction(view, row, lanes)
         reason = "it had stopped" if obstruction is None else f"it had stopped {obstruction}"
         return Impact(side, obstruction is not None, reason)
-    if other not in view.rows or _speed(view, before, other) <= STOPPED:
+    if partner is None or speeds(other)[0] <= STOPPED:
         return Impact(side, True, "the other one had stopped")
-    state, there = view.states[row], view.plain_boxes[view.rows[other]]
-    reverses = _longitudinal_speed(view, before, of) < -STOPPED
-    bearing = math.atan2(there[1] - state.y, there[0] - state.x) - state.yaw - (math.pi if reverses else 0.0)
+    state = view.states[row]
+    reverses = longitudinal_speed < -STOPPED
+    bearing = math.atan2(partner[1] - state.y, partner[0] - state.x) - state.yaw - (math.pi if reverses else 0.0)
     if abs(math.remainder(bearing, math.tau)) > BEHIND:
         return Impact(side, False, "it was driving away from it in reverse" if reverses else "it was hit from behind")
     if side == ("rear" if reverses else "front"):
@@ -154,20 +159,3 @@ def leaves_lane(view: WorldView, row: int, lanes: LaneTracker) -> bool:
     under = [{lane for lane in at_corner if drivable[lane]} for at_corner in lanes.rows_at(corners(view, row))]
     front_left, rear_left, rear_right, front_right = under
     return not (front_left & front_right and rear_left & rear_right)
-
-
-def _speed(view: WorldView, before: WorldView | None, name: str) -> float:
-    """Return the speed of an actor before the contact, which changes it [m/s]."""
-    state = _state(view, before, name)
-    return math.hypot(state.velocity_x, state.velocity_y)
-
-
-def _longitudinal_speed(view: WorldView, before: WorldView | None, name: str) -> float:
-    """Return the speed of an actor along its heading before the contact, negative in reverse [m/s]."""
-    state = _state(view, before, name)
-    return math.cos(state.yaw) * state.velocity_x + math.sin(state.yaw) * state.velocity_y
-
-
-def _state(view: WorldView, before: WorldView | None, name: str) -> ActorState:
-    source = before if before is not None and name in before.rows else view
-    return source.states[source.rows[name]]
