@@ -125,9 +125,7 @@ class Canvas(ABC):
 
     def shows(self, points: Array) -> bool:
         """Return whether the rectangle around points (M, 2) reaches into the section."""
-        (left, bottom), (right, top) = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-        window = self.window
-        return bool(left <= window.right and right >= window.left and bottom <= window.top and top >= window.bottom)
+        return self.window.reaches(points)
 
 
 def shortened_label(text: str) -> str:

@@ -178,10 +178,11 @@ def _drawn(parts: Iterable[tuple[_Part, Sequence[_Edges]]], window: Window | Non
     for part, edges in parts:
         for lane, inner, outer in edges:
             polygon = np.concatenate([simplify_line(inner), simplify_line(outer)[::-1]])
-            if _reaches(polygon, window):
+            if window is None or window.reaches(polygon):
                 lanes.append((lane.type, polygon))
         for lane in part.section.lanes.values():
-            markings.extend(mark for mark in _marks(part, lane, spacing) if _reaches(mark[2], window))
+            marks = _marks(part, lane, spacing)
+            markings.extend(mark for mark in marks if window is None or window.reaches(mark[2]))
     lanes.sort(key=lambda entry: _LOWEST.index(entry[0]) if entry[0] in _LOWEST else len(_LOWEST))
     return RoadDrawing(tuple(lanes), tuple(markings))
 
@@ -318,10 +319,3 @@ def _marks(part: _Part, lane: Lane, spacing: float) -> Iterator[tuple[str, str, 
             continue
         stations = equidistant(start, end, spacing)
         yield mark.type, mark.color, simplify_line(_edge(road, section, lane, stations, outer=True))
-
-
-def _reaches(points: Array, window: Window | None) -> bool:
-    if window is None:
-        return True
-    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
-    return bool(left <= window.right and right >= window.left and bottom <= window.top and top >= window.bottom)

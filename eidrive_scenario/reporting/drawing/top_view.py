@@ -53,6 +53,11 @@ class Window:
         width = max(self.right - self.left, ratio * (self.top - self.bottom), least)
         return Window.centered(((self.left + self.right) / 2.0, (self.bottom + self.top) / 2.0), width, ratio)
 
+    def reaches(self, points: Array) -> bool:
+        """Return whether the rectangle around points (M, 2) reaches into this one."""
+        (left, bottom), (right, top) = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        return bool(left <= self.right and right >= self.left and bottom <= self.top and top >= self.bottom)
+
 
 @dataclass(frozen=True)
 class RoadDrawing:
