@@ -12,12 +12,12 @@ from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
     CriteriaContext,
+    CriterionDeclaration,
     build_criteria,
     exit_verdict,
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import CriteriaObserver, Criterion, Verdict, bind_roads
-from eidrive_scenario.recording.frame import ExecutedCommand, Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
@@ -26,7 +26,6 @@ from eidrive_scenario.simulation.attribution import report_extension
 from eidrive_scenario.simulation.commands import parse_added_criteria
 from eidrive_scenario.simulation.recorded_outcome import (
     CONTEXT,
-    RecordedOutcome,
     plain_verdict,
     recorded_context,
     recorded_outcome,
@@ -96,96 +95,63 @@ def judge_recording(location: str | Path, criteria: Any = None) -> Judgement:
         raise
 
 
-def _judge(recording: Recording, criteria: Any) -> Judgement:
-    outcome, text = recorded_outcome(recording), recording.attachments.get(ROAD_FILE)
+def _judge(recording: Recording, others: Any) -> Judgement:
+    """Judge a recording by its own criteria, which join and leave it as in the run, or by `others`."""
+    outcome, text, source = recorded_outcome(recording), recording.attachments.get(ROAD_FILE), str(recording.path)
     roads = None if text is None else RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}")
-    judge = _Judge(recording, roads, outcome)
-    if criteria is not None:
-        judge.add_others(criteria)
+    criteria: list[Criterion] = []
+
+    def add(declarations: Iterable[CriterionDeclaration]) -> None:
+        for criterion in build_criteria(declarations, [criterion.name for criterion in criteria]):
+            if outcome is None and type(criterion).observe_links is not Criterion.observe_links:
+                message = f"criterion {criterion.name!r} requires link statistics, and the recording has none"
+                raise SettingError(Diagnostic(message, "the run did not end, or an older version recorded it", source))
+            bind_roads(criterion, roads)
+            criteria.append(criterion)
+
+    if others is not None:
+        add(parse_added_criteria(RunSettings(criteria=others).criteria_sources, recorded_context(recording)))
     elif CONTEXT not in recording.metadata:
         version = recording.metadata.get("eidrive-scenario", "unknown")
         message = f"the recording contains no criteria (written by version {version})"
-        raise SettingError(Diagnostic(message, "give criteria (--criterion)", str(recording.path)))
+        raise SettingError(Diagnostic(message, "give criteria (--criterion)", source))
+    observer, context = CriteriaObserver(criteria), CriteriaContext(has_roads=roads is not None)
+    exit_command: Verdict | None = None
+    end: float | None = None
     skipped: list[str] = []
     for frame in recording.frames(skipped.append):
-        judge.observe(frame)
-    return judge.conclude([*recording.damage, *skipped])
-
-
-class _Judge:
-    """Criteria on the frames of one recording. They join and leave it as those of the run."""
-
-    def __init__(self, recording: Recording, roads: RoadNetwork | None, outcome: RecordedOutcome | None) -> None:
-        self._recording = recording
-        self._roads = roads
-        self._outcome = outcome
-        self._criteria: list[Criterion] = []
-        self._observer = CriteriaObserver(self._criteria)
-        self._own = True
-        self._exit: Verdict | None = None
-        self._last: Frame | None = None
-
-    def add_others(self, criteria: Any) -> None:
-        """Add criteria that replace those of the run."""
-        self._own = False
-        declarations = parse_added_criteria(
-            RunSettings(criteria=criteria).criteria_sources, recorded_context(self._recording)
-        )
-        self._add(build_criteria(declarations))
-
-    def observe(self, frame: Frame) -> None:
-        """Process a frame, and the commands before it."""
-        for command in frame.commands if self._own else ():
-            self._execute(command)
-        self._observer.observe(frame)
-        self._last = frame
-
-    def _execute(self, command: ExecutedCommand) -> None:
-        source = str(self._recording.path)
-        if command.type == CRITERION:
-            context = CriteriaContext(has_roads=self._roads is not None)
-            declarations = parse_criteria(command.content, context, source=source)
-            self._add(build_criteria(declarations, [criterion.name for criterion in self._criteria]))
-        elif command.type in EXITS:
-            self._exit = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)
-
-    def _add(self, criteria: Iterable[Criterion]) -> None:
-        for criterion in criteria:
-            if self._outcome is None and type(criterion).observe_links is not Criterion.observe_links:
-                message = f"criterion {criterion.name!r} requires link statistics, and the recording has none"
-                hint = "the run did not end, or an older version recorded it"
-                raise SettingError(Diagnostic(message, hint, str(self._recording.path)))
-            bind_roads(criterion, self._roads)
-            self._criteria.append(criterion)
-
-    def conclude(self, damage: Sequence[str]) -> Judgement:
-        """Return the judgement after the last frame."""
-        if self._last is None:
-            hint = "; ".join(damage) or "record the run again"
-            raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self._recording.path)))
-        outcome = self._outcome
-        links = {} if outcome is None else {(link.sender, link.receiver): link.statistics for link in outcome.links}
-        for criterion in self._criteria:
-            criterion.observe_final_links(() if outcome is None else outcome.final_links)
-            criterion.observe_links(links)
-        verdicts = list(map(plain_verdict, self._observer.verdicts(self._exit)))
-        end = INCOMPLETE if outcome is None else outcome.end_reason
-        code = exit_code_of(verdicts, end)
-        warnings = [] if verdicts else [f"{UNJUDGED}; give one by --criterion, such as '{{collision: {{of: Ego}}}}'"]
-        warnings += [f"the recording is damaged: {line}" for line in damage]
-        if self._own and outcome is not None and not damage:
-            warnings += _differences(verdicts, outcome.criteria)
-        return Judgement(
-            self._recording.path,
-            self._recording.scenario,
-            self._recording.seed,
-            end,
-            ABORTED if damage or outcome is None else code,
-            tuple(verdicts),
-            criteria_metrics(self._criteria),
-            self._last.view.time,
-            tuple(warnings),
-        )
+        for command in frame.commands if others is None else ():
+            if command.type == CRITERION:
+                add(parse_criteria(command.content, context, source=source))
+            elif command.type in EXITS:
+                exit_command = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)
+        observer.observe(frame)
+        end = frame.view.time
+    damage = [*recording.damage, *skipped]
+    if end is None:
+        hint = "; ".join(damage) or "record the run again"
+        raise SettingError(Diagnostic("the recording contains no readable frame", hint, source))
+    links = {} if outcome is None else {(link.sender, link.receiver): link.statistics for link in outcome.links}
+    for criterion in criteria:
+        criterion.observe_final_links(() if outcome is None else outcome.final_links)
+        criterion.observe_links(links)
+    verdicts = tuple(map(plain_verdict, observer.verdicts(exit_command)))
+    warnings = [] if verdicts else [f"{UNJUDGED}; give one by --criterion, such as '{{collision: {{of: Ego}}}}'"]
+    warnings += [f"the recording is damaged: {line}" for line in damage]
+    if others is None and outcome is not None and not damage:
+        warnings += _differences(verdicts, outcome.criteria)
+    end_reason = INCOMPLETE if outcome is None else outcome.end_reason
+    return Judgement(
+        recording.path,
+        recording.scenario,
+        recording.seed,
+        end_reason,
+        ABORTED if damage or outcome is None else exit_code_of(verdicts, end_reason),
+        verdicts,
+        criteria_metrics(criteria),
+        end,
+        tuple(warnings),
+    )
 
 
 def _differences(judged: Sequence[Verdict], recorded: Sequence[Verdict]) -> list[str]:
