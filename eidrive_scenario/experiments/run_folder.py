@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shutil
 from collections.abc import Iterator, Sequence
@@ -55,9 +54,7 @@ class RunFolder:
 
     def prepare(self) -> None:
         """Remove the files of an earlier run that did not end, including its page by `eidrive view`."""
-        self.recording.unlink(missing_ok=True)
-        self.recording.with_suffix(".html").unlink(missing_ok=True)
-        shutil.rmtree(self.images, ignore_errors=True)
+        _remove(self.recording, self.images)
 
     def commit(self, result: bytes) -> None:
         """Replace the files of an earlier run with the same settings.
@@ -66,9 +63,7 @@ class RunFolder:
         last, so a result always belongs to the recording in its folder.
         """
         (self.path / RESULT).unlink(missing_ok=True)
-        for outdated in (self.path / RECORDING, (self.path / RECORDING).with_suffix(".html")):
-            outdated.unlink(missing_ok=True)
-        shutil.rmtree(self.path / IMAGES, ignore_errors=True)
+        _remove(self.path / RECORDING, self.path / IMAGES)
         if self.recording.exists():
             self.recording.replace(self.path / RECORDING)
         if self.images.exists():
@@ -85,14 +80,20 @@ class RunFolder:
     def discard(self) -> None:
         """Remove all files of a run that never started."""
         with suppress(OSError):
-            self.recording.unlink(missing_ok=True)
-            shutil.rmtree(self.images, ignore_errors=True)
+            self.prepare()
             self._lock.release()
             self.path.rmdir()
 
     def release(self) -> None:
         """Release the folder for other runs."""
         self._lock.release()
+
+
+def _remove(recording: Path, images: Path) -> None:
+    """Remove a recording with its page by `eidrive view`, and a folder of images."""
+    recording.unlink(missing_ok=True)
+    recording.with_suffix(".html").unlink(missing_ok=True)
+    shutil.rmtree(images, ignore_errors=True)
 
 
 @contextmanager
@@ -105,7 +106,16 @@ def run_folder(parent: Path, settings: ResolvedSettings, *, own: bool) -> Iterat
     Invalid input creates no files. Raise OutputError if the folder cannot be written, or if `parent` itself is in use
     or contains the result of other settings.
     """
-    folder = _claim_below(parent, settings) if own else _claim(parent, settings)
+    name, reason = folder_name(settings), ""
+    names = (name if number == 1 else f"{name}-{number}" for number in range(1, _MAX_COPIES + 1))
+    for path in (parent / name for name in names) if own else (parent,):
+        folder = _claim(path, settings)
+        if isinstance(folder, RunFolder):
+            break
+        reason = folder
+    else:
+        message = f"{_MAX_COPIES} folders of this name are in use" if own else reason
+        raise OutputError(Diagnostic(message, "choose another folder", str(path)))
     try:
         folder.prepare()
         yield folder
@@ -132,29 +142,14 @@ def check_writable(folder: Path) -> None:
         ) from error
 
 
-def _claim_below(parent: Path, settings: ResolvedSettings) -> RunFolder:
-    name = folder_name(settings)
-    for number in itertools.count(1):
-        path = parent / (name if number == 1 else f"{name}-{number}")
-        lock = _lock(path)
-        if lock is not None:
-            if _is_free(path, settings):
-                return RunFolder(path, lock)
-            lock.release()
-        if number == _MAX_COPIES:
-            break
-    message = f"{_MAX_COPIES} folders of this name are in use"
-    raise OutputError(Diagnostic(message, "choose another folder", str(path)))
-
-
-def _claim(path: Path, settings: ResolvedSettings) -> RunFolder:
+def _claim(path: Path, settings: ResolvedSettings) -> RunFolder | str:
+    """Return a folder, or why it cannot be used for a run with these settings."""
     lock = _lock(path)
     if lock is None:
-        raise OutputError(Diagnostic("another run writes to this folder", "choose another folder", str(path)))
+        return "another run writes to this folder"
     if not _is_free(path, settings):
         lock.release()
-        message = "the folder contains the result of a run with other settings"
-        raise OutputError(Diagnostic(message, "choose another folder", str(path)))
+        return "the folder contains the result of a run with other settings"
     return RunFolder(path, lock)
 
 
