@@ -121,8 +121,6 @@ class JobQueue:
         """
         group = self._of_worker.get(worker)
         if group not in self._waiting:
-            while self._untouched and self._untouched[0] not in self._waiting:
-                self._untouched.popleft()
             group = self._untouched.popleft() if self._untouched else self._largest()
         if group is None:
             return None
