@@ -270,97 +270,70 @@ _BRIGHT = 0.55
 """Rate from which the text of a cell is dark."""
 
 
-def rate_map(
-    xs: Sequence[float],
-    ys: Sequence[float],
-    rates: Mapping[tuple[int, int], Proportion],
-    *,
-    x_title: str,
-    y_title: str,
-    names: tuple[Sequence[str], Sequence[str]],
-) -> str:
-    """Return an SVG element with one cell per rate, at (column, row). A tooltip of each has its interval.
+@dataclass(frozen=True)
+class MapAxis:
+    """Columns or rows of a heat map: title, and value and text of each, in ascending order."""
 
-    names  texts of the values of columns and rows, for the tooltips
-    """
+    name: str
+    centers: tuple[float, ...]
+    labels: tuple[str, ...]
+
+
+Rates = Mapping[tuple[int, int], Proportion]
+"""Rates of a heat map by (column, row)."""
+
+
+def rate_map(columns: MapAxis, rows: MapAxis, rates: Rates) -> str:
+    """Return an SVG element with one cell per rate. A tooltip of each has its interval."""
     with rc_context(PAGE_STYLE):
         figure = Figure(figsize=(MAP_WIDTH, MAP_HEIGHT), dpi=72.0)
         axes = figure.add_axes((MAP_LEFT, MAP_BOTTOM, MAP_RIGHT - MAP_LEFT, MAP_TOP - MAP_BOTTOM))
-        mesh = _draw_rates(axes, xs, ys, rates, (x_title, y_title))
+        mesh = _draw_rates(axes, columns, rows, rates)
         beside = figure.add_axes((MAP_RIGHT + 0.03, MAP_BOTTOM, 0.03, MAP_TOP - MAP_BOTTOM))
         bar = figure.colorbar(mesh, cax=beside, format=PercentFormatter(1.0))
         bar.set_label("success rate")
         beside.tick_params(length=0.0)
         bar.outline.set_visible(False)
-        above = _tooltips(axes, xs, ys, rates, (x_title, y_title), names)
-        return inline_svg(figure, f"success rate over {x_title} and {y_title}", kind="map", above=above)
+        above = _tooltips(axes, columns, rows, rates)
+        return inline_svg(figure, f"success rate over {columns.name} and {rows.name}", kind="map", above=above)
 
 
-def rate_map_figure(
-    xs: Sequence[float],
-    ys: Sequence[float],
-    rates: Mapping[tuple[int, int], Proportion],
-    *,
-    x_title: str,
-    y_title: str,
-    size: Size,
-) -> Figure:
+def rate_map_figure(columns: MapAxis, rows: MapAxis, rates: Rates, size: Size) -> Figure:
     """Return the rates as a heat map of a size [mm]."""
     with paper_style():
         figure, axes = _paper_axes(size)
-        mesh = _draw_rates(axes, xs, ys, rates, (x_title, y_title))
+        mesh = _draw_rates(axes, columns, rows, rates)
         bar = figure.colorbar(mesh, format=PercentFormatter(1.0), label="success rate")
         if bar.solids is not None:  # matplotlib draws bars of 50 or more colors as images
             bar.solids.set(rasterized=False, edgecolor="face")
     return figure
 
 
-def _draw_rates(
-    axes: Axes,
-    xs: Sequence[float],
-    ys: Sequence[float],
-    rates: Mapping[tuple[int, int], Proportion],
-    titles: tuple[str, str],
-) -> QuadMesh:
+def _draw_rates(axes: Axes, columns: MapAxis, rows: MapAxis, rates: Rates) -> QuadMesh:
     """Draw a heat map with its percentages, if they are few, and the values of its cells on the axes."""
-    shares = np.full((len(ys), len(xs)), np.nan)
+    shares = np.full((len(rows.centers), len(columns.centers)), np.nan)
     for (column, row), rate in rates.items():
         shares[row, column] = rate.share
-    mesh = heat_cells(axes, xs, ys, shares, colors=COLORS, scale=Normalize(0.0, 1.0))
-    axes.set_xlabel(titles[0])
-    axes.set_ylabel(titles[1])
-    if max(len(xs), len(ys)) <= MOST_NUMBERS:
-        _write_numbers(axes, xs, ys, shares)
+    mesh = heat_cells(axes, columns.centers, rows.centers, shares, colors=COLORS, scale=Normalize(0.0, 1.0))
+    axes.set_xlabel(columns.name)
+    axes.set_ylabel(rows.name)
+    if max(shares.shape) <= MOST_NUMBERS:
+        dark = matplotlib.colormaps[COLORS](0.0)
+        for row, column in np.argwhere(np.isfinite(shares)).tolist():
+            x, y, share = columns.centers[column], rows.centers[row], shares[row, column]
+            color = dark if share > _BRIGHT else "#fffffe"
+            axes.text(x, y, f"{100.0 * share:.0f}", color=color, ha="center", va="center", fontsize=8.0)
     return mesh
 
 
-def _write_numbers(axes: Axes, xs: Sequence[float], ys: Sequence[float], shares: Array) -> None:
-    colors = matplotlib.colormaps[COLORS]
-    for row, y in enumerate(ys):
-        for column, x in enumerate(xs):
-            share = float(shares[row, column])
-            if not np.isnan(share):
-                color = colors(0.0) if share > _BRIGHT else "#fffffe"
-                axes.text(x, y, f"{100.0 * share:.0f}", color=color, ha="center", va="center", fontsize=8.0)
-
-
-def _tooltips(
-    axes: Axes,
-    xs: Sequence[float],
-    ys: Sequence[float],
-    rates: Mapping[tuple[int, int], Proportion],
-    titles: tuple[str, str],
-    names: tuple[Sequence[str], Sequence[str]],
-) -> str:
+def _tooltips(axes: Axes, columns: MapAxis, rows: MapAxis, rates: Rates) -> str:
     """Return transparent rectangles above the cells, whose titles a browser shows."""
     height = 72.0 * MAP_HEIGHT
-    across = axes.transData.transform([(edge, 0.0) for edge in cell_edges(xs)])[:, 0]
-    down = height - axes.transData.transform([(0.0, edge) for edge in cell_edges(ys)])[:, 1]
+    across = axes.transData.transform([(edge, 0.0) for edge in cell_edges(columns.centers)])[:, 0]
+    down = height - axes.transData.transform([(0.0, edge) for edge in cell_edges(rows.centers)])[:, 1]
     rectangles = []
     for (column, row), rate in sorted(rates.items()):
-        values = ", ".join(
-            f"{title} {name[index]}" for title, name, index in zip(titles, names, (column, row), strict=True)
-        )
+        values = f"{columns.name} {columns.labels[column]}, {rows.name} {rows.labels[row]}"
         text = f"{values}: {rate.successes} of {rate.trials} passed, 95 % interval {rate.low:.2f} to {rate.high:.2f}"
         corner = f'x="{across[column]:.2f}" y="{down[row + 1]:.2f}"'
         size = f'width="{across[column + 1] - across[column]:.2f}" height="{down[row] - down[row + 1]:.2f}"'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
@@ -11,7 +11,14 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.statistics.intervals import Proportion, wilson
-from eidrive_scenario.reporting.drawing.charts import ChartSeries, line_chart, rate_figure, rate_map, rate_map_figure
+from eidrive_scenario.reporting.drawing.charts import (
+    ChartSeries,
+    MapAxis,
+    line_chart,
+    rate_figure,
+    rate_map,
+    rate_map_figure,
+)
 from eidrive_scenario.reporting.drawing.vector_canvas import Size
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
@@ -23,17 +30,12 @@ RANGES = 10
 
 
 @dataclass(frozen=True)
-class Levels:
-    """Values of an axis with numbers, in ascending order.
+class Levels(MapAxis):
+    """Values of an axis with numbers: single ones, or ranges with their centers.
 
-    centers  value, or center of the range, of each level
-    labels   its text
     start, width  lower end of the first range and width of each; width 0 for single values
     """
 
-    name: str
-    centers: tuple[float, ...]
-    labels: tuple[str, ...]
     start: float = 0.0
     width: float = 0.0
 
@@ -86,12 +88,8 @@ class Matrix:
 
 def scenario_matrix(groups: Sequence[RunGroup]) -> Matrix | None:
     """Return the matrix of scenarios and settings; None for one scenario, one setting or too many settings."""
-    names = [(group.scenario, _name(group)) for group in groups]
-    detailed = len(set(names)) < len(names)
-    table: dict[str, dict[str, list[ReportedRun]]] = {}
-    for group in groups:
-        table.setdefault(group.scenario, {}).setdefault(_name(group, detailed=detailed), []).extend(group.distinct)
-    return _matrix("scenario", table, least_rows=2)
+    named = zip(groups, group_names(groups), strict=True)
+    return _matrix("scenario", [(group.scenario, name, run) for group, name in named for run in group.distinct], 2)
 
 
 def _name(group: RunGroup, *, detailed: bool = False) -> str:
@@ -109,29 +107,25 @@ def parameter_matrix(runs: Sequence[ReportedRun], varied: Sequence[str]) -> Matr
         return None
     down = varied[1] if len(varied) == 2 else ""
     across, along = _label(runs, varied[0]), _label(runs, down) if down else lambda run: "passed"
-    table: dict[str, dict[str, list[ReportedRun]]] = {}
-    for run in runs:
-        table.setdefault(along(run), {}).setdefault(across(run), []).append(run)
-    columns = {name for cells in table.values() for name in cells}
-    if not all(run.is_swept for run in runs) and len(runs) <= max(len(columns), len(table)):
+    cells = [(along(run), across(run), run) for run in runs]
+    most = max(len({row for row, _, _ in cells}), len({column for _, column, _ in cells}))
+    if len(runs) <= most and not all(run.is_swept for run in runs):
         return None
-    return _matrix(f"{down} \\ {varied[0]}" if down else varied[0], table, least_rows=1)
+    return _matrix(f"{down} \\ {varied[0]}" if down else varied[0], cells)
 
 
 def axis_matrix(groups: Sequence[RunGroup], axis: str) -> Matrix | None:
     """Return the matrix of the groups of a scenario over the axis of a sweep, with one row per group."""
     across = _label([run for group in groups for run in group.distinct], axis)
-    table: dict[str, dict[str, list[ReportedRun]]] = {}
-    for group, name in zip(groups, group_names(groups), strict=True):
-        for run in group.distinct:
-            table.setdefault(name, {}).setdefault(across(run), []).append(run)
-    return _matrix(axis, table, least_rows=1, ordered=False)
+    named = zip(groups, group_names(groups), strict=True)
+    return _matrix(axis, [(name, across(run), run) for group, name in named for run in group.distinct], ordered=False)
 
 
 def group_names(groups: Sequence[RunGroup]) -> list[str]:
-    """Return a name for each group of a scenario, with as many settings as differ."""
+    """Return a name for each group that differs from those of the other groups of its scenario."""
     names = [_name(group) for group in groups]
-    return names if len(set(names)) == len(names) else [_name(group, detailed=True) for group in groups]
+    is_distinct = len({(group.scenario, name) for group, name in zip(groups, names, strict=True)}) == len(names)
+    return names if is_distinct else [_name(group, detailed=True) for group in groups]
 
 
 def _label(runs: Sequence[ReportedRun], name: str) -> Callable[[ReportedRun], str]:
@@ -143,9 +137,13 @@ def _label(runs: Sequence[ReportedRun], name: str) -> Callable[[ReportedRun], st
 
 
 def _matrix(
-    corner: str, table: Mapping[str, Mapping[str, Sequence[ReportedRun]]], least_rows: int, *, ordered: bool = True
+    corner: str, cells: Sequence[tuple[str, str, ReportedRun]], least_rows: int = 1, *, ordered: bool = True
 ) -> Matrix | None:
-    columns = sorted({name for cells in table.values() for name in cells}, key=_order)
+    """Return the matrix of runs with their rows and columns; None for too few or too many of these."""
+    table: dict[str, dict[str, list[ReportedRun]]] = {}
+    for row, column, run in cells:
+        table.setdefault(row, {}).setdefault(column, []).append(run)
+    columns = sorted({column for _, column, _ in cells}, key=_order)
     if len(table) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(table) * len(columns) > MOST_CELLS:
         return None
     names = sorted(table, key=_order) if ordered else list(table)
@@ -276,10 +274,12 @@ def rate_maps(group: RunGroup) -> Iterator[RateMap]:
         pair = columns.name, rows.name
         matrix = parameter_matrix(group.distinct, pair)
         if matrix is not None:
-            names = columns.labels, rows.labels
-            svg = rate_map(columns.centers, rows.centers, rates, x_title=pair[0], y_title=pair[1], names=names)
             upwards = replace(matrix, rows=matrix.rows[::-1])
-            yield RateMap(Markup(svg), upwards, tuple(name for name in group.varied if name not in pair))
+            yield RateMap(
+                Markup(rate_map(columns, rows, rates)),
+                upwards,
+                tuple(name for name in group.varied if name not in pair),
+            )
 
 
 def _maps(group: RunGroup) -> Iterator[tuple[Levels, Levels, dict[tuple[int, int], Proportion]]]:
@@ -308,5 +308,4 @@ def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, 
         for group, name in zip(members, group_names(members), strict=True):
             for columns, rows, rates in _maps(group):
                 title = f"{scenario}-{columns.name}-{rows.name}" + f"-{name}" * (len(members) > 1)
-                titles = {"x_title": columns.name, "y_title": rows.name}
-                yield title, rate_map_figure(columns.centers, rows.centers, rates, **titles, size=size)
+                yield title, rate_map_figure(columns, rows, rates, size)

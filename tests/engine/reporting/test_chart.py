@@ -22,6 +22,7 @@ from eidrive_scenario.reporting.drawing.charts import (
     TOP,
     WIDTH,
     ChartSeries,
+    MapAxis,
     heat_cells,
     line_chart,
     rate_map,
@@ -74,7 +75,7 @@ def test_line_chart_of_full_range_spans_axes() -> None:
 
 def test_line_charts_and_maps_have_sizes_of_their_own() -> None:
     rates = {(0, 0): Proportion(1, 2, 0.01, 0.99, 0.95)}
-    drawn = etree.fromstring(rate_map([0.0], [0.0], rates, x_title="a", y_title="b", names=(["0"], ["0"])))
+    drawn = etree.fromstring(rate_map(MapAxis("a", (0.0,), ("0",)), MapAxis("b", (0.0,), ("0",)), rates))
     assert chart(ChartSeries("one", "#123456", (0.0, 8.0), (0.0, 8.0))).get("viewBox") == "0 0 792 216"
     assert drawn.get("viewBox") == "0 0 446.4 288"
 
