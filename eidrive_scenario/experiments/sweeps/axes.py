@@ -267,7 +267,8 @@ def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = 
 
     Raise SettingError for such an interval without a whole number.
     """
-    if not any(axis.is_interval and not is_setting(axis.name) for axis in axes):
+    intervals = [axis for axis in axes if axis.is_interval and not is_setting(axis.name)]
+    if not intervals:
         return tuple(axes)
     names: set[str] = set()
     with suppress(InputError):
@@ -277,18 +278,17 @@ def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = 
             names = {
                 parameter.name for parameter in declared.parameter_declaration if parameter.parameter_type in _WHOLE
             }
-    return tuple(_typed_axis(axis, names) for axis in axes)
-
-
-def _typed_axis(axis: Axis, names: set[str]) -> Axis:
-    if not axis.is_interval or is_setting(axis.name) or axis.name.removeprefix(PARAMETER) not in names:
-        return axis
-    typed = replace(axis, is_whole=True)
-    low, high = typed.ends
-    if low >= high:
-        message = f"--vary: {axis.name} is a whole number, and {axis.low:g}:{axis.high:g} has fewer than two of them"
-        raise SettingError(Diagnostic(message, "give a larger interval"))
-    return typed
+    whole = {
+        axis.name: replace(axis, is_whole=True) for axis in intervals if axis.name.removeprefix(PARAMETER) in names
+    }
+    for axis in whole.values():
+        low, high = axis.ends
+        if low >= high:
+            message = (
+                f"--vary: {axis.name} is a whole number, and {axis.low:g}:{axis.high:g} has fewer than two of them"
+            )
+            raise SettingError(Diagnostic(message, "give a larger interval"))
+    return tuple(whole.get(axis.name, axis) for axis in axes)
 
 
 GRID = "grid"
