@@ -17,7 +17,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, Point, Scalar
+from eidrive_scenario.experiments.sweeps.axes import Axis, Point
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
 
@@ -234,7 +234,8 @@ def falsify(
     """
     if not axes:
         raise SettingError(Diagnostic("--falsify without --vary", "give the axes of the space"))
-    optuna = _optuna()
+    optuna = optional_import("optuna", "search")
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of the options of the sampler
         sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
@@ -245,7 +246,7 @@ def falsify(
     while len(executed) < runs:
         trials = [study.ask(_distributions(optuna, axes)) for _ in range(min(BATCH, runs - len(executed)))]
         jobs = [
-            plan.job(len(executed) + index, {**plan.points[0], **_values(axes, trial.params)}, plan.seeds[0])
+            plan.job(len(executed) + index, {**plan.points[0], **trial.params}, plan.seeds[0])
             for index, trial in enumerate(trials)
         ]
         batch = execute(jobs)
@@ -345,19 +346,9 @@ def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:
     return distributions
 
 
-def _values(axes: Sequence[Axis], params: dict[str, Any]) -> dict[str, Scalar]:
-    return {axis.name: params[axis.name] for axis in axes}
-
-
 def _has_verdict(run: StoredRun) -> bool:
     return run.status in (PASSED, FAILED)
 
 
 def _without_verdict(runs: Sequence[StoredRun]) -> SettingError:
     return SettingError(Diagnostic(f"no run has a verdict: {runs[0].status}: {runs[0].error}", "correct the settings"))
-
-
-def _optuna() -> Any:
-    optuna = optional_import("optuna", "search")
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    return optuna

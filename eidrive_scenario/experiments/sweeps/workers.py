@@ -85,6 +85,9 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             wall_limit=wall_limit,
         )
         unjudged = result.exit_code == errors.NOT_JUDGED
+        folder = {}
+        if files is not None and result.folder is not None:
+            folder[FOLDER] = os.path.relpath(result.folder.resolve(), files.store.resolve().parent)
         return StoredRun(
             key=job.key,
             number=job.number,
@@ -93,7 +96,7 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             seed=job.seed,
             status=PASSED if result.passed else NOT_JUDGED if unjudged else FAILED,
             point=dict(job.point),
-            result={**result.to_dict(), **_folder(result.folder, files)},
+            result={**result.to_dict(), **folder},
             error=result.warnings[0] if unjudged else "",
             command=result.command,
             wall_s=round(time.perf_counter() - start, 4),
@@ -110,13 +113,6 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             raise
         status, message = ABORTED, _message(error)
     return without_result(job, status, message, time.perf_counter() - start)
-
-
-def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
-    """Return the column of the folder of a run, if its files are kept."""
-    if folder is None or files is None:
-        return {}
-    return {FOLDER: os.path.relpath(folder.resolve(), files.store.resolve().parent)}
 
 
 def without_result(job: SweepJob, status: str, message: str, wall_s: float) -> StoredRun:
