@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -121,32 +121,28 @@ class _Row:
     """
 
     name: str
-    cells: tuple[str, ...]
+    cells: Sequence[str]
     conclusion: str
     remark: str
     bar: tuple[float, float, float] | None = None
 
 
-def _columns(comparisons: Sequence[NamedComparison]) -> list[str]:
-    metrics = dict.fromkeys(name for named in comparisons for name in _metrics(named))
+def _table(comparisons: Sequence[NamedComparison]) -> tuple[list[str], list[_Row]]:
+    """Return the titles of the columns after the conclusion, and the rows."""
+    metrics = dict.fromkeys(name for named in comparisons if named.comparison for name in named.comparison.metrics)
     confidence = f"{_compared(comparisons).confidence:.0%}"
     columns = ["pairs", "reference passed", "passed", "only reference passed", "only this passed"]
-    return [*columns, f"difference ({confidence})", "p", *(f"{name}, difference ({confidence})" for name in metrics)]
-
-
-def _rows(comparisons: Sequence[NamedComparison]) -> Iterator[_Row]:
-    metrics = dict.fromkeys(name for named in comparisons for name in _metrics(named))
+    columns += [f"difference ({confidence})", "p", *(f"{name}, difference ({confidence})" for name in metrics)]
+    rows = []
     for named in comparisons:
         comparison, name = named.comparison, text_of_value(named.second)
         if comparison is None:
-            cells = ("0", *("" for _ in range(6 + len(metrics))))
-            yield _Row(name, cells, UNDECIDED, _no_pair(named, name, text_of_value(named.first)))
+            cells = ["0"] + [""] * (len(columns) - 1)
+            rows.append(_Row(name, cells, UNDECIDED, _no_pair(named, name, text_of_value(named.first))))
             continue
         counts, (low, high), (first, second) = comparison.verdicts, comparison.interval, comparison.rates
-        remark = (
-            f"{name}: no verdict of {comparison.lost} runs with a verdict of the reference" if comparison.lost else ""
-        )
-        cells = (
+        remark = f"{name}: no verdict of {comparison.lost} runs with a verdict of the reference"
+        cells = [
             str(counts.pairs),
             f"{first:.1%}",
             f"{second:.1%}",
@@ -155,16 +151,14 @@ def _rows(comparisons: Sequence[NamedComparison]) -> Iterator[_Row]:
             f"{counts.difference:+.1%} ({low:+.1%} to {high:+.1%})",
             f"{comparison.p_value:.3g}",
             *(_difference(comparison.metrics.get(metric)) for metric in metrics),
-        )
-        yield _Row(name, cells, comparison.conclusion, remark, (low, high, counts.difference))
+        ]
+        bar = low, high, counts.difference
+        rows.append(_Row(name, cells, comparison.conclusion, remark if comparison.lost else "", bar))
+    return columns, rows
 
 
 def _difference(paired: PairedDifference | None) -> str:
     return "" if paired is None else f"{paired.mean:+.4g} ({interval_text(paired.low, paired.high, '+.4g')})"
-
-
-def _metrics(named: NamedComparison) -> Mapping[str, Any]:
-    return {} if named.comparison is None else named.comparison.metrics
 
 
 def _compared(comparisons: Sequence[NamedComparison]) -> Comparison:
@@ -175,14 +169,14 @@ def _compared(comparisons: Sequence[NamedComparison]) -> Comparison:
 def as_markdown(comparisons: Sequence[NamedComparison]) -> str:
     """Return comparisons as a table of GitHub Flavored Markdown; texts of users are code, so that none is markup."""
     axis, reference = comparisons[0].axis, text_of_value(comparisons[0].first)
-    columns = [_code(axis) if axis else "store", "conclusion", *map(_cell, _columns(comparisons))]
+    titles, rows = _table(comparisons)
+    columns = [_code(axis) if axis else "store", "conclusion", *map(_cell, titles)]
     lines = [
         f"### {f'{_code(axis)} compared' if axis else 'Comparison'} with {_code(reference)}",
         "",
         f"| {' | '.join(columns)} |",
         f"|---|---|{'---:|' * (len(columns) - 2)}",
     ]
-    rows = list(_rows(comparisons))
     lines += [f"| {' | '.join([_code(row.name), f'**{row.conclusion}**', *row.cells])} |" for row in rows]
     lines += [f"\n{_cell(row.remark)}" for row in rows if row.remark]
     return "\n".join([*lines, "", f"<sub>{_explanation(comparisons)}</sub>"])
@@ -208,15 +202,15 @@ def _cell(text: str) -> str:
 
 def write_comparison(comparisons: Sequence[NamedComparison], out: Path) -> Path:
     """Write comparisons as a page, and return its path. Raise SettingError if it cannot be written."""
-    axis = comparisons[0].axis
+    axis, (columns, rows) = comparisons[0].axis, _table(comparisons)
     return write_page(
         out,
         "comparison.html.jinja",
         title=f"Comparison of {axis}" if axis else "Comparison of two sweeps",
         subject=axis or "store",
         reference=text_of_value(comparisons[0].first),
-        columns=_columns(comparisons),
-        rows=list(_rows(comparisons)),
+        columns=columns,
+        rows=rows,
         explanation=_explanation(comparisons),
         footer=f"eidrive-scenario {version('eidrive-scenario')}",
     )
