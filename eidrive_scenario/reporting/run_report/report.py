@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
+import os
+import platform
+import shlex
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from eidrive_scenario.base.installation import ENGINE
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.statistics.intervals import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
@@ -19,7 +26,6 @@ from eidrive_scenario.reporting.run_report.rates import (
     scenario_matrix,
     success_rate,
 )
-from eidrive_scenario.reporting.run_report.report_origin import report_origin
 from eidrive_scenario.reporting.run_report.reported_runs import OUTCOMES, ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup, group_runs
 from eidrive_scenario.reporting.run_report.run_table import (
@@ -74,7 +80,7 @@ def write_run_report(
     overview = sorted(enumerate(groups), key=_rate_order) if len(groups) > MOST_GROUPS else list(enumerate(groups))
     title = headline(runs)
     failures = [run for run in runs if not run.passed]
-    common: dict[str, Any] = {"title": title, "footer": f"eidrive-scenario {version('eidrive-scenario')}"}
+    common: dict[str, Any] = {"title": title, "footer": f"{ENGINE} {version(ENGINE)}"}
     return write_page(
         page,
         template,
@@ -157,3 +163,37 @@ def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
     given = [run.metrics.get(metric) for run in runs]
     values = [value for value in given if value is not None and math.isfinite(value)]
     return summarize(values) if values else None
+
+
+def report_origin(runs: Sequence[ReportedRun]) -> dict[str, str]:
+    """Return what the header of a report states, by title; without the commit outside of a Git repository."""
+    given = [run.settings.get("versions") for run in runs]
+    versions = {str(names[ENGINE]) for names in given if isinstance(names, dict) and ENGINE in names}
+    machine = f"{platform.node()}, {platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    entries = {
+        "version": f"{ENGINE} {', '.join(sorted(versions)) or version(ENGINE)}",
+        "commit": _commit(),
+        "date": datetime.now().astimezone().isoformat(sep=" ", timespec="minutes"),
+        "machine": f"{machine}, Python {platform.python_version()}",
+        "command": _command(),
+    }
+    return {title: text for title, text in entries.items() if text}
+
+
+def _commit() -> str:
+    """Return the commit of the working folder; empty without one."""
+    # Whether files differ from it is not asked: Git would execute filters that the settings of the folder name.
+    command = ["git", "rev-parse", "--short=10", "HEAD"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""
+
+
+def _command() -> str:
+    """Return the command line of this process; empty in a session of Python."""
+    program = Path(sys.argv[0])
+    if not program.name or program.name == "-c":
+        return ""
+    name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
+    return " ".join([name, *map(shlex.quote, sys.argv[1:])])
