@@ -88,6 +88,24 @@ class PairCriterion(Criterion):
         )
 
 
+class SurroundedCriterion(Criterion):
+    """Criterion on an actor and those around it, or only one of them, in the coordinates of the lane of the actor."""
+
+    def __init__(self, settings: CriterionSettings, of: str, to: str | None) -> None:
+        super().__init__(settings)
+        self.of = of
+        self.others = None if to is None else (to,)
+        """Names of the evaluated others; None for all."""
+        self.subjects = (of, *(self.others or ()))
+        self.missing = set(self.subjects)
+        """Required actors that were never present so far."""
+        self.surroundings = Surroundings(None)
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        self.surroundings = Surroundings(roads)
+
+
 class LeaderSettings(CriterionSettings):
     """Settings: `{of: Ego}` for the nearest actor ahead in the path of the actor, `{of: Ego, to: Lead}` for one actor
     while it is ahead in that path.
@@ -99,7 +117,7 @@ class LeaderSettings(CriterionSettings):
     _two_actors = model_validator(mode="after")(require_two_actors)
 
 
-class LeaderCriterion(Criterion):
+class LeaderCriterion(SurroundedCriterion):
     """Criterion on a quantity of an actor and its leader.
 
     A criterion with a minimum fails below `limit`, one with a maximum above it. Without a leader it passes; its value
@@ -112,17 +130,10 @@ class LeaderCriterion(Criterion):
     """Whether the extreme is a maximum."""
 
     def __init__(self, settings: LeaderSettings, limit: float | None) -> None:
-        super().__init__(settings)
-        self.of, self.to, self.limit = settings.of, settings.to, limit
-        self.subjects = (settings.of,) if settings.to is None else (settings.of, settings.to)
-        self._surroundings = Surroundings(None)
-        self._missing = set(self.subjects)
+        super().__init__(settings, settings.of, settings.to)
+        self._target = settings.to or "an actor"
         self._extreme = Extreme(limit, largest=self.largest)
         self._other = ""
-
-    def bind(self, roads: RoadNetwork | None) -> None:
-        super().bind(roads)
-        self._surroundings = Surroundings(roads)
 
     @abstractmethod
     def measure(self, leader: Relation) -> float | None:
@@ -130,9 +141,9 @@ class LeaderCriterion(Criterion):
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
-        if self._missing:
-            self._missing.difference_update(view.names)
-        leader = self._surroundings.leader(view, self.of, None if self.to is None else (self.to,))
+        if self.missing:
+            self.missing.difference_update(view.names)
+        leader = self.surroundings.leader(view, self.of, self.others)
         value = self.measure(leader) if leader is not None else None
         if value is None or leader is None:
             return
@@ -142,14 +153,14 @@ class LeaderCriterion(Criterion):
             self.violated_with = self.violated_with or leader.other
 
     def verdict(self) -> Verdict:
-        if self._missing:
-            reason = actor_never_present(self._missing)
+        if self.missing:
+            reason = actor_never_present(self.missing)
         elif self._extreme.value is None:
-            reason = f"{self.of} never had {self.to or 'an actor'} ahead in its path, so there is no {self.quantity}"
+            reason = f"{self.of} never had {self._target} ahead in its path, so there is no {self.quantity}"
         else:
             value = f"{self._extreme.value:.2f} {self.unit}"
             reason = f"{self.quantity} of {self.of} to {self._other} was {value} at {self._extreme.when:.2f} s"
-        return conclude_extreme(self, self._extreme, reason, measured=not self._missing)
+        return conclude_extreme(self, self._extreme, reason, measured=not self.missing)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the extreme and its time [s]; empty without a value."""

@@ -8,18 +8,8 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import require_two_actors
-from eidrive_scenario.api.common import RoadNetwork
-from eidrive_scenario.api.criteria import (
-    Criterion,
-    CriterionSettings,
-    Frame,
-    Relation,
-    SafeDistanceModel,
-    Surroundings,
-    Verdict,
-    actor_never_present,
-)
+from eidrive_criteria.pairs import LeaderSettings, SurroundedCriterion
+from eidrive_scenario.api.criteria import Frame, Relation, SafeDistanceModel, Verdict, actor_never_present
 
 STANDING = 0.1
 """Maximum speed of a standing actor [m/s]."""
@@ -27,7 +17,7 @@ STANDING = 0.1
 Positive = Annotated[float, Field(gt=0)]
 
 
-class RssViolationSettings(CriterionSettings):
+class RssViolationSettings(LeaderSettings):
     """Settings: `{of: Ego, to: Lead}`, or `{of: Ego}` for all actors; parameters of the model with CARLA's defaults.
 
     reaction_time [s]; max_acceleration, min_braking, max_braking, min_braking_correct [m/s²];
@@ -35,8 +25,6 @@ class RssViolationSettings(CriterionSettings):
     share  share of the time in which the distances may be too small, 0 to 1
     """
 
-    of: str
-    to: str | None = None
     share: Annotated[float, Field(ge=0, le=1)] = 0.0
     reaction_time: Annotated[float, Field(ge=0)] = 1.0
     max_acceleration: Annotated[float, Field(ge=0)] = 3.5
@@ -46,8 +34,6 @@ class RssViolationSettings(CriterionSettings):
     lateral_acceleration: Annotated[float, Field(ge=0)] = 0.2
     lateral_braking: Positive = 0.8
     lateral_margin: Annotated[float, Field(ge=0)] = 0.1
-
-    _two_actors = model_validator(mode="after")(require_two_actors)
 
     @model_validator(mode="after")
     def _braking(self) -> Self:
@@ -60,7 +46,7 @@ class RssViolationSettings(CriterionSettings):
         return SafeDistanceModel(**self.model_dump(include=set(SafeDistanceModel.__dataclass_fields__)))
 
 
-class RssViolation(Criterion):
+class RssViolation(SurroundedCriterion):
     """Criterion that fails if the longitudinal and the lateral distance to an actor are both below those of RSS.
 
     Excluded are actors behind, which have to keep the distance themselves, actors that cross the lane, for which RSS
@@ -72,29 +58,21 @@ class RssViolation(Criterion):
     name = "rss_violation"
 
     def __init__(self, settings: RssViolationSettings) -> None:
-        super().__init__(settings)
-        self._settings, self._model = settings, settings.model()
-        self.subjects = (settings.of,) if settings.to is None else (settings.of, settings.to)
-        self._surroundings = Surroundings(None)
-        self._missing = set(self.subjects)
+        super().__init__(settings, settings.of, settings.to)
+        self._share, self._model = settings.share, settings.model()
         self._ticks = self._violations = 0
         self._ratio, self._when, self._other = math.inf, math.nan, ""
         self._first: float | None = None
 
-    def bind(self, roads: RoadNetwork | None) -> None:
-        super().bind(roads)
-        self._surroundings = Surroundings(roads)
-
     def observe(self, frame: Frame) -> None:
-        view, settings = frame.view, self._settings
-        if self._missing:
-            self._missing.difference_update(view.names)
-        if settings.of not in view.rows:
+        view = frame.view
+        if self.missing:
+            self.missing.difference_update(view.names)
+        if self.of not in view.rows:
             return
         self._ticks += 1
         violated = False
-        to = None if settings.to is None else (settings.to,)
-        for relation in self._surroundings.relations(view, settings.of, to):
+        for relation in self.surroundings.relations(view, self.of, self.others):
             # A body that overlaps from behind is a coupled trailer, or has hit this one.
             behind = relation.ahead < 0.0 and (relation.gap > 0.0 or relation.side_gap == 0.0)
             if behind or relation.crosses or math.hypot(relation.speed, relation.side_speed) < STANDING:
@@ -109,10 +87,10 @@ class RssViolation(Criterion):
             self._first = view.time if self._first is None else self._first
 
     def verdict(self) -> Verdict:
-        of, share = self._settings.of, self._violations / self._ticks if self._ticks else None
-        passed = not self._missing and share is not None and share <= self._settings.share
-        if self._missing:
-            reason = actor_never_present(self._missing)
+        of, share = self.of, self._violations / self._ticks if self._ticks else None
+        passed = not self.missing and share is not None and share <= self._share
+        if self.missing:
+            reason = actor_never_present(self.missing)
         elif math.isfinite(self._ratio):
             reason = (
                 f"{of} had {self._ratio:.2f} of the required distance to {self._other} at {self._when:.2f} s; the "
@@ -124,9 +102,9 @@ class RssViolation(Criterion):
             passed,
             reason,
             value=share,
-            limit=self._settings.share,
+            limit=self._share,
             first_violation=self._first if not passed else None,
-            is_final=self._first is not None and self._settings.share == 0.0,
+            is_final=self._first is not None and self._share == 0.0,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -8,15 +8,9 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from eidrive_criteria.folds import require_two_actors
-from eidrive_scenario.api.common import TIME_TOLERANCE, RoadNetwork
-from eidrive_scenario.api.criteria import (
-    Criterion,
-    CriterionSettings,
-    Frame,
-    Surroundings,
-    Verdict,
-    actor_never_present,
-)
+from eidrive_criteria.pairs import SurroundedCriterion
+from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_scenario.api.criteria import CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class YieldToEmergencyVehicleSettings(CriterionSettings):
@@ -34,7 +28,7 @@ class YieldToEmergencyVehicleSettings(CriterionSettings):
     _two_actors = model_validator(mode="after")(require_two_actors)
 
 
-class YieldToEmergencyVehicle(Criterion):
+class YieldToEmergencyVehicle(SurroundedCriterion):
     """Criterion that fails if an emergency vehicle that approaches from behind does not get past the actor.
 
     It approaches when it drives in the direction of the actor, at most `within` behind it, in any lane. The approach
@@ -47,11 +41,8 @@ class YieldToEmergencyVehicle(Criterion):
     unit = "s"
 
     def __init__(self, settings: YieldToEmergencyVehicleSettings) -> None:
-        super().__init__(settings)
+        super().__init__(settings, settings.of, settings.to)
         self._settings = settings
-        self.subjects = (settings.of, settings.to)
-        self._missing = set(self.subjects)
-        self._surroundings = Surroundings(None)
         self._since: float | None = None
         """Start of the present approach [s]; None without one."""
         self._longest: float | None = None
@@ -64,18 +55,14 @@ class YieldToEmergencyVehicle(Criterion):
         self._removed = False
         """Whether either of both is absent since the present approach."""
 
-    def bind(self, roads: RoadNetwork | None) -> None:
-        super().bind(roads)
-        self._surroundings = Surroundings(roads)
-
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
-        if self._missing:
-            self._missing.difference_update(view.names)
+        if self.missing:
+            self.missing.difference_update(view.names)
         self._removed = not (settings.of in view.rows and settings.to in view.rows)
         if self._removed:
             return
-        relation = next(self._surroundings.relations(view, settings.of, (settings.to,)), None)
+        relation = next(self.surroundings.relations(view, settings.of, self.others), None)
         if self._since is None:
             approaches = (
                 relation is not None
@@ -101,8 +88,8 @@ class YieldToEmergencyVehicle(Criterion):
     def verdict(self) -> Verdict:
         settings = self._settings
         of, to = settings.of, settings.to
-        if self._missing:
-            reason = actor_never_present(self._missing)
+        if self.missing:
+            reason = actor_never_present(self.missing)
         elif self._longest is None:
             reason = f"{to} never approached {of} from behind within {settings.within:g} m"
         elif self._since is not None:
@@ -111,7 +98,7 @@ class YieldToEmergencyVehicle(Criterion):
         else:
             reason = f"{to} {self._outcome} {of} {self._longest:.2f} s after it had approached"
         return self.conclude(
-            not self._missing and self._since is None and self._violated is None,
+            not self.missing and self._since is None and self._violated is None,
             reason,
             value=self._longest,
             limit=settings.at_most,
