@@ -24,10 +24,9 @@ function layMessages() {
 
 /* Scroll to the last message that was sent before the shown instant. */
 function followMessages() {
-  let low = 0, high = listedMessages.length;
-  while (low < high) { const middle = (low + high) >> 1; if (listedMessages[middle][0] <= shown.time + 1e-6) low = middle + 1; else high = middle; }
-  if (low - 1 !== currentMessage) {
-    currentMessage = low - 1;
+  const newest = countFirst(listedMessages, ([sent]) => sent <= shown.time + 1e-6) - 1;
+  if (newest !== currentMessage) {
+    currentMessage = newest;
     messageList.scrollTop = Math.max(0, (currentMessage + 1.5) * rowHeight() - messageList.clientHeight / 2);
   }
   drawMessageRows();

@@ -15,12 +15,15 @@ function cameraOf(view, [x, y, yaw], size) {
   const { back, up, ahead, side, field } = VIEWS[view], dx = Math.cos(yaw), dy = Math.sin(yaw);
   const height = up === null ? Math.max(1.25, 0.8 * size[2]) : up;
   const eye = [x - back * dx - side * dy, y - back * dy + side * dx, height];
-  const look = [x + ahead * dx - eye[0], y + ahead * dy - eye[1], (up === null ? height - 1.2 : 0.5) - eye[2]];
-  const long = Math.hypot(...look), forward = look.map((value) => value / long);
-  const level = Math.hypot(forward[0], forward[1]);
-  const right = [forward[1] / level, -forward[0] / level, 0];
-  const upward = [right[1] * forward[2], -right[0] * forward[2], right[0] * forward[1] - right[1] * forward[0]];
-  return { eye, right, up: upward, forward, field };
+  return cameraTo(eye, [x + ahead * dx, y + ahead * dy, up === null ? height - 1.2 : 0.5], field);
+}
+
+/* Return a camera at `eye` towards `look` with its horizontal field of view [degrees]. */
+function cameraTo(eye, look, field) {
+  const away = look.map((value, axis) => value - eye[axis]), long = Math.hypot(...away), forward = away.map((value) => value / long);
+  const level = Math.max(Math.hypot(forward[0], forward[1]), 1e-6), right = [forward[1] / level, -forward[0] / level, 0];
+  const up = [right[1] * forward[2], -right[0] * forward[2], right[0] * forward[1] - right[1] * forward[0]];
+  return { eye, right, up, forward, field };
 }
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -47,6 +50,20 @@ function clipped(points, closed) {
   return kept;
 }
 
+/* Return the functions that map camera coordinates to the canvas, and that trace the visible part of a line or polygon;
+   the latter returns false without one. */
+function projectionOf(camera, focal, area) {
+  const flat = ([x, y, z]) => [area.width / 2 + focal * x / z, area.height / 2 - focal * y / z];
+  const polygon = (points, closed) => {
+    const visible = clipped(points.map((point) => seen(camera, point)), closed);
+    if (visible.length < 2) return false;
+    trace(visible.map(flat));
+    if (closed) pen.closePath();
+    return true;
+  };
+  return { flat, polygon };
+}
+
 /* Return the corners (8) of a box on the ground of height `base`: the bottom, then the top. */
 function corners(x, y, length, width, yaw, height, base = 0) {
   const cos = Math.cos(yaw), sin = Math.sin(yaw), found = [];
@@ -65,7 +82,7 @@ function drawPerspective() {
   if (!own || !needsStation(shown.view)) { drawTop(); return; }
   const area = prepare(), camera = cameraOf(shown.view, own, data.actors[shown.station].size);
   const focal = area.width / 2 / Math.tan(camera.field * Math.PI / 360);
-  const flat = ([x, y, z]) => [area.width / 2 + focal * x / z, area.height / 2 - focal * y / z];
+  const { polygon } = projectionOf(camera, focal, area);
   const horizon = area.height / 2 + focal * camera.forward[2] / Math.max(Math.hypot(camera.forward[0], camera.forward[1]), 1e-3);
   const sky = pen.createLinearGradient(0, 0, 0, Math.max(horizon, 1));
   sky.addColorStop(0, "#8fb7e3"); sky.addColorStop(1, "#e6eef6");
@@ -73,13 +90,6 @@ function drawPerspective() {
   pen.fillStyle = "#dfe5d6"; pen.fillRect(0, horizon, area.width, area.height - horizon);
   const near = ({ area: [left, bottom, right, top] }) => Math.hypot(
     Math.max(left - camera.eye[0], 0, camera.eye[0] - right), Math.max(bottom - camera.eye[1], 0, camera.eye[1] - top)) < FAR_AWAY;
-  const polygon = (points, closed) => {
-    const visible = clipped(points.map((point) => seen(camera, point)), closed);
-    if (visible.length < 2) return false;
-    trace(visible.map(flat));
-    if (closed) pen.closePath();
-    return true;
-  };
   for (const { lanes, lines } of levels) {
     for (const lane of lanes) if (near(lane) && polygon(lane.points, true)) { pen.fillStyle = lane.color; pen.fill(); }
     for (const line of lines) if (near(line)) drawMark(line, camera, polygon);
@@ -89,9 +99,18 @@ function drawPerspective() {
     pen.fillStyle = part("braking") ? C.braking : C.plan; pen.globalAlpha = 0.55; pen.fill(); pen.globalAlpha = 1;
   }
   drawBodies(camera, polygon, near);
-  for (const { box, color, kind } of perceivedBoxes()) drawWire(box, color, kind, camera, flat);
-  for (const { sender, receiver, state } of shown.layers.messages ? messagesNow() : []) drawLink(sender, receiver, state, polygon);
-  if (shown.layers.labels) drawNames(camera, flat, area);
+  drawOver(camera, focal, area);
+}
+
+/* Draw perceived boxes, messages and names over the picture.
+
+   baseOf   height of the bottom of an actor [m]
+   floorOf  height of the ground below a box [m] */
+function drawOver(camera, focal, area, baseOf = () => 0, floorOf = () => 0) {
+  const { flat, polygon } = projectionOf(camera, focal, area);
+  for (const { box, color, kind } of perceivedBoxes()) drawWire(box, color, kind, camera, flat, floorOf(box));
+  for (const { sender, receiver, state } of shown.layers.messages ? messagesNow() : []) drawLink(sender, receiver, state, polygon, baseOf);
+  if (shown.layers.labels) drawNames(camera, flat, area, baseOf);
 }
 
 /* Draw a road mark as a strip, with 3 m strokes if it is broken. */
@@ -149,7 +168,7 @@ function drawBodies(camera, polygon, near) {
   }
 }
 
-function drawWire([x, y, length, width, yaw, height, existence], color, kind, camera, flat, base = 0) {
+function drawWire([x, y, length, width, yaw, height, existence], color, kind, camera, flat, base) {
   const dx = camera.eye[0] - x, dy = camera.eye[1] - y, cos = Math.cos(yaw), sin = Math.sin(yaw);
   if (Math.abs(cos * dx + sin * dy) < length / 2 && Math.abs(cos * dy - sin * dx) < width / 2) return;  // around the eye
   const points = corners(x, y, length, width, yaw, height, base).map((point) => seen(camera, point));
@@ -164,7 +183,7 @@ function drawWire([x, y, length, width, yaw, height, existence], color, kind, ca
   pen.setLineDash([]);
 }
 
-function drawLink(sender, receiver, state, polygon, baseOf = () => 0) {
+function drawLink(sender, receiver, state, polygon, baseOf) {
   const ends = [sender, receiver].map((name) => [poseOf(name), name]);
   if (!ends.every(([pose]) => pose)) return;
   const line = ends.map(([pose, name]) => [pose[0], pose[1], baseOf(name) + Math.max(data.actors[name].size[2], 1.5)]);
@@ -175,7 +194,7 @@ function drawLink(sender, receiver, state, polygon, baseOf = () => 0) {
 }
 
 /* Write the names of the actors, near ones first, without those that would cover another one. */
-function drawNames(camera, flat, area, baseOf = () => 0) {
+function drawNames(camera, flat, area, baseOf) {
   pen.font = "600 12px system-ui, sans-serif"; pen.textBaseline = "bottom";
   const taken = [];
   const points = names.filter((name) => name !== shown.station && shown.layers.truth && poseOf(name))

@@ -100,15 +100,18 @@ function make(tag, text, parent, properties = {}) {
   return made;
 }
 
-/* Return the index of the last one of ascending times that is not after the time; 0 if all are. */
-function indexAt(time, times = data.times) {
-  let low = 0, high = times.length - 1;
+/* Return the number of entries at the start of a list for which a function is true. */
+function countFirst(list, isBefore) {
+  let low = 0, high = list.length;
   while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (times[middle] <= time + 1e-6) low = middle; else high = middle - 1;
+    const middle = (low + high) >> 1;
+    if (isBefore(list[middle])) low = middle + 1; else high = middle;
   }
   return low;
 }
+
+/* Return the index of the last one of ascending times that is not after the time; 0 if all are. */
+const indexAt = (time, times = data.times) => Math.max(0, countFirst(times, (each) => each <= time + 1e-6) - 1);
 
 const indexOf = (run) => run === other ? shown.otherIndex : shown.index;
 const endOf = (run) => run.times[run.times.length - 1];
@@ -169,9 +172,7 @@ function sortMessages() {
 function messagesNow() {
   const { time, station } = shown, found = new Map();
   if (bySent.length < data.messages.length) sortMessages();
-  let low = 0, high = bySent.length;
-  while (low < high) { const middle = (low + high) >> 1; if (bySent[middle][0] < time - longest) low = middle + 1; else high = middle; }
-  for (let i = low; i < bySent.length && bySent[i][0] <= time + 1e-6; i += 1) {
+  for (let i = countFirst(bySent, ([sent]) => sent < time - longest); i < bySent.length && bySent[i][0] <= time + 1e-6; i += 1) {
     const [sent, sender, receiver, arrives, reason] = bySent[i];
     if (station && receiver !== station && sender !== station) continue;
     const end = arrives === null ? sent : arrives;

@@ -283,14 +283,6 @@ function addCameraViews() {
   }
 }
 
-/* Return a camera at `eye` towards `look` with its horizontal field of view [degrees]. */
-function cameraTo(eye, look, field) {
-  const away = look.map((value, axis) => value - eye[axis]), long = Math.hypot(...away), forward = away.map((value) => value / long);
-  const level = Math.max(Math.hypot(forward[0], forward[1]), 1e-6), right = [forward[1] / level, -forward[0] / level, 0];
-  const up = [right[1] * forward[2], -right[0] * forward[2], right[0] * forward[1] - right[1] * forward[0]];
-  return { eye, right, up, forward, field };
-}
-
 const limit = (value, least, most) => Math.min(most, Math.max(least, value));
 
 /* Return the camera of the shown view; null if its actor is absent. */
@@ -428,23 +420,9 @@ function drawSpace() {
   lightUp(focusOf(camera));
   renderer.render(scene, lens);
   pen.drawImage(renderer.domElement, 0, 0, area.width, area.height);
-  drawOver(camera, focal, area);
-  return true;
-}
-
-/* Draw perceived boxes, messages and names over the picture. */
-function drawOver(camera, focal, area) {
-  const flat = ([x, y, z]) => [area.width / 2 + focal * x / z, area.height / 2 - focal * y / z];
-  const polygon = (points, closed) => {
-    const visible = clipped(points.map((point) => seen(camera, point)), closed);
-    if (visible.length < 2) return false;
-    trace(visible.map(flat));
-    return true;
-  };
   const near = shown.station && poseOf(shown.station) ? baseOf(shown.station) : 0;
-  for (const { box, color, kind } of perceivedBoxes()) drawWire(box, color, kind, camera, flat, groundAt(box[0], box[1], near));
-  for (const { sender, receiver, state } of shown.layers.messages ? messagesNow() : []) drawLink(sender, receiver, state, polygon, baseOf);
-  if (shown.layers.labels) drawNames(camera, flat, area, baseOf);
+  drawOver(camera, focal, area, baseOf, ([x, y]) => groundAt(x, y, near));
+  return true;
 }
 
 function draw() {
