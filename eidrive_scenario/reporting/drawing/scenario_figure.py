@@ -1,4 +1,4 @@
-"""Figures of scenarios before their run, and of road files."""
+"""Figure of a scenario before its run, or of a road file."""
 
 from __future__ import annotations
 
@@ -25,44 +25,30 @@ def is_road_file(source: str | Path) -> bool:
 
 
 def source_figure(path: Path, size: Size, station: str | None = None) -> Figure:
-    """Return the picture of a road file, or of a scenario before its run; see the functions below.
+    """Return the picture of a scenario before its run, or of a road file.
 
-    Raise SettingError for a station of a road file.
+    size     width and height [mm]
+    station  whose shadow is drawn; by default the first that drives, else the first
+
+    Raise InputError for a file that is invalid, too large or cannot be run, SettingError for a station of a road file.
     """
     if not is_road_file(path):
-        return scenario_figure(path, size, station)
+        with Simulation(path, load_weights=False) as simulation:
+            picture = ScenarioPicture.of(simulation, station)
+        roads = network_drawing(simulation.roads)
+        labels = RoadLabels(simulation.roads) if simulation.roads is not None else None
+        return scene_figure(lambda canvas: picture.draw(canvas, roads, labels), picture.section, size)
     if station is not None:
         raise SettingError(
             Diagnostic(f"a road file has no station (got {quoted(station)})", "give a scenario", str(path))
         )
-    return roads_figure(path, size)
-
-
-def scenario_figure(path: Path, size: Size, station: str | None = None) -> Figure:
-    """Return the picture of a scenario before its run. Raise InputError if it cannot be run.
-
-    size     width and height [mm]
-    station  whose shadow is drawn; by default the first that drives, else the first
-    """
-    simulation = Simulation(path, load_weights=False)
-    try:
-        picture = ScenarioPicture.of(simulation, station)
-    finally:
-        simulation.close()
-    roads = network_drawing(simulation.roads)
-    labels = RoadLabels(simulation.roads) if simulation.roads is not None else None
-    return scene_figure(lambda canvas: picture.draw(canvas, roads, labels), picture.section, size)
-
-
-def roads_figure(path: Path, size: Size) -> Figure:
-    """Return the picture of a road file. Raise InputError if it is invalid or too large."""
     network = RoadNetwork.load(path)
-    drawing, labels = network_drawing(network), RoadLabels(network)
+    drawing, road_labels = network_drawing(network), RoadLabels(network)
     left, bottom, right, top = network.bounds()
 
     def draw(canvas: Canvas) -> None:
         canvas.roads(drawing)
-        labels.draw(canvas)
-        labels.write(canvas, ())
+        road_labels.draw(canvas)
+        road_labels.write(canvas)
 
     return scene_figure(draw, lambda ratio: Window.enclosing([(left, bottom), (right, top)]).widened(ratio, 20.0), size)

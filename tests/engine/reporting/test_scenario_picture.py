@@ -14,7 +14,7 @@ from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
 from eidrive_scenario.extensions.library import library_path
-from eidrive_scenario.reporting.drawing.scenario_figure import roads_figure, scenario_figure
+from eidrive_scenario.reporting.drawing.scenario_figure import source_figure
 from eidrive_scenario.reporting.drawing.scenario_picture import POINT_HEIGHT, ScenarioPicture, sector_outline
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, write_figure
 from eidrive_scenario.simulation import Simulation
@@ -90,7 +90,7 @@ def test_unknown_station_is_refused(coop: Simulation) -> None:
 
 
 def test_figure_names_what_it_shows(tmp_path: Path) -> None:
-    write_figure(scenario_figure(COOP, DEFAULT_SIZE), tmp_path / "a.svg")
+    write_figure(source_figure(COOP, DEFAULT_SIZE), tmp_path / "a.svg")
     expected = {"Ego", "RSU", "Firetruck", "Incoming", "EgoHasArrived", "road 3", "-1", "2", "s=20"}
     expected |= {"not visible to Ego", "sensor range", "trigger zone", "route", "station", "actor", "conflict area"}
     assert expected <= texts(tmp_path / "a.svg")
@@ -134,12 +134,12 @@ def test_scenario_without_roads_and_actors_is_drawn(tmp_path: Path) -> None:
         "<CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions/></Init><StopTrigger/></Storyboard>"
         "</OpenSCENARIO>"
     )
-    write_figure(scenario_figure(empty, DEFAULT_SIZE), tmp_path / "a.svg")
+    write_figure(source_figure(empty, DEFAULT_SIZE), tmp_path / "a.svg")
     assert texts(tmp_path / "a.svg") == {"10 m", "x", "y"}
 
 
 def test_road_file_has_ids_and_marks(tmp_path: Path) -> None:
-    write_figure(roads_figure(library_path() / "roads" / "two_lane_road.xodr", (85.0, 60.0)), tmp_path / "a.svg")
+    write_figure(source_figure(library_path() / "roads" / "two_lane_road.xodr", (85.0, 60.0)), tmp_path / "a.svg")
     written = texts(tmp_path / "a.svg")
     assert {"road 1", "s=100", "reference line with s [m]"} <= written
     assert any(text.startswith("lanes ") for text in written), "the lanes are too narrow for their ids"
