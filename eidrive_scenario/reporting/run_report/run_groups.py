@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
 from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
@@ -84,10 +84,9 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     axes = _numeric_axes(runs)
     settings = [_comparable(run, axes) for run in runs]
     names = dict.fromkeys(name for of_run in settings for name in of_run)
-    differing = [name for name in names if len({of_run.get(name, "") for of_run in settings}) > 1]
-    points = [_point(run, axes) for run in runs]
+    values = {name: [of_run.get(name, "") for of_run in settings] for name in names}
     differing = [
-        name for name in differing if not _depends_on_axes([of_run.get(name, "") for of_run in settings], points)
+        name for name in names if len(set(values[name])) > 1 and not _depends_on_axes(values[name], runs, axes)
     ]
     grouped: dict[tuple[str, ...], list[ReportedRun]] = {}
     for run, of_run in zip(runs, settings, strict=True):
@@ -104,7 +103,7 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
                 **options,
                 **{
                     name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
-                    for name, value in zip(differing, values, strict=True)
+                    for name, value in zip(differing, of_group, strict=True)
                     if value not in _EMPTY and name not in _NAMES and name not in options
                 },
             },
@@ -112,24 +111,11 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
             tuple(members),
             axes,
         )
-        for ((channel, *values), members), options in zip(grouped.items(), chosen, strict=True)
+        for ((channel, *of_group), members), options in zip(grouped.items(), chosen, strict=True)
     ]
 
 
-class _Point(NamedTuple):
-    """Place of a run in its sweep: values of the axes with texts, number of the run and values of the other axes."""
-
-    sweep: str
-    texts: tuple[tuple[str, object], ...]
-    numbers: tuple[object, ...]
-
-
-def _point(run: ReportedRun, axes: Sequence[str]) -> _Point:
-    texts = tuple(sorted((name, value) for name, value in run.axes.items() if name not in axes))
-    return _Point(run.sweep, texts, (run.run, *(run.axes.get(name) for name in axes)))
-
-
-def _depends_on_axes(values: Sequence[str], points: Sequence[_Point]) -> bool:
+def _depends_on_axes(values: Sequence[str], runs: Sequence[ReportedRun], axes: Sequence[str]) -> bool:
     """Whether the values of a setting follow from the axes with numbers, or from the number of the run.
 
     Examples are a parameter that is an expression of another one, and a property with the value `$name`. The values
@@ -137,10 +123,12 @@ def _depends_on_axes(values: Sequence[str], points: Sequence[_Point]) -> bool:
     """
     at_point: dict[object, str] = {}
     in_sweep: dict[object, set[str]] = {}
-    for (sweep, texts, numbers), value in zip(points, values, strict=True):
+    for run, value in zip(runs, values, strict=True):
+        texts = tuple(sorted((name, text) for name, text in run.axes.items() if name not in axes))
+        numbers = run.run, *(run.axes.get(name) for name in axes)
         if at_point.setdefault((texts, numbers), value) != value:
             return False
-        in_sweep.setdefault((sweep, texts), set()).add(value)
+        in_sweep.setdefault((run.sweep, texts), set()).add(value)
     return any(len(distinct) > 1 for distinct in in_sweep.values())
 
 
