@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 from eidrive_scenario.reporting.run_report.reported_runs import OUTCOMES, ReportedCriterion, ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
@@ -55,9 +56,9 @@ def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
     entries.sort(key=lambda entry: OUTCOMES.index(entry[0].outcome))
     runs = [run for run, _ in entries]
     numbers = [number for _, number in entries]
-    texts = _Numbered()
+    texts = _numbers()
     titles = metric_titles(runs)
-    kinds, metric_sets, setting_sets = _Numbered(), _Numbered(), _Numbered()
+    kinds, metric_sets, setting_sets = _numbers(), _numbers(), _numbers()
     base: list[list[str]] = []
     metrics: list[list[Any]] = []
     settings: list[list[int]] = []
@@ -80,36 +81,32 @@ def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
         "groups": numbers,
         "groupNames": [" · ".join([group.scenario, group.channel, *_settings_of(group)]) for group in groups],
         "criteria": [[_verdict(criterion, kinds, texts) for criterion in run.criteria] for run in runs],
-        "kinds": [[name, _rounded(limit), unit] for name, limit, unit in kinds.values],
+        "kinds": [[name, _rounded(limit), unit] for name, limit, unit in kinds],
         "metrics": metrics,
-        "metricSets": metric_sets.values,
+        "metricSets": list(metric_sets),
         "settings": settings,
         "settingSets": [
             {"paths": paths, "values": [texts[value] for value in values]}
-            for paths, values in zip(setting_sets.values, base, strict=True)
+            for paths, values in zip(setting_sets, base, strict=True)
         ],
         "warnings": [[texts[warning] for warning in run.warnings] for run in runs],
         "commands": [texts[run.command] for run in runs],
         "replays": [texts[run.replay] for run in runs],
-        "texts": texts.values,
+        "texts": list(texts),
     }
 
 
-class _Numbered:
-    """Values that get a number each, in the order of their first use."""
-
-    def __init__(self) -> None:
-        self._numbers: dict[Any, int] = {}
-
-    def __getitem__(self, value: Any) -> int:
-        return self._numbers.setdefault(value, len(self._numbers))
-
-    @property
-    def values(self) -> list[Any]:
-        return list(self._numbers)
+Numbers: TypeAlias = defaultdict[Any, int]
+"""Values that get a number each, in the order of their first use."""
 
 
-def _verdict(criterion: ReportedCriterion, kinds: _Numbered, texts: _Numbered) -> list[Any]:
+def _numbers() -> Numbers:
+    numbers: Numbers = defaultdict(int)
+    numbers.default_factory = numbers.__len__
+    return numbers
+
+
+def _verdict(criterion: ReportedCriterion, kinds: Numbers, texts: Numbers) -> list[Any]:
     """Return kind (name, limit, unit), whether the criterion passed, value, reason, and the lines of the state at its
     first violation."""
     reason = criterion.reason if criterion.passed else failure_reason(criterion)
@@ -118,7 +115,7 @@ def _verdict(criterion: ReportedCriterion, kinds: _Numbered, texts: _Numbered) -
     return [kind, int(criterion.passed), _rounded(criterion.value), texts[reason], *state]
 
 
-def _columns(groups: Sequence[RunGroup], runs: Sequence[ReportedRun], texts: _Numbered) -> list[dict[str, Any]]:
+def _columns(groups: Sequence[RunGroup], runs: Sequence[ReportedRun], texts: Numbers) -> list[dict[str, Any]]:
     """Return the columns that identify a run: scenario, channel, what differs between and within groups, seed.
 
     Those of groups have a value per group. The page makes columns of other settings from the settings of the runs.
@@ -148,7 +145,7 @@ def _length(value: object) -> int:
 
 
 def _column(
-    title: str, values: Sequence[int | float | str | None], texts: _Numbered, *, is_shown: bool | None = None
+    title: str, values: Sequence[int | float | str | None], texts: Numbers, *, is_shown: bool | None = None
 ) -> dict[str, Any]:
     """Return a column, shown by default if its values differ."""
     is_number = all(value is None or _is_number(value) for value in values)
