@@ -15,9 +15,6 @@ TTC_LIMIT = 10.0
 """Maximum time to collision in the charts [s]."""
 FAR = 100.0
 """Maximum gap in the charts [m]."""
-_BY_SENDER = ("age", "expired")
-"""Columns with a value for each sender."""
-
 Values = dict[str, Any]
 
 
@@ -36,12 +33,13 @@ class SeriesBuilder:
 
     def __init__(self) -> None:
         self._frames = 0
-        self._columns: dict[str, dict[str, Any]] = {}
+        self._columns: dict[str, dict[tuple[str, str], list[Any]]] = {}
+        """Columns by station, and by their name with the sender, "" for those of the station itself."""
         self._generated: dict[str, dict[str, float]] = {}
         """Time of generation of the newest message by receiver and sender [s]."""
         self._expired: dict[str, dict[str, int]] = {}
         """Number of messages that were too old on arrival, by receiver and sender."""
-        self._pending: dict[str, Values] = {}
+        self._pending: dict[str, dict[tuple[str, str], Any]] = {}
         self._driven = False
         self._contact: tuple[float, str] | None = None
         self._least = (math.inf, 0.0, "")
@@ -63,18 +61,17 @@ class SeriesBuilder:
             for row in step.expired:
                 sender = step.inbox[row].message.sender
                 expired[sender] = expired.get(sender, 0) + 1
-            ages = {sender: _rounded(now - generated, 3) for sender, generated in newest.items()}
-            self._pending[name] = {"age": ages, "expired": dict(expired)}
+            values = self._pending[name] = {}
             if name in driven:
                 attached = frame.attached(name)
                 gap, other = nearest_body(view, name, attached)
                 self._note_gap(gap, now, f"{name} and {other}")
                 ttc = min_time_to_collision(view, name, TTC_LIMIT, attached) if is_finite else math.inf
-                self._pending[name] |= {
-                    "speed": _rounded(float(view.speed[view.row(name)]), 2),
-                    "gap": _rounded(gap, 2) if gap <= FAR else None,
-                    "ttc": _rounded(ttc, 2),
-                }
+                values["speed", ""] = _rounded(float(view.speed[view.row(name)]), 2)
+                values["gap", ""] = _rounded(gap, 2) if gap <= FAR else None
+                values["ttc", ""] = _rounded(ttc, 2)
+            values |= {("age", sender): _rounded(now - generated, 3) for sender, generated in newest.items()}
+            values |= {("expired", sender): number for sender, number in expired.items()}
 
     @property
     def width(self) -> int:
@@ -84,23 +81,22 @@ class SeriesBuilder:
     def keep(self) -> None:
         """Add the values of the last frame."""
         for name, values in self._pending.items():
-            columns = self._columns.setdefault(name, {"speed": [], "gap": [], "ttc": [], "age": {}, "expired": {}})
-            for key in ("speed", "gap", "ttc"):
-                _pad(columns[key], self._frames).append(values.get(key))
-            for key in _BY_SENDER:
-                for sender, value in values[key].items():
-                    _pad(columns[key].setdefault(sender, []), self._frames).append(value)
+            columns = self._columns.setdefault(name, {})
+            for key, value in values.items():
+                _pad(columns.setdefault(key, []), self._frames).append(value)
         self._frames += 1
 
     def take(self) -> dict[str, Values]:
         """Return the columns by station since the last call, without those that have no value."""
         series: dict[str, Values] = {}
         for name, columns in self._columns.items():
-            lists = {key: _pad(columns[key], self._frames) for key in ("speed", "gap", "ttc")}
-            series[name] = {key: values for key, values in lists.items() if any(value is not None for value in values)}
-            for key in _BY_SENDER:
-                if columns[key]:
-                    series[name][key] = {sender: _pad(values, self._frames) for sender, values in columns[key].items()}
+            of_station = series[name] = {}
+            for (key, sender), values in columns.items():
+                _pad(values, self._frames)
+                if sender:
+                    of_station.setdefault(key, {})[sender] = values
+                elif any(value is not None for value in values):
+                    of_station[key] = values
         self._columns, self._frames = {}, 0
         return series
 
