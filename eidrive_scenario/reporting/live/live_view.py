@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from numbers import Real
 from subprocess import DEVNULL
 from typing import TYPE_CHECKING, Any, Self
@@ -49,12 +50,10 @@ def open_in_browser(address: str) -> None:
     browser. A browser for terminals ends, as it has no terminal. The variable BROWSER selects another program.
     """
     if sys.executable:
-        threading.Thread(target=_open, args=(address,), name="eidrive browser", daemon=True).start()
-
-
-def _open(address: str) -> None:
-    command = [sys.executable, "-I", "-m", "webbrowser", address]
-    subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True, check=False)
+        command = [sys.executable, "-I", "-m", "webbrowser", address]
+        streams = {"stdin": DEVNULL, "stdout": DEVNULL, "stderr": DEVNULL}
+        run = partial(subprocess.run, command, start_new_session=True, check=False, **streams)
+        threading.Thread(target=run, name="eidrive browser", daemon=True).start()
 
 
 _MAX_LAG = 0.25

@@ -174,16 +174,14 @@ def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[s
 
 def _roads(roads: RoadDrawing) -> dict[str, Any]:
     return {
-        "levels": [_level(level) for level in roads.levels],
+        "levels": [
+            {
+                "lanes": [[kind, polygon.round(2).tolist()] for kind, polygon in level.lanes],
+                "lines": [[is_broken(kind), color, line.round(2).tolist()] for kind, color, line in level.markings],
+            }
+            for level in roads.levels
+        ],
         "houses": [[round(height, 2), outline.round(2).tolist()] for outline, height in roads.houses],
-    }
-
-
-def _level(roads: RoadDrawing) -> dict[str, Any]:
-    """Return lanes and road marks of one level."""
-    return {
-        "lanes": [[kind, polygon.round(2).tolist()] for kind, polygon in roads.lanes],
-        "lines": [[is_broken(kind), color, line.round(2).tolist()] for kind, color, line in roads.markings],
     }
 
 
