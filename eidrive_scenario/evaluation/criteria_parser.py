@@ -15,6 +15,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import chain, count
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
@@ -225,7 +226,8 @@ def build_criteria(declarations: Iterable[CriterionDeclaration], taken: Collecti
     criteria = []
     for declaration in declarations:
         criterion = declaration.build()
-        criterion.name = _free_name(criterion.name, names)
+        numbered = (f"{criterion.name}_{number}" for number in count(2))
+        criterion.name = next(name for name in chain([criterion.name], numbered) if name not in names)
         names.add(criterion.name)
         criteria.append(criterion)
     return criteria
@@ -296,14 +298,6 @@ def _check_context(criterion: Criterion, context: CriteriaContext, source: str, 
         message = f"criterion {name!r} evaluates a route, and the scenario requests none"
         hint = "add an AssignRouteAction or an AcquirePositionAction, or give the points of the setting 'route'"
         raise SettingError(Diagnostic(message, hint, source, line))
-
-
-def _free_name(name: str, taken: Collection[str]) -> str:
-    number, free = 1, name
-    while free in taken:
-        number += 1
-        free = f"{name}_{number}"
-    return free
 
 
 def exit_verdict(command: CustomCommand, time: float) -> Verdict:

@@ -121,7 +121,10 @@ class JobQueue:
         """
         group = self._of_worker.get(worker)
         if group not in self._waiting:
-            group = self._untouched.popleft() if self._untouched else self._largest()
+            if self._untouched:
+                group = self._untouched.popleft()
+            else:
+                group = max(self._waiting, key=lambda group: len(self._waiting[group]), default=None)
         if group is None:
             return None
         self._of_worker[worker] = group
@@ -130,9 +133,6 @@ class JobQueue:
         if not indices:
             del self._waiting[group]
         return index
-
-    def _largest(self) -> tuple[str, int] | None:
-        return max(self._waiting, key=lambda group: len(self._waiting[group]), default=None)
 
 
 def _in_processes(jobs: Sequence[J], task: Callable[[J], T], workers: int, end: Callable[[T], T]) -> tuple[T, ...]:

@@ -142,9 +142,14 @@ def _record(
     images.watch(simulation.stack)
     simulation.add_observer(images)
     scenario, resolved = simulation.scenario, simulation.resolved
-    given = _given_settings(scenario, resolved.seed, resolved.run, settings)
+    # Settings of the caller as texts, without those that use the value of the file
+    given = {option.name: option.form.recorded(getattr(settings, option.name)) for option in OPTIONS}
+    given["run"] = None if resolved.run is None else str(resolved.run)
     metadata = {
-        **given,
+        "scenario": scenario.name,
+        "seed": str(resolved.seed),
+        **{name: text for name, text in given.items() if text is not None},
+        "parameters": json.dumps(scenario.parameters),
         "settings": resolved.canonical,
         "command": command,
         **scenario_metadata(scenario),
@@ -194,11 +199,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _given_settings(scenario: Scenario, seed: int, run: int | None, settings: RunSettings) -> dict[str, str]:
-    """Return the settings of the caller as texts, without settings that use the value of the file."""
-    given = {option.name: option.form.recorded(getattr(settings, option.name)) for option in OPTIONS}
-    given |= {"run": None if run is None else str(run), "parameters": json.dumps(scenario.parameters)}
-    texts = {name: text for name, text in given.items() if text is not None}
-    return {"scenario": scenario.name, "seed": str(seed), **texts}

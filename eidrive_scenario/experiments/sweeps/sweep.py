@@ -151,7 +151,12 @@ def run_sweep(
 
     def end(future: Future[StoredRun]) -> None:
         job, tries = running.pop(future)
-        error = _error_of(future)
+        if future.cancelled():
+            raise SimulationError(
+                "the scheduler of the workers has ended; the results of all earlier runs are stored, and the same "
+                "command continues"
+            )
+        error = future.exception()
         if error is None:
             writer.add(future.result())
         elif isinstance(error, HungRunError):
@@ -191,13 +196,3 @@ def run_sweep(
             raise
     shown(progress, None)
     return progress
-
-
-def _error_of(future: Future[StoredRun]) -> BaseException | None:
-    """Return the exception of an ended call, or None. Raise SimulationError if its scheduler has cancelled it."""
-    if future.cancelled():
-        raise SimulationError(
-            "the scheduler of the workers has ended; the results of all earlier runs are stored, and the same command "
-            "continues"
-        )
-    return future.exception()
