@@ -16,6 +16,16 @@ from eidrive_scenario.world.view import WorldView
 
 SPACING = 1.0
 """Distance of the sample points of a lane along the reference line [m]."""
+RANGE = 200.0
+"""Maximum distance of the actors that are considered [m]."""
+STEP = 5
+"""Number of sample points of a lane per point to which actors are compared."""
+BESIDE = 15.0
+"""Distance from the sample points of the lane within which actors are placed on their lanes [m]."""
+CLOSE = 10.0
+"""Distance between bodies up to which straight coordinates apply to actors beside the lane [m]."""
+STANDING = 0.1
+"""Maximum speed of a standing actor [m/s]. Its heading is irrelevant for the role of a leader."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +70,125 @@ class LaneChain:
         return float(np.interp(along, self.along, self.distances))
 
 
-class LaneChains:
-    """Chains of lanes of a road network, of about `reach` meters beyond the first road, computed when needed."""
+class _Body(NamedTuple):
+    """Extent and velocity of a body in a frame: position, half extents [m], velocity [m/s]."""
 
-    def __init__(self, roads: RoadNetwork, reach: float) -> None:
+    along: float
+    left: float
+    half_along: float
+    half_left: float
+    speed: float
+    side_speed: float
+
+
+class Relation(NamedTuple):
+    """Another actor in the coordinates of the lane of an actor: longitudinal forward, lateral to the left.
+
+    gap         longitudinal distance between the bodies [m]; 0 if they overlap longitudinally
+    ahead       longitudinal distance of the center of the other body [m], negative behind
+    side_gap    lateral distance between the bodies [m]; 0 if they overlap laterally
+    left        lateral distance of the center of the other body [m], negative to the right
+    speed, other_speed              along the lane [m/s], both positive in the direction of the actor
+    side_speed, other_side_speed    to the left [m/s]
+    wrong_way   whether the actor drives against the direction of its lane
+    """
+
+    other: str
+    gap: float
+    ahead: float
+    side_gap: float
+    left: float
+    speed: float
+    other_speed: float
+    side_speed: float
+    other_side_speed: float
+    wrong_way: bool = False
+
+    @property
+    def crosses(self) -> bool:
+        """Whether the other actor moves across the lane rather than along it."""
+        return abs(self.other_side_speed) > max(abs(self.other_speed), STANDING)
+
+    @property
+    def leads(self) -> bool:
+        """Whether the other actor is ahead in the path of the actor and neither approaches it nor crosses the path."""
+        return self.ahead > 0.0 and self.side_gap == 0.0 and self.other_speed > -STANDING and not self.crosses
+
+    @property
+    def closing_speed(self) -> float:
+        """Speed at which the gap to an actor ahead shrinks [m/s]."""
+        return self.speed - self.other_speed
+
+
+class LaneCoordinates:
+    """Actors in the coordinates of the lane of one of them.
+
+    Chains of lanes reach about RANGE beyond the first road. They are computed when needed.
+    """
+
+    def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads
-        self._reach = reach
+        self._hints: dict[str, LaneLocation | None] = {}
+        """Last location of each actor."""
         self._chains: dict[tuple[LaneKey, int], LaneChain] = {}
 
-    def chain(self, location: LaneLocation, direction: int) -> LaneChain:
+    def own_lane(self, view: WorldView, row: int) -> tuple[LaneLocation, int] | None:
+        """Return the location of an actor on its lane and its direction in s; None off the road."""
+        location, yaw = self._locate(view, row), view.plain_boxes[row][6]
+        if location is None or not self._roads.on_road(location):
+            return None
+        heading = self._roads.road_pose_at(location.road, location.s).h
+        return location, 1 if math.cos(yaw - heading) >= 0.0 else -1
+
+    def in_reach(self, view: WorldView, row: int, near: list[int], location: LaneLocation, direction: int) -> list[int]:
+        """Return the actors beside the lane and those in the straight path; the others are ignored."""
+        chain = self._chain(location, direction)
+        begun = chain.roads[location.road].along(location.s)
+        first, last = np.searchsorted(chain.along, (begun - 2.0 * BESIDE, begun + RANGE + SPACING)).tolist()
+        boxes = view.boxes[near]
+        offset = boxes[:, None, :2] - chain.points[first:last:STEP]
+        beside = (np.square(offset).sum(axis=-1) <= BESIDE * BESIDE).any(axis=1)
+        own = view.plain_boxes[row]
+        left = (boxes[:, 1] - own[1]) * math.cos(own[6]) - (boxes[:, 0] - own[0]) * math.sin(own[6])
+        straight = np.abs(left) <= (np.hypot(boxes[:, 3], boxes[:, 4]) + own[4]) / 2.0
+        return [near[index] for index in np.flatnonzero(beside | straight).tolist()]
+
+    def bodies(
+        self, view: WorldView, row: int, other: int, location: LaneLocation, direction: int
+    ) -> tuple[_Body, _Body] | None:
+        """Return both bodies in the coordinates of the lane; None if the road bends away before the other one."""
+        own, body = view.plain_boxes[row], view.plain_boxes[other]
+        there = self._locate(view, other)
+        chain = self._chain(location, direction)
+        begun = chain.roads[location.road].along(location.s)
+        road = None if there is None else chain.roads.get(there.road)
+        if there is None or road is None:
+            distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
+            bends_away = there is not None and CLOSE < distance < chain.length - begun
+            return None if bends_away else _straight(view, row, other)
+        along = chain.distance(road.along(there.s)) - chain.distance(begun)
+        left = (there.t - self._center(road, there.road, there.s)) * road.direction - location.offset * direction
+        return (
+            _body(view, row, 0.0, 0.0, self._heading(location, direction)),
+            _body(view, other, along, left, self._heading(there, road.direction)),
+        )
+
+    def is_wrong_way(self, location: LaneLocation, direction: int) -> bool:
+        """Return whether an actor drives against the direction of its lane."""
+        return self._roads.driving_direction(location.road, location.lane) != direction
+
+    def _locate(self, view: WorldView, row: int) -> LaneLocation | None:
+        name = view.names[row]
+        x, y, z, *_ = view.plain_boxes[row]
+        location = self._roads.locate_at(x, y, self._hints.get(name), z)
+        self._hints[name] = location
+        return location
+
+    def _heading(self, location: LaneLocation, direction: int) -> float:
+        heading = self._roads.road_pose_at(location.road, location.s).h
+        return heading if direction > 0 else heading + math.pi
+
+    def _chain(self, location: LaneLocation, direction: int) -> LaneChain:
         """Return the chain of the lane of an actor that moves in a direction of s."""
         road = self._roads.roads[location.road]
         key = LaneKey(location.road, road.section_at(location.s).index, location.lane)
@@ -77,7 +197,7 @@ class LaneChains:
             chain = self._chains[key, direction] = self._build(key, direction)
         return chain
 
-    def center(self, chain: RoadOfChain, number: str, s: float) -> float:
+    def _center(self, chain: RoadOfChain, number: str, s: float) -> float:
         """Return t of the center of the chain on one of its roads [m]; beyond its lanes that of the end of the last."""
         road = self._roads.roads[number]
         section = road.section_at(s)
@@ -96,7 +216,7 @@ class LaneChains:
             if behind is not None:
                 lanes[key.road][behind.section] = behind.lane
         length, way, last = first.length, direction, key
-        while length - first.length <= self._reach:
+        while length - first.length <= RANGE:
             following = self._next_section(last, way)
             if following is None:
                 ways = list(self._roads.links.beyond(last, way))
@@ -156,68 +276,6 @@ class LaneChains:
         return min(same, key=lambda lane: abs(lane - near))
 
 
-RANGE = 200.0
-"""Maximum distance of the actors that are considered [m]."""
-STEP = 5
-"""Number of sample points of a lane per point to which actors are compared."""
-BESIDE = 15.0
-"""Distance from the sample points of the lane within which actors are placed on their lanes [m]."""
-CLOSE = 10.0
-"""Distance between bodies up to which straight coordinates apply to actors beside the lane [m]."""
-STANDING = 0.1
-"""Maximum speed of a standing actor [m/s]. Its heading is irrelevant for the role of a leader."""
-
-
-class Relation(NamedTuple):
-    """Another actor in the coordinates of the lane of an actor: longitudinal forward, lateral to the left.
-
-    gap         longitudinal distance between the bodies [m]; 0 if they overlap longitudinally
-    ahead       longitudinal distance of the center of the other body [m], negative behind
-    side_gap    lateral distance between the bodies [m]; 0 if they overlap laterally
-    left        lateral distance of the center of the other body [m], negative to the right
-    speed, other_speed              along the lane [m/s], both positive in the direction of the actor
-    side_speed, other_side_speed    to the left [m/s]
-    wrong_way   whether the actor drives against the direction of its lane
-    """
-
-    other: str
-    gap: float
-    ahead: float
-    side_gap: float
-    left: float
-    speed: float
-    other_speed: float
-    side_speed: float
-    other_side_speed: float
-    wrong_way: bool = False
-
-    @property
-    def crosses(self) -> bool:
-        """Whether the other actor moves across the lane rather than along it."""
-        return abs(self.other_side_speed) > max(abs(self.other_speed), STANDING)
-
-    @property
-    def leads(self) -> bool:
-        """Whether the other actor is ahead in the path of the actor and neither approaches it nor crosses the path."""
-        return self.ahead > 0.0 and self.side_gap == 0.0 and self.other_speed > -STANDING and not self.crosses
-
-    @property
-    def closing_speed(self) -> float:
-        """Speed at which the gap to an actor ahead shrinks [m/s]."""
-        return self.speed - self.other_speed
-
-
-class _Body(NamedTuple):
-    """Extent and velocity of a body in a frame: position, half extents [m], velocity [m/s]."""
-
-    along: float
-    left: float
-    half_along: float
-    half_left: float
-    speed: float
-    side_speed: float
-
-
 class Surroundings:
     """Relations of one actor to the others.
 
@@ -227,9 +285,7 @@ class Surroundings:
     """
 
     def __init__(self, roads: RoadNetwork | None) -> None:
-        self._roads = roads
-        self._chains = None if roads is None else LaneChains(roads, RANGE)
-        self._hints: dict[str, LaneLocation | None] = {}
+        self._lanes = None if roads is None else LaneCoordinates(roads)
 
     def relations(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Iterator[Relation]:
         """Yield the relation to each other actor within RANGE, or to those named `to`; none if `of` is absent."""
@@ -249,110 +305,45 @@ class Surroundings:
         ]
         if not near:
             return
-        lane = self._own_lane(view, row)
-        if lane is not None:
-            near = self._in_reach(view, row, near, *lane)
-        for other in near:
-            relation = self._relation(view, row, other, lane)
-            if relation is not None:
-                yield relation
+        lanes = self._lanes
+        lane = None if lanes is None else lanes.own_lane(view, row)
+        if lanes is None or lane is None:
+            for other in near:
+                yield _relation(view.names[other], *_straight(view, row, other))
+            return
+        for other in lanes.in_reach(view, row, near, *lane):
+            bodies = lanes.bodies(view, row, other, *lane)
+            if bodies is not None:  # else the road bends away before it
+                yield _relation(view.names[other], *bodies, wrong_way=lanes.is_wrong_way(*lane))
 
     def leader(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Relation | None:
         """Return the nearest actor ahead in the path of an actor, or None. `to` restricts the candidates."""
         leaders = (relation for relation in self.relations(view, of, to) if relation.leads)
         return min(leaders, key=lambda leader: leader.gap, default=None)
 
-    def _in_reach(
-        self, view: WorldView, row: int, near: list[int], location: LaneLocation, direction: int
-    ) -> list[int]:
-        """Return the actors beside the lane and those in the straight path; the others are ignored."""
-        assert self._chains is not None
-        chain = self._chains.chain(location, direction)
-        begun = chain.roads[location.road].along(location.s)
-        first, last = np.searchsorted(chain.along, (begun - 2.0 * BESIDE, begun + RANGE + SPACING)).tolist()
-        boxes = view.boxes[near]
-        offset = boxes[:, None, :2] - chain.points[first:last:STEP]
-        beside = (np.square(offset).sum(axis=-1) <= BESIDE * BESIDE).any(axis=1)
-        own = view.plain_boxes[row]
-        left = (boxes[:, 1] - own[1]) * math.cos(own[6]) - (boxes[:, 0] - own[0]) * math.sin(own[6])
-        straight = np.abs(left) <= (np.hypot(boxes[:, 3], boxes[:, 4]) + own[4]) / 2.0
-        return [near[index] for index in np.flatnonzero(beside | straight).tolist()]
 
-    def _own_lane(self, view: WorldView, row: int) -> tuple[LaneLocation, int] | None:
-        """Return the location of an actor on its lane and its direction in s; None off the road."""
-        if self._roads is None:
-            return None
-        location, yaw = self._locate(view, row), view.plain_boxes[row][6]
-        if location is None or not self._roads.on_road(location):
-            return None
-        heading = self._roads.road_pose_at(location.road, location.s).h
-        return location, 1 if math.cos(yaw - heading) >= 0.0 else -1
+def _relation(name: str, a: _Body, b: _Body, *, wrong_way: bool = False) -> Relation:
+    """Return the relation of the first body to the second one, which has the name."""
+    ahead, left = b.along - a.along, b.left - a.left
+    return Relation(
+        other=name,
+        gap=max(abs(ahead) - a.half_along - b.half_along, 0.0),
+        ahead=ahead,
+        side_gap=max(abs(left) - a.half_left - b.half_left, 0.0),
+        left=left,
+        speed=a.speed,
+        other_speed=b.speed,
+        side_speed=a.side_speed,
+        other_side_speed=b.side_speed,
+        wrong_way=wrong_way,
+    )
 
-    def _relation(
-        self, view: WorldView, row: int, other: int, lane: tuple[LaneLocation, int] | None
-    ) -> Relation | None:
-        """Return the relation to another actor; None if the road bends away before it."""
-        bodies = self._straight(view, row, other) if lane is None else self._along_lane(view, row, other, *lane)
-        if bodies is None:
-            return None
-        a, b = bodies
-        ahead, left = b.along - a.along, b.left - a.left
-        return Relation(
-            other=view.names[other],
-            gap=max(abs(ahead) - a.half_along - b.half_along, 0.0),
-            ahead=ahead,
-            side_gap=max(abs(left) - a.half_left - b.half_left, 0.0),
-            left=left,
-            speed=a.speed,
-            other_speed=b.speed,
-            side_speed=a.side_speed,
-            other_side_speed=b.side_speed,
-            wrong_way=lane is not None and self._wrong_way(*lane),
-        )
 
-    def _wrong_way(self, location: LaneLocation, direction: int) -> bool:
-        assert self._roads is not None
-        return self._roads.driving_direction(location.road, location.lane) != direction
-
-    def _straight(self, view: WorldView, row: int, other: int) -> tuple[_Body, _Body]:
-        own, there = view.plain_boxes[row], view.plain_boxes[other]
-        dx, dy, yaw = there[0] - own[0], there[1] - own[1], own[6]
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        return _body(view, row, 0.0, 0.0, yaw), _body(view, other, cos * dx + sin * dy, cos * dy - sin * dx, yaw)
-
-    def _along_lane(
-        self, view: WorldView, row: int, other: int, location: LaneLocation, direction: int
-    ) -> tuple[_Body, _Body] | None:
-        """Return both bodies in the coordinates of the lane."""
-        assert self._chains is not None
-        own, body = view.plain_boxes[row], view.plain_boxes[other]
-        there = self._locate(view, other)
-        chain = self._chains.chain(location, direction)
-        begun = chain.roads[location.road].along(location.s)
-        road = None if there is None else chain.roads.get(there.road)
-        if there is None or road is None:
-            distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
-            bends_away = there is not None and CLOSE < distance < chain.length - begun
-            return None if bends_away else self._straight(view, row, other)
-        along = chain.distance(road.along(there.s)) - chain.distance(begun)
-        left = (there.t - self._chains.center(road, there.road, there.s)) * road.direction - location.offset * direction
-        return (
-            _body(view, row, 0.0, 0.0, self._heading(location, direction)),
-            _body(view, other, along, left, self._heading(there, road.direction)),
-        )
-
-    def _locate(self, view: WorldView, row: int) -> LaneLocation | None:
-        assert self._roads is not None
-        name = view.names[row]
-        x, y, z, *_ = view.plain_boxes[row]
-        location = self._roads.locate_at(x, y, self._hints.get(name), z)
-        self._hints[name] = location
-        return location
-
-    def _heading(self, location: LaneLocation, direction: int) -> float:
-        assert self._roads is not None
-        heading = self._roads.road_pose_at(location.road, location.s).h
-        return heading if direction > 0 else heading + math.pi
+def _straight(view: WorldView, row: int, other: int) -> tuple[_Body, _Body]:
+    own, there = view.plain_boxes[row], view.plain_boxes[other]
+    dx, dy, yaw = there[0] - own[0], there[1] - own[1], own[6]
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return _body(view, row, 0.0, 0.0, yaw), _body(view, other, cos * dx + sin * dy, cos * dy - sin * dx, yaw)
 
 
 def _body(view: WorldView, row: int, along: float, left: float, heading: float) -> _Body:
