@@ -3,6 +3,7 @@
 All names may change in a minor version.
 """
 
+from eidrive_scenario.experiments.reported_run import ReportedRun as ReportedRun
 from eidrive_scenario.reporting.drawing.canvas import Canvas as Canvas
 from eidrive_scenario.reporting.drawing.charts import ChartSeries as ChartSeries
 from eidrive_scenario.reporting.drawing.charts import heat_cells as heat_cells
@@ -20,7 +21,6 @@ from eidrive_scenario.reporting.page import png_address as png_address
 from eidrive_scenario.reporting.page import write_page as write_page
 from eidrive_scenario.reporting.replay.page import write_replays as write_replays
 from eidrive_scenario.reporting.run_report.report import write_run_report as write_run_report
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun as ReportedRun
 from eidrive_scenario.reporting.run_report.reported_runs import run_of_result as run_of_result
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder as SnapshotBuilder
 from eidrive_scenario.reporting.snapshot import StationSnapshot as StationSnapshot

@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.experiments.sweeps.store import is_store
 from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinished_runs
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, write_figure
 from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.rates import rate_figures
 from eidrive_scenario.reporting.run_report.report import write_run_report
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, read_runs, read_sweeps
+from eidrive_scenario.reporting.run_report.reported_runs import read_runs, read_sweeps
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 LONGEST_NAME = 200

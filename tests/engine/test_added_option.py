@@ -40,7 +40,7 @@ from typer.testing import CliRunner
 from eidrive_scenario.cli import app
 from eidrive_scenario.experiments.sweeps.axes import parse_axis, settings_at
 from eidrive_scenario.reporting.run_report.report import write_run_report
-from eidrive_scenario.reporting.run_report.reported_runs import parse_run
+from eidrive_scenario.experiments.reported_run import parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
 from eidrive_scenario.simulation import RunSettings, run_file
 

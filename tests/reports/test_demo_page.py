@@ -25,10 +25,10 @@ from eidrive_reports.paper import (
 from lxml import html
 
 from eidrive_scenario import reporting
+from eidrive_scenario.experiments.reported_run import parse_run
 from eidrive_scenario.experiments.statistics.intervals import wilson
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
-from eidrive_scenario.reporting.run_report.reported_runs import parse_run
 
 AREA = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
 

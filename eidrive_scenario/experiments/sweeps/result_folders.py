@@ -12,25 +12,16 @@ import msgspec
 
 from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.experiments.reported_run import parse_run
 from eidrive_scenario.experiments.sweeps.axes import PARAMETER, SETTINGS, Scalar, axis_identity, is_setting
 from eidrive_scenario.experiments.sweeps.store import ABORTED, FAILED, NOT_JUDGED, PASSED, StoredRun
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import RESULT, read_result, result_paths, unfinished_runs
 from eidrive_scenario.run_options import NO_COOPERATION, OPTIONS
 from eidrive_scenario.simulation.result import typed
-from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 SCENARIO = "scenario"
 """Name of the axis over the scenarios of a folder."""
-
-
-class _Verdict(msgspec.Struct):
-    """Verdict in the format of `--json`, as far as it is a part of a row."""
-
-    name: str
-    passed: bool
-    value: float | None = None
-    limit: float | None = None
 
 
 class _Settings(msgspec.Struct):
@@ -42,26 +33,6 @@ class _Settings(msgspec.Struct):
     parameters: dict[str, str] = {}
     drawn: tuple[str, ...] = ()
     varied: tuple[str, ...] = ()
-
-
-class _Result(msgspec.Struct):
-    """Result in the format of `--json`, as far as it is a part of a row."""
-
-    scenario: str
-    seed: int
-    passed: bool
-    end_reason: str
-    trace_hash: str
-    settings: dict[str, Any]
-    run: int | None = None
-    channel: str = ""
-    criteria: tuple[_Verdict, ...] = ()
-    metrics: dict[str, float | None] = {}
-    warnings: tuple[str, ...] = ()
-    simulated_s: float = 0.0
-    wall_s: float = 0.0
-    settings_sha256: str = ""
-    command: str = ""
 
 
 def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
@@ -109,14 +80,13 @@ def with_axes(runs: Iterable[StoredRun], axes: Mapping[str, str]) -> Iterator[St
 
 
 def _finished(path: Path, number: int) -> StoredRun:
+    result = parse_run(read_result(path), path)
     try:
-        result = msgspec.convert(read_result(path), _Result)
         point = _point(result.settings)
     except msgspec.ValidationError as error:
         raise InputError(
             Diagnostic(f"not the result of a run: {error}", f"give another {RESULT}", str(path))
         ) from error
-    is_judged = result.passed or result.criteria or result.end_reason == TIME_LIMIT
     verdicts = {
         f"{verdict.name}.{key}": getattr(verdict, key)
         for verdict in result.criteria
@@ -138,10 +108,10 @@ def _finished(path: Path, number: int) -> StoredRun:
         result.scenario,
         result.run,
         result.seed,
-        PASSED if result.passed else FAILED if is_judged else NOT_JUDGED,
+        PASSED if result.passed else FAILED if result.is_judged else NOT_JUDGED,
         point,
         row,
-        "" if is_judged else "no criterion judges the run",
+        "" if result.is_judged else "no criterion judges the run",
         result.command,
         result.wall_s,
         json.dumps(result.settings),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, quoted
 from eidrive_scenario.experiments.commands import command_of_source
+from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
 from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
@@ -34,7 +35,6 @@ from eidrive_scenario.reporting.replay.page import (
     station_settings,
     street_of,
 )
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts
 from eidrive_scenario.simulation.recorded_outcome import bodies
 from eidrive_scenario.simulation.result import RunResult

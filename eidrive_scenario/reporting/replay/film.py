@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from eidrive_scenario.base.installation import install_command
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording
@@ -27,7 +28,6 @@ from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size,
 from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
 from eidrive_scenario.reporting.replay.page import decisive_instant, drawn_roads, run_settings, station_settings
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 

@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
@@ -31,7 +32,7 @@ from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, Data, descr
 from eidrive_scenario.reporting.replay.light import LightChanges, parse_weather
 from eidrive_scenario.reporting.replay.models import ActorModels, street_models, three_library
 from eidrive_scenario.reporting.replay.series import closest_approach
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, run_of_recording
+from eidrive_scenario.reporting.run_report.reported_runs import run_of_recording
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.roads import RoadNetwork

@@ -10,6 +10,7 @@ from itertools import combinations, pairwise
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.experiments.statistics.intervals import Proportion, wilson
 from eidrive_scenario.reporting.drawing.charts import (
     ChartSeries,
@@ -20,7 +21,6 @@ from eidrive_scenario.reporting.drawing.charts import (
     rate_map_figure,
 )
 from eidrive_scenario.reporting.drawing.vector_canvas import Size
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 
 MOST_VALUES = 24

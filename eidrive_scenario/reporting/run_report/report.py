@@ -17,6 +17,7 @@ from typing import Any
 
 from eidrive_scenario.base.installation import ENGINE
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedRun, parse_run
 from eidrive_scenario.experiments.statistics.intervals import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.rates import (
@@ -26,7 +27,6 @@ from eidrive_scenario.reporting.run_report.rates import (
     scenario_matrix,
     success_rate,
 )
-from eidrive_scenario.reporting.run_report.reported_runs import OUTCOMES, ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup, group_runs
 from eidrive_scenario.reporting.run_report.run_table import (
     failure_reason,

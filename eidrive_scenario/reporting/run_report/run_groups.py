@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, flow_text, shorten
 from eidrive_scenario.run_options import OPTIONS
 

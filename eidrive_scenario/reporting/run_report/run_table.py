@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
-from eidrive_scenario.reporting.run_report.reported_runs import OUTCOMES, ReportedCriterion, ReportedRun
+from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedCriterion, ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 from eidrive_scenario.reporting.run_report.settings_text import flatten
 

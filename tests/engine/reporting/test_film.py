@@ -11,6 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
@@ -20,7 +21,6 @@ from eidrive_scenario.reporting.drawing.labels import label_places, overlaps, wr
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.reporting.replay import film
 from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder
 from eidrive_scenario.simulation import RunSettings, Simulation
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from report_table import listed_runs
 
+from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import open_recording
@@ -18,7 +19,7 @@ from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.reporting.replay.page import make_replay, write_replays
 from eidrive_scenario.reporting.run_report.rates import parameter_matrix, scenario_matrix
 from eidrive_scenario.reporting.run_report.report import write_run_report
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run, read_runs
+from eidrive_scenario.reporting.run_report.reported_runs import read_runs
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 Play = Callable[..., list[Frame]]

@@ -10,11 +10,11 @@ from lxml import html
 from report_table import listed_runs
 
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.reporting.run_report.report import write_run_report
-from eidrive_scenario.reporting.run_report.reported_runs import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 from eidrive_scenario.simulation import RunSettings
 

@@ -113,7 +113,7 @@ def test_interrupted_run_is_aborted(runs: Path) -> None:
     ("text", "message"),
     [
         ("{", "not JSON"),
-        ('{"trace_hash": ""}', "not the result of a run: Object missing required field `scenario`"),
+        ('{"trace_hash": ""}', "result: 'scenario': field required"),
         ('{"trace_hash": "", "scenario": "s", "seed": "x", "passed": true, "end_reason": "", "settings": {}}', "seed"),
     ],
 )
