@@ -241,20 +241,11 @@ def is_store(path: Path) -> bool:
 
 
 def _row(run: StoredRun) -> tuple[Any, ...]:
-    return (
-        run.key,
-        run.number,
-        run.scenario,
-        run.run,
-        run.seed,
-        run.status,
-        json.dumps(run.point),
-        json.dumps(run.result),
-        encodable(run.error),
-        encodable(run.command),
-        run.wall_s,
-        zlib.compress(encodable(run.settings).encode()),
-    )
+    columns = msgspec.structs.asdict(run)
+    columns |= {name: json.dumps(columns[name]) for name in ("point", "result")}
+    columns |= {name: encodable(columns[name]) for name in ("error", "command")}
+    columns["settings"] = zlib.compress(encodable(run.settings).encode())
+    return tuple(columns.values())
 
 
 def _stored_run(row: Sequence[Any], largest: int) -> StoredRun:

@@ -117,11 +117,7 @@ def line_chart(
     with rc_context(PAGE_STYLE):
         figure = Figure(figsize=(WIDTH, HEIGHT))
         axes = figure.add_axes((LEFT, BOTTOM, (RIGHT if named else WIDE) - LEFT, TOP - BOTTOM))
-        _set_ranges(axes, lines, x_range, y_range)
-        axes.set_xlabel(x_title)
-        axes.set_ylabel(y_title)
-        axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
-        ends = _draw_lines(axes, lines, points=points)
+        ends = _draw_lines(axes, lines, (x_title, y_title), (x_range, y_range), ticks=9, points=points)
         if named:
             _draw_names(axes, ends)
         return inline_svg(figure, f"{y_title} over {x_title}")
@@ -133,11 +129,7 @@ def rate_figure(
     """Return rates with their intervals as a figure of a size [mm], with a legend of several series below it."""
     with paper_style():
         figure, axes = _paper_axes(size)
-        _set_ranges(axes, lines, x_range, (0.0, 1.0))
-        axes.set_xlabel(x_title)
-        axes.set_ylabel(y_title)
-        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-        _draw_lines(axes, lines, points=True)
+        _draw_lines(axes, lines, (x_title, y_title), (x_range, (0.0, 1.0)), ticks=6, points=True)
         if len(lines) > 1:
             handles = [Line2D([], [], color=line.color, marker="o", ms=4.0) for line in lines]
             names = [line.name for line in lines]
@@ -153,19 +145,25 @@ def _paper_axes(size: Size) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _set_ranges(
+def _draw_lines(
     axes: Axes,
     lines: Sequence[ChartSeries],
-    x_range: tuple[float, float] | None,
-    y_range: tuple[float, float] | None,
-) -> None:
-    """Set the limits of the axes, which are those of the points by default."""
-    axes.set_xlim(x_range or _extent([value for line in lines for value in line.x]))
-    axes.set_ylim(y_range or (0.0, _extent([value for line in lines for value in line.y])[1]))
+    titles: tuple[str, str],
+    ranges: tuple[tuple[float, float] | None, tuple[float, float] | None],
+    *,
+    ticks: int,
+    points: bool,
+) -> list[tuple[float, float, ChartSeries]]:
+    """Draw the series on a grid, and return the last points of those that have one inside the ranges.
 
-
-def _draw_lines(axes: Axes, lines: Sequence[ChartSeries], *, points: bool) -> list[tuple[float, float, ChartSeries]]:
-    """Draw the series on a grid, and return the last points of those that have one inside the ranges."""
+    titles, ranges  of x and y; the ranges are those of the points by default
+    ticks           maximum number of intervals of x
+    """
+    axes.set_xlim(ranges[0] or _extent([value for line in lines for value in line.x]))
+    axes.set_ylim(ranges[1] or (0.0, _extent([value for line in lines for value in line.y])[1]))
+    axes.set_xlabel(titles[0])
+    axes.set_ylabel(titles[1])
+    axes.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.grid(axis="y")
     axes.set_axisbelow(True)

@@ -17,12 +17,12 @@ from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
 from eidrive_scenario.reporting.replay.light import LightChanges
 from eidrive_scenario.reporting.replay.models import ActorModels
-from eidrive_scenario.reporting.replay.series import SeriesBuilder
+from eidrive_scenario.reporting.replay.series import SeriesBuilder, rounded
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.storyboard.state.element_states import ElementState, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message
-from eidrive_scenario.world.view import Contact, WorldView
+from eidrive_scenario.world.view import WorldView
 
 MOST = 40_000
 """Maximum number of messages in a page."""
@@ -239,11 +239,8 @@ class ReplayBuilder:
     def _append(self, added: Mapping[str, Any], frame: Frame) -> None:
         part = self._part
         before = len(part["times"])
-        part["times"].append(added["time"])
-        part["ticks"].append(added["tick"])
-        part["poses"].append(added["pose"])
-        part["changes"].extend(added["changes"])
-        part["contacts"].extend(added["contacts"])
+        for key in _LISTS:
+            part[key] += added[key]
         for name, actor in added["actors"].items():
             if name not in self.actors:
                 self.actors.add(name)
@@ -251,7 +248,7 @@ class ReplayBuilder:
                 part["actors"][name] = actor | self._models.describe(
                     name, actor["category"], tuple(actor["size"]), offset
                 )
-        part["light"].extend(self._light.observe(frame))
+        part["light"] += self._light.observe(frame)
         for name, station in added["stations"].items():
             self._stations.add(name)
             part["stations"].setdefault(name, [None] * before).append(station)
@@ -323,17 +320,12 @@ def overlay(data: Data) -> Data:
     return {**data, "stations": plans, "messages": lost, "changes": [], "timeline": [], "models": {}, "light": []}
 
 
+_LISTS = ("times", "ticks", "poses", "changes", "contacts", "light")
+"""Entries of a part that are lists over frames or over events."""
+
+
 def _empty_part() -> Data:
-    return {
-        "times": [],
-        "ticks": [],
-        "actors": {},
-        "poses": [],
-        "stations": {},
-        "changes": [],
-        "contacts": [],
-        "light": [],
-    }
+    return {**{key: [] for key in _LISTS}, "actors": {}, "stations": {}}
 
 
 def _column(entries: list[Any]) -> list[Any]:
@@ -360,13 +352,13 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
             builders[name] = SnapshotBuilder(name, settings.get(name, DEFAULT_SETTINGS))
     snapshots = {name: builder.observe(frame) for name, builder in builders.items()}
     return {
-        "time": round(view.time, 4),
-        "tick": view.tick,
+        "times": [round(view.time, 4)],
+        "ticks": [view.tick],
         "actors": {
             name: {"category": category, "size": [round(size, 2) for size in box[3:6]]}
             for name, category, box, _ in shown
         },
-        "pose": poses,
+        "poses": [poses],
         "stations": {name: _station(snapshots[name]) if name in frame.steps else None for name in builders},
         "changes": [
             [round(change.time, 4), change.path, change.after.value.removesuffix("State"), change.why]
@@ -374,13 +366,11 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
             if change.transition is not None and math.isfinite(change.time)
         ],
         "contacts": [
-            [round(view.time, 4), contact.first, contact.second, _impact_speed(contact)] for contact in view.contacts
+            [round(view.time, 4), contact.first, contact.second, rounded(contact.impact_speed, 2)]
+            for contact in view.contacts
         ],
+        "light": [],
     }
-
-
-def _impact_speed(contact: Contact) -> float | None:
-    return round(contact.impact_speed, 2) if math.isfinite(contact.impact_speed) else None
 
 
 def _raised(view: WorldView) -> dict[str, list[float]]:
@@ -397,7 +387,7 @@ def _raised(view: WorldView) -> dict[str, list[float]]:
 
 def _size(part: Mapping[str, Any]) -> int:
     """Return the approximate size of the data of one frame in the page [bytes]."""
-    poses = sum(40 + len(name) for name in part["pose"])
+    poses = sum(40 + len(name) for name in part["poses"][0])
     changes = sum(len(path) + len(why) for _, path, _, why in part["changes"])
     contacts = sum(40 + len(first) + len(second) for _, first, second, _ in part["contacts"])
     return 40 + poses + changes + contacts + sum(map(_station_size, part["stations"].values()))

@@ -67,10 +67,10 @@ class SeriesBuilder:
                 gap, other = nearest_body(view, name, attached)
                 self._note_gap(gap, now, f"{name} and {other}")
                 ttc = min_time_to_collision(view, name, TTC_LIMIT, attached) if is_finite else math.inf
-                values["speed", ""] = _rounded(float(view.speed[view.row(name)]), 2)
-                values["gap", ""] = _rounded(gap, 2) if gap <= FAR else None
-                values["ttc", ""] = _rounded(ttc, 2)
-            values |= {("age", sender): _rounded(now - generated, 3) for sender, generated in newest.items()}
+                values["speed", ""] = rounded(float(view.speed[view.row(name)]), 2)
+                values["gap", ""] = rounded(gap, 2) if gap <= FAR else None
+                values["ttc", ""] = rounded(ttc, 2)
+            values |= {("age", sender): rounded(now - generated, 3) for sender, generated in newest.items()}
             values |= {("expired", sender): number for sender, number in expired.items()}
 
     @property
@@ -168,7 +168,8 @@ def _pair_text(pair: str, names: Collection[str]) -> str:
     return " and ".join(possible[0]) if possible else pair
 
 
-def _rounded(value: float, digits: int) -> float | None:
+def rounded(value: float, digits: int) -> float | None:
+    """Return a number with so many decimals; None for one that is not finite, which JSON does not have."""
     return round(value, digits) if math.isfinite(value) else None
 
 
