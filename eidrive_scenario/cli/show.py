@@ -153,7 +153,7 @@ def draw(
     The picture has ids of roads and lanes, marks of s, starts, paths, trigger zones and the ranges of sensors.
     """
     from eidrive_scenario.extensions.library import resolve_scenario
-    from eidrive_scenario.reporting.drawing.scenario_figure import is_road_file, source_figure
+    from eidrive_scenario.reporting.drawing.scenario_picture import is_road_file, source_figure
     from eidrive_scenario.reporting.drawing.vector_canvas import check_format, parse_size, write_figure
 
     path = Path(file) if is_road_file(file) else resolve_scenario(file)

@@ -16,7 +16,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import recording_in
-from eidrive_scenario.reporting.drawing.scenario_figure import is_road_file, source_figure
+from eidrive_scenario.reporting.drawing.scenario_picture import is_road_file, source_figure
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, Size, checked_size, paper_style, write_figure
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.report_files import report_files

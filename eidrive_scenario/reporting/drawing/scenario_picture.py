@@ -1,4 +1,4 @@
-"""Top view of a scenario before its run: starts, paths, trigger zones, and the views of the stations."""
+"""Top view of a road file, or of a scenario before its run: starts, paths, trigger zones, views of the stations."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from contourpy import FillType, contour_generator
+from matplotlib.figure import Figure
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.geometry import equidistant, footprint
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.driving.agent_factory import build_detector
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted, suggestion
 from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
+from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.reporting.drawing.canvas import Canvas
 from eidrive_scenario.reporting.drawing.labels import write_labels
-from eidrive_scenario.reporting.drawing.road_drawing import simplify_line
+from eidrive_scenario.reporting.drawing.road_drawing import network_drawing, simplify_line
 from eidrive_scenario.reporting.drawing.road_labels import RoadLabels
 from eidrive_scenario.reporting.drawing.top_view import (
     AREA,
@@ -36,7 +39,8 @@ from eidrive_scenario.reporting.drawing.top_view import (
     RoadDrawing,
     Window,
 )
-from eidrive_scenario.roads import Route
+from eidrive_scenario.reporting.drawing.vector_canvas import Size, scene_figure
+from eidrive_scenario.roads import RoadNetwork, Route
 from eidrive_scenario.sensing.sensor import view_sectors
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.kinematics.route import build_route
@@ -291,3 +295,39 @@ def _zones(simulation: Simulation, outline: Outline) -> Iterator[TriggerZone]:
                     zones.setdefault((pose.x, pose.y, radius), condition.name)
     for (x, y, radius), name in zones.items():
         yield TriggerZone(name, (x, y), radius)
+
+
+def is_road_file(source: str | Path) -> bool:
+    """Return whether a source is a road file, not a scenario."""
+    path = Path(source)
+    return path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads"
+
+
+def source_figure(path: Path, size: Size, station: str | None = None) -> Figure:
+    """Return the picture of a scenario before its run, or of a road file.
+
+    size     width and height [mm]
+    station  whose shadow is drawn; by default the first that drives, else the first
+
+    Raise InputError for a file that is invalid, too large or cannot be run, SettingError for a station of a road file.
+    """
+    if not is_road_file(path):
+        with Simulation(path, load_weights=False) as simulation:
+            picture = ScenarioPicture.of(simulation, station)
+        roads = network_drawing(simulation.roads)
+        labels = RoadLabels(simulation.roads) if simulation.roads is not None else None
+        return scene_figure(lambda canvas: picture.draw(canvas, roads, labels), picture.section, size)
+    if station is not None:
+        raise SettingError(
+            Diagnostic(f"a road file has no station (got {quoted(station)})", "give a scenario", str(path))
+        )
+    network = RoadNetwork.load(path)
+    drawing, road_labels = network_drawing(network), RoadLabels(network)
+    left, bottom, right, top = network.bounds()
+
+    def draw(canvas: Canvas) -> None:
+        canvas.roads(drawing)
+        road_labels.draw(canvas)
+        road_labels.write(canvas)
+
+    return scene_figure(draw, lambda ratio: Window.enclosing([(left, bottom), (right, top)]).widened(ratio, 20.0), size)

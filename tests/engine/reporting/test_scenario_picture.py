@@ -14,8 +14,12 @@ from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
 from eidrive_scenario.extensions.library import library_path
-from eidrive_scenario.reporting.drawing.scenario_figure import source_figure
-from eidrive_scenario.reporting.drawing.scenario_picture import POINT_HEIGHT, ScenarioPicture, sector_outline
+from eidrive_scenario.reporting.drawing.scenario_picture import (
+    POINT_HEIGHT,
+    ScenarioPicture,
+    sector_outline,
+    source_figure,
+)
 from eidrive_scenario.reporting.drawing.vector_canvas import DEFAULT_SIZE, write_figure
 from eidrive_scenario.simulation import Simulation
 
