@@ -436,7 +436,7 @@ def _boxes(detections: Detections, *, ellipses: bool = False) -> list[list[float
     ):
         if not math.isfinite(x + y + yaw + length + width + height):
             continue
-        share = None if exists is None or not math.isfinite(exists) else round(exists, 2)
+        share = None if exists is None else rounded(exists, 2)
         box = [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3), round(height, 2)]
         axes = ellipse_of_95_percent(detections.covariance[row]) if ellipses else None
         ellipse = [] if axes is None else [round(axes[0], 2), round(axes[1], 2), round(axes[2], 3)]

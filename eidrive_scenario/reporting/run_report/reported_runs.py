@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,26 +91,19 @@ def read_sweeps(stores: Sequence[Path]) -> tuple[list[ReportedRun], list[str]]:
 
 
 def _reported(run: StoredRun, store: Path) -> ReportedRun:
-    kept = _kept_result(run, store)
-    if kept is None:
-        reported = parse_run(_as_result(run), store)
-    else:
-        reported = parse_run(kept[1], kept[0]).model_copy(update={"folder": kept[0].parent})
+    """Return a stored run, with the folder of its files and their result if they are those of this run."""
     axes = {name: value for name, value in run.point.items() if name != "run"}
-    return reported.model_copy(update={"axes": axes, "sweep": str(store)})
-
-
-def _kept_result(run: StoredRun, store: Path) -> tuple[Path, Mapping[str, Any]] | None:
-    """Return file and content of the result in the folder of the run; None without that of this run."""
+    report = {"axes": axes, "sweep": str(store)}
     folder = run.result.get(FOLDER)
-    if not isinstance(folder, str):
-        return None
-    path = store.parent / folder / RESULT
-    try:
-        result = read_result(path)
-    except InputError:
-        return None
-    return (path, {**result, "run": run.run}) if result["trace_hash"] == run.result.get("trace_hash") else None
+    if isinstance(folder, str):
+        path = store.parent / folder / RESULT
+        kept: dict[str, Any] = {}
+        with suppress(InputError):
+            kept = read_result(path)
+        if kept and kept["trace_hash"] == run.result.get("trace_hash"):
+            reported = parse_run({**kept, "run": run.run}, path)
+            return reported.model_copy(update={**report, "folder": path.parent})
+    return parse_run(_as_result(run), store).model_copy(update=report)
 
 
 def _as_result(run: StoredRun) -> dict[str, Any]:
