@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -165,7 +165,7 @@ def mixed_versions(runs: Iterable[StoredRun]) -> str:
     """
     packages: dict[str, dict[str, int]] = {}
     for run in runs:
-        for name, version in _part_of_settings(run, _Versions).versions.items():
+        for name, version in _settings_of(run).versions.items():
             counts = packages.setdefault(name, {})
             counts[version] = counts.get(version, 0) + 1
     texts = [
@@ -235,31 +235,24 @@ def _varied_parameters(run: StoredRun) -> dict[str, Any]:
     if not run.settings:  # a run that did not start has these parameters only
         prefix = "parameter."
         return {name.removeprefix(prefix): value for name, value in run.result.items() if name.startswith(prefix)}
-    names = _part_of_settings(run, _VariedNames).varied
-    return {name: run.result[column] for name in names if (column := f"parameter.{name}") in run.result}
+    return {
+        name: run.result[column] for name in _settings_of(run).varied if (column := f"parameter.{name}") in run.result
+    }
 
 
-_Part = TypeVar("_Part", bound=msgspec.Struct)
-
-
-class _VariedNames(msgspec.Struct):
-    """Part of the settings of a run that is read."""
+class _Settings(msgspec.Struct):
+    """Settings of a run that are read here."""
 
     varied: tuple[str, ...] = ()
-
-
-class _Versions(msgspec.Struct):
-    """Versions of packages among the settings of a run."""
-
     versions: dict[str, str] = {}
 
 
-def _part_of_settings(run: StoredRun, kind: type[_Part]) -> _Part:
-    """Return a part of the settings of a run; its default if the run did not start, or has settings of another form."""
+def _settings_of(run: StoredRun) -> _Settings:
+    """Return settings of a run; the defaults if it did not start, or has settings of another form."""
     try:
-        return msgspec.convert(json.loads(run.settings or "{}"), kind)
+        return msgspec.convert(json.loads(run.settings or "{}"), _Settings)
     except (ValueError, RecursionError):
-        return kind()
+        return _Settings()
 
 
 def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:
