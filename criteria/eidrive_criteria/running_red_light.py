@@ -8,9 +8,6 @@ from eidrive_criteria.stop_lines import StopLineCriterion, StopLineSettings
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import Crossing, Frame, lamp_colors, shows_red
 
-KEPT = 60.0
-"""Time for which states of signals are kept for crossings that are decided later [s]."""
-
 
 class RunningRedLightSettings(StopLineSettings):
     """Settings: `{of: Ego, part: front}`; `part: rear` also fails an actor whose rear crosses after the change."""
@@ -31,7 +28,7 @@ class RunningRedLight(StopLineCriterion):
         super().__init__(settings)
         self._colors: Mapping[str, tuple[str, ...]] = {}
         self._red: list[tuple[float, frozenset[str]]] = []
-        """Times of changes and the lights that show red from then on."""
+        """Times of all changes and the lights that show red from then on: a crossing may be decided much later."""
 
     def bind(self, roads: RoadNetwork | None) -> None:
         super().bind(roads)
@@ -43,8 +40,6 @@ class RunningRedLight(StopLineCriterion):
         red = frozenset(name for name, state in signals.items() if name in colors and shows_red(state, colors[name]))
         if not self._red or self._red[-1][1] != red:
             self._red.append((frame.view.time, red))
-            while len(self._red) > 1 and self._red[1][0] < frame.view.time - KEPT:
-                del self._red[0]
 
     def is_illegal(self, crossing: Crossing) -> bool:
         before = [red for time, red in self._red if time < crossing.time]

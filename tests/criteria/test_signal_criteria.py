@@ -104,6 +104,21 @@ def test_light_on_a_connecting_road_is_valid_for_its_route(frame: Any, car: Any,
         assert verdict.first_violation == pytest.approx(0.8), "the front reaches the line when the center is at 18 m"
 
 
+def test_red_light_counts_for_a_route_that_is_certain_minutes_later(frame: Any, car: Any) -> None:
+    """The actor crosses the line of the light on road 101 at red, and waits in the junction while it changes."""
+    roads = lights("101")
+    straight = [roads.lane_pose_at("101", -1, float(s)) for s in range(int(roads.roads["101"].length))]
+    poses = [(10.0 + s, 0.0, 0.0) for s in range(11)]
+    frames = [frame(0.1 * n, {"Ego": car(*pose, 10.0)}, signals={"10": "red"}) for n, pose in enumerate(poses)]
+    for n in range(200):
+        frames.append(frame(2.0 + n, {"Ego": car(*poses[-1])}, signals={"10": ("green", "red")[n // 20 % 2]}))
+    for n, pose in enumerate(straight[1:]):
+        frames.append(frame(202.0 + 0.1 * n, {"Ego": car(pose.x, pose.y, pose.h, 10.0)}, signals={"10": "green"}))
+    verdict = judge(light(), frames, roads)
+    assert (verdict.passed, verdict.value) == (False, 1.0)
+    assert verdict.first_violation == pytest.approx(0.8), "the front reaches the line when the center is at 18 m"
+
+
 def approach(frame: Any, car: Any, stop: float | None, ticks: int = 1, speed: float = 0.0) -> list[Frame]:
     """Return frames with the center from x = 0 to 24 m in steps of 2 m; with a stop of `ticks` s at `stop`."""
     places = [(2.0 * n, 10.0) for n in range(13)]
