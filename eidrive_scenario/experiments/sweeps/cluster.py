@@ -27,40 +27,42 @@ class _Children:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._idle: list[tuple[str, LocalWorkers]] = []
-        self._busy: list[tuple[str, LocalWorkers]] = []
+        self._children: dict[LocalWorkers, tuple[str, bool]] = {}
+        """Sweep of each child, and whether it executes a call."""
         self._finalizer: Finalize | None = None
 
     @contextmanager
     def of(self, sweep: str) -> Iterator[LocalWorkers]:
         """Return a child of a sweep for one call. A new one replaces idle children of other sweeps."""
-        others: list[tuple[str, LocalWorkers]] = []
+        others: list[LocalWorkers] = []
         with self._lock:
-            held = next((entry for entry in self._idle if entry[0] == sweep), None)
-            if held is not None:
-                self._idle.remove(held)
+            child = next((child for child, state in self._children.items() if state == (sweep, False)), None)
+            if child is not None:
+                self._children[child] = sweep, True
             else:  # the command of another sweep may have been killed
-                others, self._idle = self._idle, []
-        for _, child in others:
-            child.close()
-        entry = held or (sweep, self._start())
-        with self._lock:
-            self._busy.append(entry)
+                others = [child for child, (_, is_busy) in self._children.items() if not is_busy]
+                for other in others:
+                    del self._children[other]
+        for other in others:
+            other.close()
+        if child is None:
+            child = self._start()
+            with self._lock:
+                self._children[child] = sweep, True
         try:
-            yield entry[1]
+            yield child
         finally:
             with self._lock:
-                if entry in self._busy:  # else the sweep has ended
-                    self._busy.remove(entry)
-                    self._idle.append(entry)
+                if child in self._children:  # else the sweep has ended
+                    self._children[child] = sweep, False
 
     def end(self, sweep: str | None = None) -> None:
         """End the children of a sweep, None for all, with their calls."""
         with self._lock:
-            ended = [entry for entry in (*self._idle, *self._busy) if sweep in (None, entry[0])]
-            self._idle = [entry for entry in self._idle if entry not in ended]
-            self._busy = [entry for entry in self._busy if entry not in ended]
-        for _, child in ended:
+            ended = [child for child, (owner, _) in self._children.items() if sweep in (None, owner)]
+            for child in ended:
+                del self._children[child]
+        for child in ended:
             child.close()
 
     def _start(self) -> LocalWorkers:
