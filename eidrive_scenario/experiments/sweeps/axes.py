@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.randomness import integer_key
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted
 from eidrive_scenario.extensions.library import library_path
@@ -296,22 +295,7 @@ MOST_POINTS = 1_000_000
 """Maximum number of combinations of a sweep."""
 
 
-def _latin_hypercube(axes: int, count: int, rng: np.random.Generator) -> Array:
-    from scipy.stats import qmc
-
-    return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(count))
-
-
-def _sobol(axes: int, count: int, rng: np.random.Generator) -> Array:
-    from scipy.stats import qmc
-
-    # The first points of a longer sequence are those of a shorter one, so that more samples add points.
-    complete = 1 << max(count - 1, 0).bit_length()
-    return np.asarray(qmc.Sobol(axes, rng=rng).random(complete)[:count])
-
-
-_SAMPLED: Mapping[str, Callable[[int, int, np.random.Generator], Array]] = {"lhs": _latin_hypercube, "sobol": _sobol}
-DESIGNS = (GRID, *_SAMPLED)
+DESIGNS = (GRID, "lhs", "sobol")
 """Names of the designs: grid, Latin hypercube, and scrambled Sobol sequence."""
 
 
@@ -334,7 +318,14 @@ def points_of(axes: Sequence[Axis], design: str, samples: int | None, seed: int)
         raise SettingError(
             Diagnostic(f"--design {design}: --samples is {samples}", f"expected 1 to {MOST_POINTS} combinations")
         )
-    shares = _SAMPLED[design](len(axes), samples, np.random.default_rng(integer_key(seed, "design", design, size=16)))
+    from scipy.stats import qmc
+
+    rng = np.random.default_rng(integer_key(seed, "design", design, size=16))
+    if design == "lhs":
+        shares = qmc.LatinHypercube(len(axes), rng=rng).random(samples)
+    else:
+        # The first points of a longer sequence are those of a shorter one, so that more samples add points.
+        shares = qmc.Sobol(len(axes), rng=rng).random(1 << max(samples - 1, 0).bit_length())[:samples]
     return [{axis.name: axis.at(float(share)) for axis, share in zip(axes, row, strict=True)} for row in shares]
 
 

@@ -229,14 +229,8 @@ class SweepPlan:
         return self.runs
 
     def __iter__(self) -> Iterator[SweepJob]:
-        return islice(self._jobs(), self.runs)
-
-    def _jobs(self) -> Iterator[SweepJob]:
-        number = 0
-        for seed in self.seeds:
-            for point in self.points:
-                yield self.job(number, point, seed)
-                number += 1
+        pairs = ((point, seed) for seed in self.seeds for point in self.points)
+        return (self.job(number, *pair) for number, pair in enumerate(islice(pairs, self.runs)))
 
     def job(self, number: int, point: Point, seed: int) -> SweepJob:
         """Return a run at a point, which need not be one of the plan."""
@@ -244,7 +238,7 @@ class SweepPlan:
         run = int(point[RUN]) if RUN in point else None
         contents = {name: digest for name in point if (digest := self.contents.get((name, point[name]))) is not None}
         inputs = {"inputs": self.inputs, "contents": contents}
-        content = {**inputs, "run": run, "seed": seed, "settings": _settings_as_json(settings)}
+        content = {**inputs, "run": run, "seed": seed, "settings": _as_json(asdict(settings))}
         return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
 
 
@@ -366,10 +360,6 @@ def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[i
 def source_of(job: SweepJob) -> Path | ConcreteRun:
     """Return what a job runs: a scenario, or one run of a distribution."""
     return job.scenario if job.run is None else load_distribution(job.scenario)[job.run]
-
-
-def _settings_as_json(settings: RunSettings) -> dict[str, Any]:
-    return {name: _as_json(value) for name, value in asdict(settings).items()}
 
 
 def _as_json(value: Any) -> Any:

@@ -300,11 +300,9 @@ def write_csv(runs: Iterable[StoredRun], path: Path) -> None:
     with write_atomically(path) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(map(neutralize_formula, names))
-        writer.writerows([[_cell(row.get(name)) for name in names] for row in rows])
-
-
-def _cell(value: Any) -> Any:
-    return neutralize_formula(value) if isinstance(value, str) else value
+        for row in rows:
+            values = [row.get(name) for name in names]
+            writer.writerow([neutralize_formula(value) if isinstance(value, str) else value for value in values])
 
 
 def write_parquet(runs: Iterable[StoredRun], path: Path) -> None:

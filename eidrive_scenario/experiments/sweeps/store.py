@@ -11,17 +11,16 @@ from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import msgspec
 
-from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError, quoted
+from eidrive_scenario.errors import Diagnostic, EidriveError, SettingError, SimulationError, quoted
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file, load_json
 from eidrive_scenario.files.encodable import encodable
 from eidrive_scenario.files.similar_paths import file_suggestion
 
-T = TypeVar("T")
 FORMAT = 1
 """Version of the tables."""
 _HEADER = b"SQLite format 3\0"
@@ -121,10 +120,11 @@ class ResultStore:
             stack.enter_context(exclusive(path))
             is_new, store = not path.exists(), None
             try:
-                connection = _checked(path, lambda: _connect(path))
-                stack.callback(connection.close)
-                opened = cls(path, connection)
-                _checked(path, opened._create)
+                with _usable(path):
+                    connection = _connect(path)
+                    stack.callback(connection.close)
+                    opened = cls(path, connection)
+                    opened._create()
                 opened._check_versions(versions)
                 store = opened
                 yield store
@@ -140,12 +140,12 @@ class ResultStore:
         if not path.is_file():
             hint = file_suggestion(path, {path.suffix, ".db"}, otherwise="give the file of a sweep")
             raise _error("no such store", hint, path)
-        connection = _checked(path, lambda: _connect(path, read_only=True))
-        try:
-            _checked(path, lambda: _check_format(path, connection))
+        with ExitStack() as stack:
+            with _usable(path):
+                connection = _connect(path, read_only=True)
+                stack.callback(connection.close)
+                _check_format(path, connection)
             yield cls(path, connection)
-        finally:
-            connection.close()
 
     def _create(self) -> None:
         if not self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
@@ -322,12 +322,11 @@ def _check_tables(path: Path, connection: sqlite3.Connection) -> None:
             raise _damaged(str(result), path)
 
 
-def _checked(path: Path, action: Callable[[], T]) -> T:
-    """Return the result of an action. Raise SettingError for errors of the database."""
+@contextmanager
+def _usable(path: Path) -> Iterator[None]:
+    """Raise SettingError for errors of the database."""
     try:
-        return action()
-    except InputError:
-        raise
+        yield
     except sqlite3.Error as error:
         raise _error(f"cannot use the store: {_reason(error)}", "give a new file", path) from error
 
