@@ -274,23 +274,17 @@ def _declare(
 def _check_context(criterion: Criterion, context: CriteriaContext, source: str, line: int | None) -> None:
     """Raise SettingError if the scenario lacks what a criterion requires."""
     name = criterion.name
+    unknown = []
     for kind, names, declared in (
         ("entity", criterion.subjects, context.entities),
         ("monitor", criterion.monitors, context.monitors),
     ):
-        unknown = [subject for subject in names if declared is not None and subject not in declared]
-        if unknown:
-            raise SettingError(
-                [
-                    Diagnostic(
-                        f"criterion {name!r}: unknown {kind} {subject!r}",
-                        suggestion(subject, declared) if declared else f"the scenario declares no {kind}",
-                        source,
-                        line,
-                    )
-                    for subject in unknown
-                ]
-            )
+        for subject in names:
+            if declared is not None and subject not in declared:
+                hint = suggestion(subject, declared) if declared else f"the scenario declares no {kind}"
+                unknown.append(Diagnostic(f"criterion {name!r}: unknown {kind} {subject!r}", hint, source, line))
+    if unknown:
+        raise SettingError(unknown)
     if criterion.needs_roads and not context.has_roads:
         message = f"criterion {name!r} requires roads, and the scenario has none"
         raise SettingError(Diagnostic(message, "add a LogicFile to its RoadNetwork", source, line))

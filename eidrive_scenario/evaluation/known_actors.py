@@ -10,18 +10,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.view import WorldView
 
 Source = Literal["own", "fused"]
 """Objects of a station: those that it perceives itself, or the result of fusion, which its planner gets."""
-
-
-def objects_of(step: AgentStep, source: Source) -> Detections:
-    """Return the own or the fused objects of a station."""
-    return step.detections if source == "own" else step.fused
 
 
 def nearest_pairs(first: Array, second: Array, within: float) -> list[tuple[int, int, float]]:
@@ -58,7 +51,7 @@ def known_actors(
     step, view = frame.steps.get(station), frame.view
     if step is None:
         return {}
-    objects = objects_of(step, source)
+    objects = step.detections if source == "own" else step.fused
     boxes = objects.boxes
     if min_confidence > 0.0:
         boxes = boxes[objects.confidence >= min_confidence]

@@ -141,7 +141,8 @@ def mean_interval(values: Sequence[float], *, confidence: float = 0.95) -> MeanI
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence: not between 0 and 1 (got {confidence})")
     summary = summarize(values)
-    half_width = _quantile(summary.count, confidence) * summary.sample_sd / math.sqrt(summary.count)
+    quantile = float(stdtrit(summary.count - 1, 0.5 + confidence / 2.0))
+    half_width = quantile * summary.sample_sd / math.sqrt(summary.count)
     return MeanInterval(summary.mean, summary.mean - half_width, summary.mean + half_width)
 
 
@@ -158,11 +159,6 @@ def jackknife_interval(value: float, left_out: Sequence[float], *, confidence: f
     pseudo_values = count * value - (count - 1) * np.asarray(left_out, dtype=np.float64)
     interval = mean_interval(pseudo_values.tolist(), confidence=confidence)
     return MeanInterval(value, value + interval.low - interval.mean, value + interval.high - interval.mean)
-
-
-def _quantile(count: int, confidence: float) -> float:
-    """Return the quantile of Student's t distribution for `count` values; NaN for a single one."""
-    return float(stdtrit(count - 1, 0.5 + confidence / 2.0)) if count > 1 else math.nan
 
 
 def interval_text(low: float, high: float, form: str) -> str:

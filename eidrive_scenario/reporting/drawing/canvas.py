@@ -29,7 +29,7 @@ STROKE = 3.0
 """Length of the strokes and gaps of a broken road mark [m]."""
 MARK_WIDTH = 0.2
 """Width of road marks [m]."""
-_LONGEST = 200
+LONGEST_LABEL = 200
 """Maximum number of characters of a label."""
 
 Points = Array | Sequence[Sequence[float]]
@@ -56,13 +56,13 @@ class Canvas(ABC):
         """Draw the roads and houses inside the section."""
         for level in roads.levels:
             for kind, polygon in level.lanes:
-                if self.shows(polygon):
+                if self.window.reaches(polygon):
                     self.fill(polygon, LANES.get(kind, LANE))
             for kind, color, line in level.markings:
-                if self.shows(line):
+                if self.window.reaches(line):
                     self.line(line, PAINT.get(color, WHITE), MARK_WIDTH, stroke=STROKE if is_broken(kind) else 0.0)
         for house, _ in roads.houses:
-            if self.shows(house):
+            if self.window.reaches(house):
                 self.fill(house, HOUSE)
 
     @abstractmethod
@@ -122,15 +122,6 @@ class Canvas(ABC):
     def position(self, point: Sequence[float]) -> tuple[float, float]:
         """Return the position of a point [units]."""
         return (point[0] - self.window.left) * self.scale, (self.window.top - point[1]) * self.scale
-
-    def shows(self, points: Array) -> bool:
-        """Return whether the rectangle around points (M, 2) reaches into the section."""
-        return self.window.reaches(points)
-
-
-def shortened_label(text: str) -> str:
-    """Return a label without its end if it is long."""
-    return text[:_LONGEST]
 
 
 COVERED = math.sqrt(-2.0 * math.log(0.05))

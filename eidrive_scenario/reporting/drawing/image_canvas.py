@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.reporting.drawing.canvas import Canvas, Points, shortened_label
+from eidrive_scenario.reporting.drawing.canvas import LONGEST_LABEL, Canvas, Points
 from eidrive_scenario.reporting.drawing.top_view import GROUND, TRUTH, WHITE, Window
 
 Image = NDArray[np.uint8]
@@ -102,4 +102,4 @@ def _bgr(color: str) -> tuple[int, int, int]:
 
 def _drawable(text: str) -> str:
     """Return the text with the characters that the fonts of OpenCV have."""
-    return "".join([letter if " " <= letter <= "~" else "?" for letter in shortened_label(text)])
+    return "".join([letter if " " <= letter <= "~" else "?" for letter in text[:LONGEST_LABEL]])

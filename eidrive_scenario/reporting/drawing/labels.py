@@ -39,7 +39,7 @@ def write_labels(
 
     Return the rectangles (N, 4) of the labels and outlines, with those that were taken before.
     """
-    shown = [index for index, outline in enumerate(outlines) if texts[index] and canvas.shows(outline)]
+    shown = [index for index, outline in enumerate(outlines) if texts[index] and canvas.window.reaches(outline)]
     bodies = np.array([_rectangle(canvas, outlines[index]) for index in shown]).reshape(-1, 4)
     labels = np.array([*canvas.reserved, *taken], dtype=float).reshape(-1, 4)
     for row, index in enumerate(shown):

@@ -60,7 +60,7 @@ class RoadLabels:
     def draw(self, canvas: Canvas) -> None:
         """Draw the reference lines with marks of s."""
         for _, _, points in self._lines:
-            if canvas.shows(points):
+            if canvas.window.reaches(points):
                 canvas.line(simplify_line(points), REFERENCE, 0.0, legend="reference line with s [m]")
         for _, outline in self._marks(canvas):
             canvas.line(outline, REFERENCE, 0.0)

@@ -73,7 +73,7 @@ def draw_snapshot(
     _draw_boxes(canvas, snapshot.fused, FUSED, 0.0, "after fusion")
     view = snapshot.view
     for name, box in zip(view.names, view.boxes.tolist(), strict=True):
-        if math.isfinite(sum(box)) and canvas.shows(footprint(np.array(box))):
+        if math.isfinite(sum(box)) and canvas.window.reaches(footprint(np.array(box))):
             is_station = name == snapshot.station
             color, opacity = (STATION, 1.0) if is_station else (WHITE, 0.35)
             canvas.body(box, color, opacity, legend=name if is_station else "other actors")

@@ -24,7 +24,7 @@ from matplotlib.path import Path as Outline
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.atomic import write_atomically
-from eidrive_scenario.reporting.drawing.canvas import Canvas, Points, shortened_label
+from eidrive_scenario.reporting.drawing.canvas import LONGEST_LABEL, Canvas, Points
 from eidrive_scenario.reporting.drawing.top_view import GROUND, STATION, TRUTH, WHITE, Window
 
 PAPER_STYLE: dict[Any, Any] = {
@@ -229,7 +229,7 @@ def _longest_round_length(longest: float) -> float:
 
 def drawable(text: str) -> str:
     """Return a label without characters that no file may contain."""
-    return "".join([letter if letter.isprintable() else "?" for letter in shortened_label(text)])
+    return "".join([letter if letter.isprintable() else "?" for letter in text[:LONGEST_LABEL]])
 
 
 def scene_figure(

@@ -57,17 +57,14 @@ def levels_of(runs: Sequence[ReportedRun], name: str) -> Levels | None:
         return None
     if len(numbers) <= MOST_VALUES:
         ordered = sorted(numbers)
-        return Levels(name, tuple(map(float, ordered)), tuple(map(_level_label, ordered)))
+        texts = tuple(str(value) if isinstance(value, int) else f"{value:.6g}" for value in ordered)
+        return Levels(name, tuple(map(float, ordered)), texts)
     start, end = float(min(numbers)), float(max(numbers))
     width = (end - start) / RANGES
     ends = [start + width * index for index in range(RANGES + 1)]
     centers = tuple((low + high) / 2.0 for low, high in pairwise(ends))
     labels = tuple(f"{low:.3g} … {high:.3g}" for low, high in pairwise(ends))
     return Levels(name, centers, labels, start, width)
-
-
-def _level_label(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value:.6g}"
 
 
 MOST_COLUMNS, MOST_CELLS = 40, 4000
