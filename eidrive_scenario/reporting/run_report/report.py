@@ -63,7 +63,7 @@ def write_run_report(
     out      file of the page if it ends in `.html`, else the folder of `report.html`
     omitted  files of runs that `results` do not contain, each with the reason; the page lists them
     unjudged  runs of sweeps without a verdict: one line for each reason
-    template, values  template that extends the one of the report by a text above it, and its values
+    template, values  name or file of a template that extends the one of the report by a text above it, and its values
 
     Runs are grouped by the settings in which those of a scenario differ. A run in several folders is listed and counted
     once. Raise InputError without results, or for an invalid result.
