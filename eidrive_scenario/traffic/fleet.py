@@ -123,7 +123,7 @@ class Fleet:
         self._made = self._ticks = self._decisions = 0
         self._until = 0.0
         self._poses: Array | None = None
-        self._occupancy = Occupancy(self.lanes, self._changes)
+        self._occupancy = Occupancy(self.lanes)
 
     @property
     def decides(self) -> bool:

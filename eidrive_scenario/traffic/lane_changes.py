@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.car_following import Drivers, IntelligentDriver
+from eidrive_scenario.roads.routing.route import smoothstep
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, Occupants, find_followers, find_leaders
@@ -196,18 +197,6 @@ class LaneChanges:
             return
         cars.shift_done[indices] += covered[indices]
         part = np.minimum(cars.shift_done[indices] / cars.shift_length[indices], 1.0)
-        cars.offset[indices] = cars.shift[indices] * (1.0 - part**3 * (10.0 + part * (6.0 * part - 15.0)))
+        cars.offset[indices] = cars.shift[indices] * (1.0 - smoothstep(part))
         cars.slope[indices] = -cars.shift[indices] / cars.shift_length[indices] * 30.0 * (part * (1.0 - part)) ** 2
         cars.shift[indices[part >= 1.0]] = 0.0
-
-    def still_left(self, cars: Cars) -> tuple[Integers, Integers]:
-        """Return the cars whose bodies still overlap the lane that they leave, and these lanes."""
-        indices = np.flatnonzero(cars.changing)
-        if not indices.size:
-            return indices, indices
-        old = cars.lane[indices]
-        half = 0.5 * self._lanes.width(old, cars.progress[indices])
-        body = np.array([0.5 * cars.specs[n].size[1] for n in indices])
-        new = np.where(cars.offset[indices] > 0.0, self._lanes.beside_left[old], self._lanes.beside_right[old])
-        covers = (np.abs(cars.offset[indices]) + body > half) & (new >= 0)
-        return indices[covers], new[covers]

@@ -6,7 +6,6 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.traffic.cars import PLANNED, Cars
-from eidrive_scenario.traffic.lane_changes import LaneChanges
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import (
     FIXED,
@@ -27,15 +26,19 @@ OUTLINE = np.array(
 )
 
 
-class Obstacles:
-    """Outlines of the actors outside a fleet on the lanes. Actors that stay in place are located once.
+class Occupancy:
+    """Occupancy of the lanes of one fleet. Actors outside the fleet that stay in place are located once.
 
-    moving  lanes that moving actors overlap
+    foreign  outlines of the actors outside the fleet
+    moving   lanes that moving actors outside the fleet overlap
     """
 
     def __init__(self, lanes: TrafficLanes) -> None:
         self._lanes = lanes
-        self.occupants = no_occupants()
+        lane = np.flatnonzero(np.isfinite(lanes.ends_at))
+        at = lanes.ends_at[lane]
+        self._ends = Occupants(lane, at, at, at, np.zeros(len(lane)), np.full(len(lane), FIXED))
+        self.foreign = no_occupants()
         self.moving = set[int]()
         self._before: dict[str, bytes] = {}
         self._resting: tuple[str, ...] = ()
@@ -62,7 +65,43 @@ class Obstacles:
             self._at_rest, self._moving_at_rest = _outlines(self._lanes, view, resting)
         occupants, moving = _outlines(self._lanes, view, others)
         self.moving = moving | self._moving_at_rest
-        self.occupants = concatenate_occupants(occupants, self._at_rest) if names else occupants
+        self.foreign = concatenate_occupants(occupants, self._at_rest) if names else occupants
+
+    def occupants(self, cars: Cars) -> Occupants:
+        """Return all occupants: cars (also on lanes that they are leaving), other actors, lane ends."""
+        own = np.arange(len(cars))
+        still, left = self._lanes_left(cars)
+        indices, lane = np.concatenate([own, still]), np.concatenate([cars.lane, left])
+        key = cars.progress[indices]
+        mine = Occupants(lane, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
+        return concatenate_occupants(mine, self.foreign, self._ends)
+
+    def leaders(self, cars: Cars, occupants: Occupants) -> Leaders:
+        """Return the leaders of all cars. During a lane change it is the nearer one of both lanes.
+
+        The end of a lane does not stop a car that is leaving this lane, as it leaves only while moving.
+        """
+        leaders = find_leaders(self._lanes, cars.plan, cars.progress, cars.front, occupants)
+        still, lane = self._lanes_left(cars)
+        if still.size:
+            chain = self._lanes.chain(lane, PLANNED + 1)
+            standing = occupants.without(FIXED)
+            other = find_leaders(self._lanes, chain, cars.progress[still], cars.front[still], standing, own=still)
+            nearer = Leaders(leaders.gap[still], leaders.speed[still]).or_nearer(other)
+            leaders.gap[still], leaders.speed[still] = nearer.gap, nearer.speed
+        return Leaders(leaders.gap * self._lanes.stretch(cars.lane, cars.progress), leaders.speed)
+
+    def _lanes_left(self, cars: Cars) -> tuple[Integers, Integers]:
+        """Return the cars whose bodies still overlap the lane that they leave, and these lanes."""
+        indices = np.flatnonzero(cars.changing)
+        if not indices.size:
+            return indices, indices
+        new = cars.lane[indices]
+        half = 0.5 * self._lanes.width(new, cars.progress[indices])
+        body = np.array([0.5 * cars.specs[n].size[1] for n in indices])
+        old = np.where(cars.offset[indices] > 0.0, self._lanes.beside_left[new], self._lanes.beside_right[new])
+        covers = (np.abs(cars.offset[indices]) + body > half) & (old >= 0)
+        return indices[covers], old[covers]
 
 
 def _considered(view: WorldView, own: frozenset[str], near: Array | None) -> Integers:
@@ -95,50 +134,3 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     moving = np.hypot(vx, vy) > STANDING
     owner = np.full(len(lane), FOREIGN)
     return Occupants(lane, progress, progress, progress, speed, owner), set(lane[moving].tolist())
-
-
-class Occupancy:
-    """Occupancy of the lanes of one fleet."""
-
-    def __init__(self, lanes: TrafficLanes, changes: LaneChanges) -> None:
-        self._lanes = lanes
-        self._changes = changes
-        self._obstacles = Obstacles(lanes)
-        lane = np.flatnonzero(np.isfinite(lanes.ends_at))
-        at = lanes.ends_at[lane]
-        self._ends = Occupants(lane, at, at, at, np.zeros(len(lane)), np.full(len(lane), FIXED))
-
-    def observe(self, view: WorldView, own: frozenset[str], near: Array | None) -> None:
-        """Observe the actors outside the fleet `own`; with positions `near` (K, 2) [m] only those near one of them."""
-        self._obstacles.observe(view, own, near)
-
-    @property
-    def moving(self) -> set[int]:
-        """Lanes that moving actors outside the fleet overlap."""
-        return self._obstacles.moving
-
-    def occupants(self, cars: Cars) -> Occupants:
-        """Return all occupants: cars (also on lanes that they are leaving), other actors, lane ends."""
-        own = np.arange(len(cars))
-        still, left = self._changes.still_left(cars)
-        indices, lane = np.concatenate([own, still]), np.concatenate([cars.lane, left])
-        key = cars.progress[indices]
-        mine = Occupants(lane, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
-        return concatenate_occupants(mine, self._obstacles.occupants, self._ends)
-
-    def leaders(self, cars: Cars, occupants: Occupants) -> Leaders:
-        """Return the leaders of all cars. During a lane change it is the nearer one of both lanes.
-
-        The end of a lane does not stop a car that is leaving this lane, as it leaves only while moving.
-        """
-        leaders = find_leaders(self._lanes, cars.plan, cars.progress, cars.front, occupants)
-        still, lane = self._changes.still_left(cars)
-        if still.size:
-            chain = self._lanes.chain(lane, PLANNED + 1)
-            standing = occupants.without(FIXED)
-            other = find_leaders(self._lanes, chain, cars.progress[still], cars.front[still], standing, own=still)
-            gap, speed = leaders.gap.copy(), leaders.speed.copy()
-            nearer = Leaders(gap[still], speed[still]).or_nearer(other)
-            gap[still], speed[still] = nearer.gap, nearer.speed
-            leaders = Leaders(gap, speed)
-        return Leaders(leaders.gap * self._lanes.stretch(cars.lane, cars.progress), leaders.speed)

@@ -7,7 +7,7 @@ import pytest
 from fleet_scene import LENGTH, REAR_AXLE, street, view_of
 
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.occupancy import Obstacles
+from eidrive_scenario.traffic.occupancy import Occupancy
 from eidrive_scenario.world.actor import Placement
 
 LANE = -1.75
@@ -23,9 +23,9 @@ def moving(x: float) -> Placement:
     return Placement(x, LANE, speed=4.0)
 
 
-def places_of(obstacles: Obstacles) -> list[float]:
+def places_of(occupancy: Occupancy) -> list[float]:
     """Return the progress of rear, middle and front of all obstacles on the street, in ascending order."""
-    return sorted(set(obstacles.occupants.key.round(6).tolist()))
+    return sorted(set(occupancy.foreign.key.round(6).tolist()))
 
 
 def outline(*places: float) -> list[float]:
@@ -33,7 +33,7 @@ def outline(*places: float) -> list[float]:
 
 
 def test_obstacles_are_where_the_actors_are_in_every_view() -> None:
-    obstacles = Obstacles(TrafficLanes(street(1, 1)))
+    occupancy = Occupancy(TrafficLanes(street(1, 1)))
     views = [
         {"a": parked(100.0), "b": moving(50.0)},
         {"a": parked(100.0), "b": moving(52.0)},
@@ -47,24 +47,24 @@ def test_obstacles_are_where_the_actors_are_in_every_view() -> None:
         {},
     ]
     for placements in views:
-        obstacles.observe(view_of(placements), frozenset())
+        occupancy.observe(view_of(placements), frozenset())
         expected = outline(*sorted(placement.x for placement in placements.values()))
-        assert places_of(obstacles) == pytest.approx(expected)
+        assert places_of(occupancy) == pytest.approx(expected)
         speeds = {placement.speed for placement in placements.values()}
-        assert set(obstacles.occupants.speed.tolist()) == speeds
-        assert bool(obstacles.moving) == (4.0 in speeds)
+        assert set(occupancy.foreign.speed.tolist()) == speeds
+        assert bool(occupancy.moving) == (4.0 in speeds)
 
 
 def test_resting_actor_out_of_sight_is_ignored_until_a_car_is_near() -> None:
-    obstacles = Obstacles(TrafficLanes(street(1, 1)))
+    occupancy = Occupancy(TrafficLanes(street(1, 1)))
     view = view_of({"a": parked(100.0), "far": parked(600.0)})
     for near, places in (([100.0], [100.0]), ([100.0, 500.0], [100.0, 600.0]), ([500.0], [600.0]), ([], [])):
-        obstacles.observe(view, frozenset(), np.array([(x, LANE) for x in near]).reshape(-1, 2))
-        assert places_of(obstacles) == pytest.approx(outline(*places))
+        occupancy.observe(view, frozenset(), np.array([(x, LANE) for x in near]).reshape(-1, 2))
+        assert places_of(occupancy) == pytest.approx(outline(*places))
 
 
 def test_cars_of_the_fleet_are_no_obstacles() -> None:
-    obstacles = Obstacles(TrafficLanes(street(1, 1)))
+    occupancy = Occupancy(TrafficLanes(street(1, 1)))
     for own, places in ((frozenset({"b"}), [100.0]), (frozenset({"a", "b"}), [])):
-        obstacles.observe(view_of({"a": parked(100.0), "b": parked(50.0)}), own)
-        assert places_of(obstacles) == pytest.approx(outline(*places))
+        occupancy.observe(view_of({"a": parked(100.0), "b": parked(50.0)}), own)
+        assert places_of(occupancy) == pytest.approx(outline(*places))
