@@ -113,9 +113,9 @@ class Fleet:
         self.driver = driver or IntelligentDriver()
         self.departed: frozenset[str] = frozenset()
         self.lanes = TrafficLanes(roads)
-        crossings = Crossings(self.lanes)
-        self._right_of_way = RightOfWay(self.lanes, crossings)
-        self._plans = Plans(self.lanes, crossings, seed)
+        self._crossings = Crossings(self.lanes)
+        self._right_of_way = RightOfWay(self.lanes, self._crossings)
+        self._plans = Plans(self.lanes, self._crossings, seed)
         self._changes = LaneChanges(self.lanes, changer or LaneChanger(), self.driver)
         self._lines = None if must_stop is None else StopLines(self.lanes, must_stop)
         self._cars = Cars()
@@ -242,14 +242,15 @@ class Fleet:
         self._cars.plan[index, 0] = lane
         self._poses, self._until = None, 0.0
         if self.lanes.in_junction[lane] and not self.lanes.walkable[lane]:
-            self._right_of_way.take(self._cars, index)
+            self._crossings.take(lane, spec.name)
+            self._cars.granted[index, 0] = True
         self._plans.extend(self._cars, index)
         return self._placement(index, teleport=True)
 
     def remove(self, name: str) -> None:
         """Remove a car."""
         index = self._index[name]
-        self._right_of_way.forget(name)
+        self._crossings.forget(name)
         self._cars.delete(index)
         self._poses = None
         self._index = {spec.name: n for n, spec in enumerate(self._cars.specs)}

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.car_following import Drivers, IntelligentDriver
 from eidrive_scenario.roads.routing.route import smoothstep
 from eidrive_scenario.traffic.cars import PLANNED, Cars
@@ -47,17 +46,17 @@ class Prospect:
     old_follower_after: Array
 
 
-def safe(changer: LaneChanger, prospect: Prospect) -> NDArray[np.bool_]:
+def safe(changer: LaneChanger, prospect: Prospect) -> Bools:
     """Return the safety criterion (equation 1): neither the new follower nor the car has to brake too hard."""
     hardest = np.minimum(prospect.new_follower_after, prospect.own_after)
     return np.asarray(hardest >= -changer.safe_deceleration)
 
 
-def incentive(changer: LaneChanger, prospect: Prospect, to_slow_side: bool) -> Array:
+def incentive(changer: LaneChanger, prospect: Prospect, to_slow_side: Bools | bool) -> Array:
     """Return the incentive minus the threshold (equations 2 and 6) [m/s²]. A positive value favors the change."""
     gain = prospect.own_after - prospect.own
     others = prospect.new_follower_after - prospect.new_follower + prospect.old_follower_after - prospect.old_follower
-    bias = changer.bias if to_slow_side else -changer.bias
+    bias = np.where(to_slow_side, changer.bias, -changer.bias)
     return np.asarray(gain + changer.politeness * others - changer.threshold + bias)
 
 
@@ -96,12 +95,8 @@ class LaneChanges:
         lanes, lane = self._lanes, cars.lane[indices]
         ends_in = lanes.ends_at[lane] - cars.progress[indices]
         room = self.length(cars.speed[indices])
-        able = (
-            (np.abs(cars.offset[indices]) < SETTLED)
-            & ~cars.walks[indices]
-            & ~lanes.in_junction[lane]
-            & ~cars.granted[indices].any(axis=1)
-        )
+        able = (np.abs(cars.offset[indices]) < SETTLED) & ~cars.walks[indices]
+        able &= ~lanes.in_junction[lane] & ~cars.granted[indices].any(axis=1)
         able &= to_junction[indices] > room + cars.front[indices]
         able &= (cars.speed[indices] > SLOWEST) | (ends_in < LAST_CHANCE)
         sides = [(lanes.left[lane], lanes.left_hand[lane]), (lanes.right[lane], ~lanes.left_hand[lane])]
@@ -113,56 +108,41 @@ class LaneChanges:
             return []
         some, target, slow_side = some[possible], target[possible], slow_side[possible]
         prospect = self._prospect(cars, some, target, leaders, desired, occupants)
-        gain = np.where(slow_side, incentive(self._changer, prospect, True), incentive(self._changer, prospect, False))
+        gain = incentive(self._changer, prospect, slow_side)
         chosen = np.flatnonzero(safe(self._changer, prospect) & (gain > 0.0))
-        return self._one_at_a_time(cars, [(-float(gain[n]), int(some[n]), int(target[n])) for n in chosen])
-
-    def _one_at_a_time(self, cars: Cars, candidates: list[tuple[float, int, int]]) -> list[tuple[int, int]]:
-        taken: list[tuple[int, int]] = []
-        for _, index, lane in sorted(candidates):
-            crowded = any(
-                other == index or (target == lane and abs(cars.progress[other] - cars.progress[index]) < ROOM)
-                for other, target in taken
-            )
-            if not crowded:
-                taken.append((index, lane))
-        return taken
+        begun: list[tuple[int, int]] = []
+        for _, index, new in sorted((-float(gain[n]), int(some[n]), int(target[n])) for n in chosen):
+            if not any(
+                other == index or (taken == new and abs(cars.progress[other] - cars.progress[index]) < ROOM)
+                for other, taken in begun
+            ):
+                begun.append((index, new))
+        return begun
 
     def _prospect(
         self, cars: Cars, indices: Integers, target: Integers, leaders: Leaders, desired: Array, occupants: Occupants
     ) -> Prospect:
         lanes = self._lanes
-        progress, front, rear, speed = (
-            cars.progress[indices],
-            cars.front[indices],
-            cars.rear[indices],
-            cars.speed[indices],
-        )
+        columns = cars.progress, cars.front, cars.rear, cars.speed
+        progress, front, rear, speed = (column[indices] for column in columns)
         drivers, wish, length = cars.drivers.of_rows(indices), desired[indices], front - rear
         after = find_leaders(lanes, lanes.chain(target, PLANNED + 1), progress, front, occupants, own=indices)
         new = find_followers(lanes, target, progress, rear, occupants, indices)
         old = find_followers(lanes, cars.lane[indices], progress, rear, occupants, indices)
         gap, ahead = leaders.gap[indices], leaders.speed[indices]
 
-        own, own_after = (
-            Drivers(np.tile(drivers.table, (2, 1)))
-            .response(
-                np.tile(speed, 2),
-                np.tile(wish, 2),
-                np.concatenate([gap, after.gap]),
-                np.concatenate([speed - ahead, speed - after.speed]),
-            )
-            .reshape(2, -1)
+        # Before and after the change in one call each, first the car, then its new and its old follower
+        own = Drivers(np.tile(drivers.table, (2, 1))).response(
+            np.tile(speed, 2),
+            np.tile(wish, 2),
+            np.concatenate([gap, after.gap]),
+            np.concatenate([speed - ahead, speed - after.speed]),
         )
-        new_follower, new_follower_after, old_follower, old_follower_after = self._followers(
-            cars,
-            desired,
-            occupants,
-            np.concatenate([new.number, new.number, old.number, old.number]),
-            np.concatenate([new.gap + length + after.gap, new.gap, old.gap, old.gap + length + gap]),
-            np.concatenate([after.speed, speed, speed, ahead]),
-        ).reshape(4, -1)
-        return Prospect(own, own_after, new_follower, new_follower_after, old_follower, old_follower_after)
+        number = np.concatenate([new.number, new.number, old.number, old.number])
+        behind = np.concatenate([new.gap + length + after.gap, new.gap, old.gap, old.gap + length + gap])
+        leader = np.concatenate([after.speed, speed, speed, ahead])
+        followers = self._followers(cars, desired, occupants, number, behind, leader)
+        return Prospect(*own.reshape(2, -1), *followers.reshape(4, -1))
 
     def _followers(
         self, cars: Cars, desired: Array, occupants: Occupants, number: Integers, behind: Array, leader: Array

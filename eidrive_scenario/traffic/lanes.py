@@ -55,10 +55,10 @@ class TrafficLanes:
         self._find_ends()
         self._tightest = np.full(len(self.keys), np.nan)
         self._limit = np.full(len(self.keys), np.nan)
-        self._varying = np.zeros(len(self.keys), dtype=bool)
-        for index, key in enumerate(self.keys):
-            road = roads.roads[key.road]
-            self._varying[index] = len(road.types) > 1 or len(tables.lanes[index].speeds) > 1
+        """Speed limits: NaN if not determined yet, -1 if the map gives none."""
+        pairs = zip(self.keys, tables.lanes, strict=True)
+        self._varying = np.array([len(roads.roads[key.road].types) > 1 or len(lane.speeds) > 1 for key, lane in pairs])
+        """Whether the limit of a lane may change along it."""
 
     def _link(self) -> None:
         """Store successors by the graph: driving lanes lead to driving lanes, sidewalks to sidewalks."""
@@ -89,13 +89,11 @@ class TrafficLanes:
                     same = self.direction[left] == self.direction[right]
                     if not (same and self.tables.lane_drivable[left] and self.tables.lane_drivable[right]):
                         continue
-                    outward, inward = self._may_cross(left, right)
-                    if self.direction[left] > 0:
-                        self.beside_right[left], self.beside_left[right] = right, left
-                        self.right[left], self.left[right] = (right if outward else -1), (left if inward else -1)
-                    else:
-                        self.beside_left[left], self.beside_right[right] = right, left
-                        self.left[left], self.right[right] = (right if outward else -1), (left if inward else -1)
+                    to_right, to_left = self._may_cross(left, right)
+                    if self.direction[left] < 0:
+                        left, right, to_right, to_left = right, left, to_left, to_right
+                    self.beside_right[left], self.beside_left[right] = right, left
+                    self.right[left], self.left[right] = (right if to_right else -1), (left if to_left else -1)
 
     def _may_cross(self, left: int, right: int) -> tuple[bool, bool]:
         """Return whether the marking permits changes from lane `left` to lane `right` at its right, and back.
@@ -183,17 +181,11 @@ class TrafficLanes:
     def limits(self, lane: Integers, progress: Array) -> Array:
         """Return the speed limits at positions (N,) [m/s]; NaN if the map gives none, inf for `no limit`."""
         limits = self._limit[lane]
-        fresh = np.isnan(limits) | self._varying[lane]
-        for n in np.flatnonzero(fresh):
-            limit = self._limit_at(int(lane[n]), float(progress[n]))
-            limits[n] = limit
+        for n in np.flatnonzero(np.isnan(limits) | self._varying[lane]):
+            key = self.keys[lane[n]]
+            s = float(self.s(lane[n], progress[n]))
+            limit = self.roads.speed_limit(key.road, min(max(s, 0.0), self.roads.roads[key.road].length), key.lane)
+            limits[n] = -1.0 if limit is None else limit
             if not self._varying[lane[n]]:
-                self._limit[lane[n]] = limit
+                self._limit[lane[n]] = limits[n]
         return np.where(limits < 0.0, np.nan, limits)
-
-    def _limit_at(self, lane: int, progress: float) -> float:
-        """Return the limit at one position, -1 if the map gives none."""
-        key = self.keys[lane]
-        s = float(self.s(np.array([lane]), np.array([progress]))[0])
-        limit = self.roads.speed_limit(key.road, min(max(s, 0.0), self.roads.roads[key.road].length), key.lane)
-        return -1.0 if limit is None else limit

@@ -208,15 +208,6 @@ class RightOfWay:
         self._lanes = lanes
         self._crossings = crossings
 
-    def take(self, cars: Cars, index: int) -> None:
-        """Let a car that is in a junction hold its lane."""
-        self._crossings.take(int(cars.plan[index, 0]), cars.specs[index].name)
-        cars.granted[index, 0] = True
-
-    def forget(self, name: str) -> None:
-        """Remove a car."""
-        self._crossings.forget(name)
-
     def waits(self, cars: Cars, begins: Array) -> Leaders:
         """Return the stop lines of junctions that cars may not enter yet."""
         wait = self._distances(cars, begins) - cars.front - STOP_LINE

@@ -45,9 +45,9 @@ class TrafficGenerator(CarGroup, ABC):
     def step(self, population: Population) -> None:
         """Spawn and despawn cars in this step."""
 
-    @abstractmethod
     def is_due(self, population: Population) -> bool:
-        """Return whether a car may be spawned now."""
+        """Return whether a car may be spawned now; never by a sink."""
+        return False
 
     @property
     def shortage(self) -> Diagnostic | None:
@@ -283,10 +283,6 @@ class Sink(TrafficGenerator):
     rate: float
     categories: frozenset[str] | None
     _next: float = field(default=-math.inf, init=False)
-
-    def is_due(self, population: Population) -> bool:
-        """Return False, as a sink never spawns cars."""
-        return False
 
     def step(self, population: Population) -> None:
         """Remove the nearest cars within the radius as far as the rate permits."""
