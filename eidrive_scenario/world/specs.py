@@ -19,12 +19,14 @@ _WORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("ambulance", ("ambulance",)),
     ("bus", ("bus", "fusorosa", "coach")),
     ("van", ("van", "sprinter", "transporter")),
-    ("truck", ("truck", "semi", "trailer", "carlacola")),
-    ("motorbike", ("motorbike", "motorcycle", "mc", "harley", "yamaha", "vespa", "kawasaki")),
-    ("bicycle", ("bicycle", "bike", "cyclist", "crossbike", "gazelle", "omafiets")),
-    ("pedestrian", ("pedestrian", "walker", "person", "adult", "child")),
-    ("rsu", ("rsu", "roadside_unit")),
 )
+"""Shapes by words in the name of a vehicle, the first one that it contains."""
+_MORE_PRECISE = {
+    "car": ("van", "ambulance"),
+    "van": ("ambulance",),
+    "truck": ("firetruck", "ambulance", "van"),
+}
+"""Shapes that the name may select instead of that of the category."""
 _VEHICLES = {
     "aircraft": "bus",
     "bicycle": "bicycle",
@@ -130,13 +132,8 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
     if isinstance(entity, MiscObject):
         return "rsu" if "rsu" in words else "box"
     by_category = _VEHICLES[entity.vehicle_category.value]
-    named = next((shape for shape, names in _WORDS if any(word in words for word in names)), None)
-    allowed = {
-        "car": ("car", "van", "ambulance"),
-        "van": ("van", "ambulance"),
-        "truck": ("truck", "firetruck", "ambulance", "van"),
-    }
-    return named if named is not None and named in allowed.get(by_category, ()) else by_category
+    named = next((shape for shape, names in _WORDS if not words.isdisjoint(names)), by_category)
+    return named if named in _MORE_PRECISE.get(by_category, ()) else by_category
 
 
 def _words(entity: Vehicle | MiscObject) -> set[str]:
