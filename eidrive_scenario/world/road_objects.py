@@ -98,8 +98,9 @@ class Building:
 
     @property
     def box(self) -> tuple[float, float, float, float, float, float, float]:
-        """Box x, y, z, length, width, height, heading."""
-        return (*self.center, *self.size, self.yaw)
+        """Box: center of the bottom x, y, z, length, width, height [m], heading [rad]."""
+        x, y, z = self.center
+        return x, y, z - self.size[2] / 2.0, *self.size, self.yaw
 
 
 class SignalHead(NamedTuple):

@@ -114,42 +114,26 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
     @classmethod
     def of_states(
         cls,
-        states: Sequence[ActorState],
-        table: Array,
-        actors: ActorColumns,
-        *,
         time: float,
         tick: int,
+        actors: ActorColumns,
+        states: Sequence[ActorState],
+        table: Array,
         contacts: tuple[Contact, ...],
-        unseen: tuple[str, ...],
-        unseen_by: Mapping[str, tuple[str, ...]],
+        hidden: tuple[tuple[str, ...], Mapping[str, tuple[str, ...]]],
     ) -> WorldView:
         """Return the view of actors in these states. What the caller has already is not computed from the arrays.
 
-        table   (N, 14) the same states
         actors  what is constant while no actor enters or leaves
+        table   (N, 14) the states
+        hidden  `unseen` and `unseen_by`
         """
-        view = cls(
-            time,
-            tick,
-            actors.names,
-            actors.categories,
-            table[:, 0:3],
-            table[:, 3],
-            table[:, 4],
-            table[:, 5],
-            table[:, 6:9],
-            table[:, 9:12],
-            table[:, 12],
-            table[:, 13],
-            actors.size,
-            actors.offset,
-            contacts,
-            unseen,
-            unseen_by,
-        )
-        cache = view.__dict__
-        cache["states"], cache["kinematics"], cache["rows"] = states, table[:, :9], actors.rows
+        names, categories, size, offset, rows = actors
+        yaw, pitch, roll = table[:, 3:6].T
+        position, velocity, acceleration, yaw_rate = table[:, 0:3], table[:, 6:9], table[:, 9:12], table[:, 12]
+        motion = position, yaw, pitch, roll, velocity, acceleration, yaw_rate, table[:, 13]
+        view = cls(time, tick, names, categories, *motion, size, offset, contacts, *hidden)
+        view.__dict__.update(states=states, kinematics=table[:, :9], rows=rows)
         return view
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:

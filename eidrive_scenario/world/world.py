@@ -94,8 +94,7 @@ class World:
         self._weather = Weather()
         self._signals: Mapping[str, str] = {}
         self._appearances: Mapping[str, Appearance] = {}
-        self._unseen: tuple[str, ...] = ()
-        self._unseen_by: Mapping[str, tuple[str, ...]] = {}
+        self._hidden = hidden_actors({})
         self._friction = 1.0
         self._couplings = Couplings(self._client)
         self._contacts = ContactTracker(self._couplings)
@@ -198,7 +197,7 @@ class World:
         self._signals = signals
         if appearances is not self._appearances:
             self._appearances = appearances
-            self._unseen, self._unseen_by = hidden_actors(appearances)
+            self._hidden = hidden_actors(appearances)
             self._view = None
 
     @property
@@ -265,12 +264,12 @@ class World:
 
     def surfaces(self) -> Surfaces:
         """Return the surfaces of the ground and of all static objects."""
-        return self._scenery.surfaces()
+        return self._scenery.surfaces
 
     def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> list[int]:
         """Return the rows of the first hits of rays as `raycast` does, but faster for up to a thousand rays."""
         self._refresh()
-        if self._unseen:
+        if self._hidden[0]:
             return list(self.raycast(origins, targets).rows.tolist())
         return first_hits(self._client, origins, targets, self._actors.row_in_list)
 
@@ -306,16 +305,7 @@ class World:
         """Return the view of the current poses and motion."""
         actors = self._actors
         states, table = actors.bodies.states()
-        return WorldView.of_states(
-            states,
-            table,
-            actors.columns,
-            time=self.time,
-            tick=self.tick,
-            contacts=contacts,
-            unseen=self._unseen,
-            unseen_by=self._unseen_by,
-        )
+        return WorldView.of_states(self.time, self.tick, actors.columns, states, table, contacts, self._hidden)
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)

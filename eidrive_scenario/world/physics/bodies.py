@@ -43,7 +43,8 @@ class Body(ABC):
         self.yaw_rate = 0.0
         self.acceleration: Vector3 = (0.0, 0.0, 0.0)
         self._dt, self._offset = dt, spec.offset
-        self._stand(placement)
+        self._pose(placement.x, placement.y, placement.z, placement.yaw, placement.pitch, placement.roll)
+        self.speed = placement.speed
         self.velocity = self._along_heading(placement.speed)
         self.velocity_before = self.velocity
         """Velocity at the start of the last step [m/s]."""
@@ -73,10 +74,6 @@ class Body(ABC):
         """Remove the body from pybullet."""
         bullet.removeBody(self.handle, physicsClientId=self.client)
 
-    def _stand(self, placement: Placement) -> None:
-        self._pose(placement.x, placement.y, placement.z, placement.yaw, placement.pitch, placement.roll)
-        self.speed = placement.speed
-
     def _pose(self, x: float, y: float, z: float, yaw: float, pitch: float, roll: float) -> None:
         self.x, self.y, self.z, self.yaw, self.pitch, self.roll = x, y, z, yaw, pitch, roll
         ox, oy, oz = self._offset
@@ -88,15 +85,6 @@ class Body(ABC):
             return speed * self._cos, speed * self._sin, 0.0
         level = speed * math.cos(self.pitch)
         return level * self._cos, level * self._sin, -speed * math.sin(self.pitch)
-
-    def _accelerate_to(self, velocity: Vector3) -> None:
-        old, dt = self.velocity, self._dt
-        self.velocity_before, self.velocity = old, velocity
-        self.acceleration = (
-            (velocity[0] - old[0]) / dt,
-            (velocity[1] - old[1]) / dt,
-            (velocity[2] - old[2]) / dt,
-        )
 
     def _create(self, center: Vector3, at: Vector3, mass: float, inertia: float, group: int, meets: int) -> None:
         """Create the rigid body with the center of its box in the frame of the center of gravity.
@@ -197,25 +185,19 @@ class ScriptedBody(Body):
         self.is_resting = not is_moving and acceleration == STILL
         self._state = tuple.__new__(ActorState, (*after, *along, *acceleration, yaw_rate, speed))
 
-    def end_step(
-        self,
-        *,
-        state: ActorState,
-        center: Vector3,
-        heading: tuple[float, float],
-        from_pose: tuple[float, ...],
-        velocity_before: Vector3,
-        moved: bool,
-        stale: bool,
-        is_resting: bool,
-    ) -> None:
-        """Set all values after a step that was computed elsewhere; `heading` is its cosine and sine."""
+    def end_step(self, state: ActorState, start: Sequence[float], footprint: Sequence[float], *flags: bool) -> None:
+        """Set all values after a step that was computed elsewhere.
+
+        start      pose x y z yaw pitch roll and velocity at its start
+        footprint  center of the box, cosine and sine of the heading
+        flags      moved, stale, is_resting
+        """
         self.x, self.y, self.z, self.yaw, self.pitch, self.roll = state[:6]
         self.velocity, self.acceleration, self.yaw_rate, self.speed = state[6:9], state[9:12], state[12], state[13]
-        self.center_x, self.center_y, self.center_z = center
-        self._cos, self._sin = heading
-        self.from_pose, self.velocity_before, self.moved = from_pose, velocity_before, moved
-        self.stale, self.is_resting, self._state = stale, is_resting, state
+        self.from_pose, (vx, vy, vz) = tuple(start[:6]), start[6:]
+        self.velocity_before = vx, vy, vz
+        self.center_x, self.center_y, self.center_z, self._cos, self._sin = footprint
+        (self.moved, self.stale, self.is_resting), self._state = flags, state
 
     def sync_pose(self) -> None:
         """Move the rigid body to the pose of the actor."""
@@ -380,7 +362,9 @@ class DrivenBody(Body):
         self.yaw_rate = rate
         level = vx * math.cos(yaw) + vy * math.sin(yaw)
         self.speed = level / math.cos(pitch)
-        self._accelerate_to((vx + arm_y * rate, vy - arm_x * rate, -math.tan(pitch) * level))
+        old_x, old_y, old_z = self.velocity_before = self.velocity
+        x, y, z = self.velocity = vx + arm_y * rate, vy - arm_x * rate, -math.tan(pitch) * level
+        self.acceleration = (x - old_x) / self._dt, (y - old_y) / self._dt, (z - old_z) / self._dt
 
     def _arm(self, yaw: float) -> Vector3:
         """Return the vector from the reference point to the center of gravity, at half the height of the box [m]."""

@@ -273,18 +273,17 @@ class BodyBatch(BodyGroup):
 
     def _write_back(self, members: Integers) -> None:
         """Set the attributes of some scripted bodies."""
-        columns = {
-            "state": [tuple.__new__(ActorState, state) for state in self._state[members].tolist()],
-            "center": self._center[members].tolist(),
-            "heading": list(zip(self._cos[members].tolist(), self._sin[members].tolist(), strict=True)),
-            "from_pose": list(map(tuple, self._from[members].tolist())),
-            "velocity_before": list(map(tuple, self._before[members].tolist())),
-            "moved": self._moved[members].tolist(),
-            "stale": self._stale[members].tolist(),
-            "is_resting": self._resting[members].tolist(),
-        }
-        for index, member in enumerate(members.tolist()):
-            self._scripted[member].end_step(**{name: column[index] for name, column in columns.items()})
+        starts, footprints, flags = (
+            np.column_stack([column[members] for column in columns]).tolist()
+            for columns in (
+                (self._from, self._before),
+                (self._center, self._cos, self._sin),
+                (self._moved, self._stale, self._resting),
+            )
+        )
+        rows = zip(members.tolist(), self._state[members].tolist(), starts, footprints, flags, strict=True)
+        for member, state, start, footprint, flag in rows:
+            self._scripted[member].end_step(tuple.__new__(ActorState, state), start, footprint, *flag)
 
     def sync_poses(self) -> None:
         members = np.flatnonzero(self._stale)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import WorldView
@@ -27,13 +26,11 @@ class FreeSpace:
 
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
-        self._circles: Array | None = None
         self._gaps: dict[tuple[str, str], tuple[float, float, float, float, float]] = {}
         """Ends of the line between two actors, and its distance from the nearest static object [m]."""
 
     def scenery_changed(self) -> None:
         """Forget the static objects."""
-        self._circles = None
         self._gaps.clear()
 
     def is_free(self, view: WorldView, own: int, origin: Vector3, target: int) -> bool:
@@ -73,11 +70,6 @@ class FreeSpace:
                 return False
         return True
 
-    def _static(self) -> Array:
-        if self._circles is None:
-            self._circles = self._scenery.circles()
-        return self._circles
-
     def _is_clear_of_scenery(
         self, pair: tuple[str, str], x: float, y: float, to_x: float, to_y: float, width: float
     ) -> bool:
@@ -95,7 +87,7 @@ class FreeSpace:
 
     def _gap(self, x: float, y: float, to_x: float, to_y: float) -> float:
         """Return the distance of a line from the nearest static object [m]."""
-        center_x, center_y, radius, _ = self._static()
+        center_x, center_y, radius, _ = self._scenery.circles
         if not len(radius):
             return math.inf
         px, py, dx, dy = center_x - x, center_y - y, to_x - x, to_y - y

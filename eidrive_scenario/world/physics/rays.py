@@ -160,7 +160,7 @@ def _scenery_shares(client: int, scenery: Scenery, begins: Array, ends: Array) -
     tested = np.arange(len(begins))
     above = min(begins[:, 2].min(initial=1.0), ends[:, 2].min(initial=1.0)) > 0.0
     if scenery.level and above:
-        circles = scenery.circles()
+        circles = scenery.circles
         if circles.shape[1] * len(begins) <= _MOST_ELEMENTS:
             tested = np.unique(_near(begins, ends, circles)[0])
     if len(tested):

@@ -89,10 +89,9 @@ class Obstacles:
         self._solid = _merged_rails(solid)
         self.solid_boxes = [box for piece in self._solid for box in _solid_boxes(piece)]
         self.soft_boxes = [_foliage(piece) for piece in road_objects if piece.kind in ("tree", "vegetation")]
-        self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
-        self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
-        for piece in self._solid:
-            self._nearby.add(piece, _cells(piece))
+        self._nearby: SpatialGrid[int] = SpatialGrid()
+        for row, piece in enumerate(self._solid):
+            self._nearby.add(row, _cells(piece))
 
     def raise_bodies(self, client: int) -> list[int]:
         """Create the bodies in pybullet and return their handles."""
@@ -101,14 +100,11 @@ class Obstacles:
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """Return the distance of a point from the nearest solid object, at most `most` [m]."""
-        return min([_gap(piece, x, y) for piece in self._nearby.query(x, y, most)], default=most)
+        return min([most, *(_gap(self._solid[row], x, y) for row in self._nearby.query(x, y, most))])
 
     def name_at(self, x: float, y: float) -> str:
         """Return the name of the object at a point of contact."""
-        gaps = [
-            (_gap(self._solid[row], x, y), row)
-            for row in np.flatnonzero(np.abs(self._where - (x, y)).max(axis=1) < 60.0).tolist()
-        ]
+        gaps = [(_gap(self._solid[row], x, y), row) for row in self._nearby.query(x, y, SQUARE)]
         return self._solid[min(gaps)[1]].name if gaps else "obstacle"
 
 
@@ -175,17 +171,16 @@ def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterat
         yield create_static_body(client, shape, group, meets)
 
 
-def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
-    """Yield the grid cells that a body may overlap."""
-    steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
+def _cells(piece: RoadObjectBody) -> Iterator[Cell]:
+    """Yield the grid cells that a body may overlap: those of a row of squares along it, which cover it."""
+    extent, side = max(piece.length, piece.width, 2 * piece.radius), min(piece.length, piece.width)
+    parts = max(math.ceil(extent / SQUARE), 1)
     cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
     dx, dy = (cos, sin) if piece.length >= piece.width else (-sin, cos)
-    extent, side = max(piece.length, piece.width), min(piece.length, piece.width) / 2
-    for step in range(steps + 1):
-        at = (step / steps - 0.5) * extent
-        x, y = piece.pose.x + at * dx, piece.pose.y + at * dy
-        for ox, oy in ((-side, -side), (side, -side), (side, side), (-side, side)):
-            yield math.floor((x + ox) / SQUARE), math.floor((y + oy) / SQUARE)
+    for part in range(parts):
+        at = ((part + 0.5) / parts - 0.5) * extent
+        reach = max(math.hypot(extent / parts, side) / 2, piece.radius)
+        yield from grid_cells(piece.pose.x + at * dx, piece.pose.y + at * dy, reach)
 
 
 def _gap(piece: RoadObjectBody, x: float, y: float) -> float:
@@ -240,7 +235,7 @@ class RoadScenery:
 
     @property
     def _boxes(self) -> list[Box]:
-        return [*self.obstacles.solid_boxes, *self.obstacles.soft_boxes, *map(standing_box, self.buildings)]
+        return [*self.obstacles.solid_boxes, *self.obstacles.soft_boxes, *(each.box for each in self.buildings)]
 
     @cached_property
     def surfaces(self) -> Surfaces:
@@ -280,12 +275,6 @@ def covering_circles(boxes: Sequence[Box]) -> Array:
     return np.stack([center_x, center_y, np.hypot(part, wide[of]) / 2.0, (bottom + height)[of]])
 
 
-def standing_box(building: Building) -> Box:
-    """Return the box of a building, with the height of its lower end."""
-    x, y, z = building.center
-    return x, y, z - building.size[2] / 2.0, *building.size, building.yaw
-
-
 _shared_scenery = lru_cache(maxsize=_MAX_KEPT)(RoadScenery)
 
 
@@ -308,7 +297,6 @@ class Scenery:
         self.roads = roads
         self._of_roads = _shared_scenery(roads, frozenset(entities)) if roads is not None else None
         self.buildings: list[Building] = []
-        self._surfaces: Surfaces | None = None
         self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
         """Center and radius of each building in plan view [m]."""
         self._client = client
@@ -324,7 +312,8 @@ class Scenery:
 
     def add_buildings(self, buildings: Sequence[Building]) -> None:
         """Add buildings, which block vehicles and rays."""
-        self._surfaces = None
+        for cached in ("circles", "surfaces"):  # of the buildings so far
+            vars(self).pop(cached, None)
         for building in buildings:
             self.buildings.append(building)
             x, y, radius = building.center[0], building.center[1], math.hypot(building.size[0], building.size[1]) / 2
@@ -373,23 +362,23 @@ class Scenery:
         self._obstacle_handles = frozenset(self._obstacles.raise_bodies(self._client))
         return bool(self._obstacle_handles)
 
+    @cached_property
     def circles(self) -> Array:
-        """Return circles (4, K) in plan view that cover all static objects: center x, y, radius, and top [m]."""
-        added = covering_circles(self._added_boxes())
+        """Circles (4, K) in plan view that cover all static objects: center x, y, radius, and top [m]."""
+        added = covering_circles(self._added_boxes)
         return added if self._of_roads is None else np.concatenate([self._of_roads.circles, added], axis=1)
 
+    @cached_property
     def surfaces(self) -> Surfaces:
-        """Return the surfaces of the ground and of all static objects."""
-        if self._surfaces is None:
-            of_roads = LEVEL_GROUND if self._of_roads is None else self._of_roads.surfaces
-            added = self._added_boxes()
-            self._surfaces = Surfaces.join(of_roads, Surfaces.of_boxes(np.array(added))) if added else of_roads
-        return self._surfaces
+        """Surfaces of the ground and of all static objects."""
+        of_roads, added = LEVEL_GROUND if self._of_roads is None else self._of_roads.surfaces, self._added_boxes
+        return Surfaces.join(of_roads, Surfaces.of_boxes(np.array(added))) if added else of_roads
 
+    @property
     def _added_boxes(self) -> list[Box]:
-        """Return the buildings that the road network does not have."""
+        """Buildings that the road network does not have."""
         first = 0 if self._of_roads is None else len(self._of_roads.buildings)
-        return [standing_box(building) for building in self.buildings[first:]]
+        return [building.box for building in self.buildings[first:]]
 
     def name_of(self, handle: int, position: Vector3) -> str:
         """Return the name of the object with this body in pybullet at a point of contact."""

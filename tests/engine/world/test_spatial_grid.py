@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from eidrive_scenario.world.physics.scenery import SpatialGrid, grid_cells
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.world.physics.scenery import Obstacles, SpatialGrid, grid_cells
+from eidrive_scenario.world.road_objects import RoadObjectBody
 
 
 @pytest.fixture
@@ -24,3 +26,31 @@ def test_query_contains_all_objects_within_reach(houses: SpatialGrid[tuple[float
 
 def test_query_with_infinite_reach_visits_occupied_cells_only(houses: SpatialGrid[tuple[float, float]]) -> None:
     assert len(set(houses.query(0.0, 0.0, 1e12))) == 300
+
+
+def wall(x: float, y: float, yaw: float, length: float, width: float, name: str = "wall") -> RoadObjectBody:
+    return RoadObjectBody(name, "barrier", Pose(x, y, 0.0, yaw, 0.0, 0.0), length, width, 1.0)
+
+
+def points_of(body: RoadObjectBody) -> np.ndarray:
+    """Return points (N, 2) of the base of a box, at most half a meter apart."""
+    sides = [np.linspace(-0.5, 0.5, int(2.0 * size) + 2) * size for size in (body.length, body.width)]
+    ahead, left = (part.ravel() for part in np.meshgrid(*sides))
+    cos, sin = np.cos(body.pose.h), np.sin(body.pose.h)
+    return np.column_stack([body.pose.x + cos * ahead - sin * left, body.pose.y + sin * ahead + cos * left])
+
+
+@pytest.mark.parametrize("most", [2.0, 8.0, 40.0])
+def test_clearance_is_the_distance_of_the_nearest_body_up_to_its_bound(most: float) -> None:
+    rng = np.random.default_rng(3)
+    sizes = [(60.0, 40.0), (40.0, 60.0), (25.0, 0.3), (0.3, 45.0), (9.0, 9.0), (18.0, 2.0)]
+    walls = [wall(*rng.uniform(-150.0, 150.0, 2), rng.uniform(0.0, 6.3), *size) for size in sizes]
+    obstacles, points = Obstacles(walls), np.concatenate([points_of(each) for each in walls])
+    for x, y in rng.uniform(-200.0, 200.0, (400, 2)).tolist():
+        expected = min(float(np.hypot(points[:, 0] - x, points[:, 1] - y).min()), most)
+        assert obstacles.clearance(x, y, most) == pytest.approx(expected, abs=0.4)
+
+
+def test_contact_at_the_end_of_a_long_wall_has_its_name() -> None:
+    obstacles = Obstacles([wall(0.0, 0.0, 0.0, 180.0, 0.3, "long"), wall(80.0, 30.0, 0.0, 4.0, 0.3, "short")])
+    assert obstacles.name_at(89.9, 0.2) == "long"
