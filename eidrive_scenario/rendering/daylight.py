@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Floats
+from eidrive_scenario.base.arrays import Array, Bools, Floats
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
@@ -86,10 +86,8 @@ def daylight(weather: Weather) -> Daylight:
         if direct * height < 0.01 * total:
             direct = 0.0
     clear_light = clear * _unit(np.array([0.70, 0.88, 1.25]) if height > 0.0 else np.array([0.62, 0.78, 1.30]))
-    gray = (
-        np.array([0.96, 1.0, 1.03]) * (1.0 - 0.35 * _low(weather.sun_elevation))
-        + 0.35 * _low(weather.sun_elevation) * warm
-    )
+    redness = 0.35 * float(np.clip(1.0 - abs(weather.sun_elevation - 2.0) / 10.0, 0.0, 1.0))  # of a low sun on clouds
+    gray = np.array([0.96, 1.0, 1.03]) * (1.0 - redness) + redness * warm
     cloud_light = clouds * _unit(gray) + NIGHT_GLOW * _unit(np.array([1.0, 0.85, 0.7]))
     sun = direct * warm
     sky = clear_light + cloud_light
@@ -113,11 +111,6 @@ def _sunlight_color(elevation: float) -> Array:
     height = max(elevation, 0.0)
     mass = 1.0 / (math.sin(math.radians(height)) + 0.50572 * (height + 6.07995) ** -1.6364)
     return _unit(np.exp(-np.minimum(mass, 12.0) * (RAYLEIGH + HAZE)))
-
-
-def _low(elevation: float) -> float:
-    """Return the weight in [0, 1] of the color of a low sun on clouds."""
-    return float(np.clip(1.0 - abs(elevation - 2.0) / 10.0, 0.0, 1.0))
 
 
 def _unit(color: Array) -> Array:
@@ -155,7 +148,7 @@ def dome(weather: Weather) -> Floats:
     the air in front of it.
     """
     light = daylight(weather)
-    x, y, z = _directions()
+    x, y, z, _ = _directions()
     clear = _scaled(_cie(_CLEAR, x, y, z, light.towards), z, float(light.clear @ LUMA))
     covered = _scaled(_cie(_OVERCAST, x, y, z, light.towards), z, float(light.clouds @ LUMA))
     color_clear = light.clear / max(float(light.clear @ LUMA), 1e-12)
@@ -199,8 +192,8 @@ def horizon(weather: Weather) -> Array:
 
 
 @lru_cache(maxsize=1)
-def _directions() -> tuple[Array, Array, Array]:
-    """Return the unit vectors of the pixels of the dome; those of the horizon outside its circle."""
+def _directions() -> tuple[Array, Array, Array, Bools]:
+    """Return the unit vectors of the pixels of the dome, those of the horizon outside its circle, and which are inside."""
     axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
     u, v = np.meshgrid(axis, axis)
     reach = np.hypot(u, v)
@@ -208,7 +201,7 @@ def _directions() -> tuple[Array, Array, Array]:
     u, v = u * shrink, v * shrink
     square = np.minimum(u * u + v * v, 1.0)
     z = (1.0 - square) / (1.0 + square)
-    return u * (1.0 + z), v * (1.0 + z), z
+    return u * (1.0 + z), v * (1.0 + z), z, reach <= 1.0
 
 
 def _cie(coefficients: tuple[float, ...], x: Array, y: Array, z: Array, sun: Array) -> Array:
@@ -226,10 +219,8 @@ def _cie(coefficients: tuple[float, ...], x: Array, y: Array, z: Array, sun: Arr
 
 def _scaled(relative: Array, z: Array, illuminance: float) -> Array:
     """Return the luminance [cd/m²] that gives this illuminance on level ground [lx]."""
-    axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
-    inside = np.hypot(*np.meshgrid(axis, axis)) <= 1.0
     solid_angle = (1.0 + z) ** 2 / ((SIZE - 2) / 2) ** 2
-    given = float((relative * z * solid_angle)[inside].sum())
+    given = float((relative * z * solid_angle)[_directions()[3]].sum())
     luminance: Array = relative * (illuminance / max(given, 1e-12))
     return luminance
 
@@ -239,7 +230,7 @@ def _clouds(cover: float) -> tuple[Array, Array]:
     """Return the cloud cover in [0, 1] and the brightness of clouds relative to their mean."""
     if cover <= 0.0:
         return np.zeros((SIZE, SIZE)), np.ones((SIZE, SIZE))
-    x, y, z = _directions()
+    x, y, z, _ = _directions()
     away = _CLOUD_HEIGHT / (z + 0.10)
     noise = _noise(x * away, y * away)
     shape = np.hypot(x, y) < 1.0

@@ -216,10 +216,6 @@ _NEAR_GROUND = 0.12
 _FEWEST_PIXELS = 10.0
 
 
-_Window = tuple[slice, slice]
-"""Lines and columns of the image."""
-
-
 def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.bool_], view: CameraView) -> Floats:
     """Return the share (H, W) of sky light on the ground in the pixels; `upright` by triangle."""
     share = np.ones(view.shape, dtype=np.float32)
@@ -230,21 +226,14 @@ def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.boo
         if 2.0 * float(half[0]) * view.pinhole.focal < _FEWEST_PIXELS * away:
             continue
         window = _window(middle, body, half, view)
-        if window is not None:
-            _dim(share, window, middle, body, cover, upright, view)
+        if window is None:
+            continue
+        triangle = cover.triangle[window]
+        pixels = np.arange(share.size).reshape(share.shape)[window][upright[triangle] & (triangle >= 0)]
+        forward = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
+        base = np.array([*middle, *half[:2], *forward], dtype=np.float32)
+        _darken(pixels, view.places(pixels, cover.nearness), base, share.ravel())
     return share
-
-
-def _dim(
-    share: Floats, window: _Window, middle: Array, body: MeshInstance, cover: Cover, upright: NDArray[np.bool_],
-    view: CameraView,
-) -> None:  # fmt: skip
-    """Multiply the share (H, W) of sky light of one body in its window of the image."""
-    triangle = cover.triangle[window]
-    pixels = np.arange(share.size).reshape(share.shape)[window][upright[triangle] & (triangle >= 0)]
-    forward = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
-    base = np.array([*middle, *body.model.half[:2], *forward], dtype=np.float32)
-    _darken(pixels, view.places(pixels, cover.nearness), base, share.ravel())
 
 
 @kernel("void(i8[::1], f4[:,::1], f4[::1], f4[::1])")
@@ -265,8 +254,8 @@ def _darken(pixels: Integers, places: Floats, base: Floats, share: Floats) -> No
             share[pixel] = min(share[pixel], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
 
 
-def _window(middle: Array, body: MeshInstance, half: Array, view: CameraView) -> _Window | None:
-    """Return the window of the image around the darkened ground of a body; None if it is outside."""
+def _window(middle: Array, body: MeshInstance, half: Array, view: CameraView) -> tuple[slice, slice] | None:
+    """Return the lines and columns of the image around the darkened ground of a body; None if it is outside."""
     pinhole = view.pinhole
     signs = np.array([(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)], dtype=float)
     reach = np.array([half[0] + _REACH, half[1] + _REACH, 0.0])

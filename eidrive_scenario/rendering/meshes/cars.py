@@ -27,8 +27,13 @@ def car(frame: BodyDimensions) -> Mesh:
 
 def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, waist: float, top: float) -> Array:
     """Return a section of the shell at a share x of the length; widths and heights are shares as well."""
-    y, tilt = width * frame.side, 0.9
-    half = [(y * 0.86, bottom), (y, bottom + 0.07), (y * 1.0, waist), (y * tilt, top - 0.015), (y * 0.55, top)]
+    y = width * frame.side
+    half = [(y * 0.86, bottom), (y, bottom + 0.07), (y, waist), (y * 0.9, top - 0.015), (y * 0.55, top)]
+    return _symmetric(frame, x, half)
+
+
+def _symmetric(frame: BodyDimensions, x: float, half: list[tuple[float, float]]) -> Array:
+    """Return a section from the distances of its corners from the middle [m] and their shares of the height."""
     points = [(-a, b) for a, b in half] + [(a, b) for a, b in reversed(half)]
     return np.array([(frame.x(x), a, frame.z(b)) for a, b in points])
 
@@ -62,22 +67,12 @@ def _cabin(
     bottom = np.array([(x0, -wide, low), (x3, -wide, low), (x3, wide, low), (x0, wide, low)])
     top = np.array([(x1, -narrow, high), (x2, -narrow, high), (x2, narrow, high), (x1, narrow, high)])
     crown = top * (1.0, 0.85, 1.0) + (0.0, 0.0, frame.z(0.025))
-    crown[:, 0] = np.array([0.93, 0.93, 0.93, 0.93]) * (crown[:, 0] - crown[:, 0].mean()) + crown[:, 0].mean()
+    crown[:, 0] = 0.93 * (crown[:, 0] - crown[:, 0].mean()) + crown[:, 0].mean()
     mesh.add("paint", loft([crown, top, bottom]))
-    rear, front = _face(bottom[[3, 0]], top[[3, 0]]), _face(bottom[[1, 2]], top[[1, 2]])
+    # Corners of the faces from left to right seen from outside, at the bottom and at the top
+    rear, front, right = (np.concatenate([bottom[ends], top[ends]]) for ends in ([3, 0], [1, 2], [0, 1]))
     mesh.add("glass", _pane(rear, 0.08, 0.92, 0.10, 0.92), _pane(front, 0.05, 0.95, 0.04, 0.95))
-    right = _face(bottom[[0, 1]], top[[0, 1]])
-    middle = 0.47
-    mesh.add_mirrored(
-        "glass",
-        _pane(right, 0.07, middle - 0.015, 0.10, 0.88),
-        _pane(right, middle + 0.015, 0.92, 0.10, 0.88),
-    )
-
-
-def _face(bottom: Array, top: Array) -> Array:
-    """Return the four corners of a face: bottom from left to right seen from outside, then top likewise."""
-    return np.stack([bottom[0], bottom[1], top[0], top[1]])
+    mesh.add_mirrored("glass", _pane(right, 0.07, 0.455, 0.10, 0.88), _pane(right, 0.485, 0.92, 0.10, 0.88))
 
 
 def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:
@@ -172,8 +167,7 @@ def _section(frame: BodyDimensions, x: float, width: float, bottom: float, shoul
     """Return a section of the body: `width` is a share of half the width, the others of the height."""
     y = width * frame.side
     half = [(0.94 * y, bottom), (y, bottom + 0.05), (y, shoulder), (0.90 * y, top - 0.04), (0.80 * y, top)]
-    points = [(-a, b) for a, b in half] + [(a, b) for a, b in reversed(half)]
-    return np.array([(frame.x(x), a, frame.z(b)) for a, b in points])
+    return _symmetric(frame, x, half)
 
 
 def _body(mesh: Mesh, frame: BodyDimensions, roof_from: float) -> None:

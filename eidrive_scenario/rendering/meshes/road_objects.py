@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 
 from eidrive_scenario.base.arrays import Array
@@ -26,10 +26,62 @@ CONIFERS = ("fir", "pine", "spruce", "conifer", "tanne", "fichte")
 def road_object_mesh(
     kind: str, name: str, length: float, width: float, height: float, radius: float
 ) -> Mapping[str, Array]:
-    """Return triangles (K, 3, 3) of a road object by material."""
-    mesh = Mesh()
-    _BUILDERS[kind](mesh, name, length, width, height, radius)
+    """Return triangles (K, 3, 3) of a road object by material; its name selects between versions of some kinds."""
+    mesh, words = Mesh(), name.lower()
+    match kind:
+        case "tree":
+            _add_tree(mesh, any(word in words for word in CONIFERS), length, width, height, radius)
+        case "vegetation":
+            small = ball((0.2 * length, -0.15 * width, 0.35 * height), (0.3 * length, 0.3 * width, 0.4 * height), 4, 6)
+            mesh.add("leaves", ball((0, 0, 0.45 * height), (length / 2, width / 2, 0.55 * height), 4, 7), small)
+        case "pole" | "post":
+            mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.8 * radius, sides=8))
+        case "lamp":
+            mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.6 * radius, sides=8))
+            mesh.add("steel", cylinder((0, 0, height - 0.1), (1.4, 0, height), 0.6 * radius, 0.5 * radius, sides=6))
+            mesh.add("plastic", box((1.6, 0, height), (0.6, 0.25, 0.1)))
+        case "guide post":
+            size, top = (2 * radius, 2 * radius, height), (1.6 * radius, 1.6 * radius)
+            mesh.add("white", tapered_box((0, 0, height / 2), size, top))
+            mesh.add("trim", box((0, 0, 0.8 * height), (2.1 * radius, 2.1 * radius, 0.15 * height)))
+            mesh.add("plate", box((-radius, 0, 0.8 * height), (0.02, radius, 0.1 * height)))
+        case "barrier":
+            narrow = (length, 0.6 * width)
+            mesh.add("concrete", tapered_box((0, 0, 0.16 * height), (length, width, 0.32 * height), narrow))
+            upper = tapered_box((0, 0, 0.66 * height), (*narrow, 0.68 * height), (length, 0.4 * width))
+            mesh.add("concrete", upper)
+        case "railing":
+            mesh.add("steel", box((0, 0, 0.7 * height), (length, 0.25 * width, 0.6 * height)))
+            mesh.add("steel", box((0, 0, 0.35 * height), (0.1, 0.4 * width, 0.7 * height)))
+        case "obstacle" if "cone" in words:
+            mesh.add("trim", box((0, 0, 0.02), (length, width, 0.04)))
+            mesh.add("orange", cylinder((0, 0, 0.04), (0, 0, height), 0.38 * min(length, width), 0.03, sides=10))
+        case "obstacle" if radius:
+            mesh.add("gray", cylinder((0, 0, 0), (0, 0, height), radius, sides=12))
+        case "obstacle":
+            material = "steel" if "post" in words or "pole" in words else "cargo"
+            mesh.add(material, box((0, 0, height / 2), (length, width, height)))
+        case "gantry":
+            mesh.add_mirrored("steel", box((0, width / 2, height / 2), (0.3, 0.3, height)))
+            mesh.add("steel", box((0, 0, height - 0.3), (0.3, width, 0.6)))
+        case "island":
+            top = (0.97 * length, 0.97 * width)
+            mesh.add("pavement", tapered_box((0, 0, height / 2), (length, width, height), top))
     return mesh.materials()
+
+
+def _add_tree(mesh: Mesh, conifer: bool, length: float, width: float, height: float, radius: float) -> None:
+    girth = 0.6 * radius
+    mesh.add("bark", cylinder((0, 0, 0), (0, 0, 0.45 * height), girth, 0.7 * girth, sides=6))
+    if conifer:
+        for low, high, share in ((0.15, 0.62, 1.0), (0.42, 0.85, 0.7), (0.68, 1.0, 0.45)):
+            reach = share * (length + width) / 4
+            mesh.add("needles", cylinder((0, 0, low * height), (0, 0, high * height), reach, 0.02, sides=7))
+        return
+    middle, half = 0.65 * height, (length / 2, width / 2, 0.35 * height)
+    aside = (0.22 * length, 0.1 * width, middle - 0.1 * height)
+    mesh.add("leaves", ball((0, 0, middle), half, 5, 8))
+    mesh.add("leaves", ball(aside, (0.3 * length, 0.3 * width, 0.2 * height), 4, 7))
 
 
 @lru_cache(maxsize=64)
@@ -48,95 +100,6 @@ def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mappi
         visor = tapered_box((0.07, 0, z + 1.12 * lens), (0.14, 2.0 * lens, 0.02), (0.14, 1.6 * lens))
         mesh.add("plastic", visor)
     return mesh.materials()
-
-
-def _tree(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    girth = 0.6 * radius
-    mesh.add("bark", cylinder((0, 0, 0), (0, 0, 0.45 * height), girth, 0.7 * girth, sides=6))
-    if any(word in name.lower() for word in CONIFERS):
-        for low, high, share in ((0.15, 0.62, 1.0), (0.42, 0.85, 0.7), (0.68, 1.0, 0.45)):
-            reach = share * (length + width) / 4
-            mesh.add("needles", cylinder((0, 0, low * height), (0, 0, high * height), reach, 0.02, sides=7))
-        return
-    middle, half = 0.65 * height, (length / 2, width / 2, 0.35 * height)
-    mesh.add("leaves", ball((0, 0, middle), half, 5, 8))
-    mesh.add(
-        "leaves",
-        ball((0.22 * length, 0.1 * width, middle - 0.1 * height), (0.3 * length, 0.3 * width, 0.2 * height), 4, 7),
-    )
-
-
-def _bush(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("leaves", ball((0, 0, 0.45 * height), (length / 2, width / 2, 0.55 * height), 4, 7))
-    mesh.add(
-        "leaves", ball((0.2 * length, -0.15 * width, 0.35 * height), (0.3 * length, 0.3 * width, 0.4 * height), 4, 6)
-    )
-
-
-def _pole(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.8 * radius, sides=8))
-
-
-def _lamp(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.6 * radius, sides=8))
-    mesh.add("steel", cylinder((0, 0, height - 0.1), (1.4, 0, height), 0.6 * radius, 0.5 * radius, sides=6))
-    mesh.add("plastic", box((1.6, 0, height), (0.6, 0.25, 0.1)))
-
-
-def _guide_post(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("white", tapered_box((0, 0, height / 2), (2 * radius, 2 * radius, height), (1.6 * radius, 1.6 * radius)))
-    mesh.add("trim", box((0, 0, 0.8 * height), (2.1 * radius, 2.1 * radius, 0.15 * height)))
-    mesh.add("plate", box((-radius, 0, 0.8 * height), (0.02, radius, 0.1 * height)))
-
-
-def _barrier(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("concrete", tapered_box((0, 0, 0.16 * height), (length, width, 0.32 * height), (length, 0.6 * width)))
-    mesh.add(
-        "concrete", tapered_box((0, 0, 0.66 * height), (length, 0.6 * width, 0.68 * height), (length, 0.4 * width))
-    )
-
-
-def _railing(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("steel", box((0, 0, 0.7 * height), (length, 0.25 * width, 0.6 * height)))
-    mesh.add("steel", box((0, 0, 0.35 * height), (0.1, 0.4 * width, 0.7 * height)))
-
-
-def _obstacle(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    if "cone" in name.lower():
-        mesh.add("trim", box((0, 0, 0.02), (length, width, 0.04)))
-        mesh.add("orange", cylinder((0, 0, 0.04), (0, 0, height), 0.38 * min(length, width), 0.03, sides=10))
-        return
-    if radius:
-        mesh.add("gray", cylinder((0, 0, 0), (0, 0, height), radius, sides=12))
-        return
-    mesh.add(
-        "steel" if "post" in name.lower() or "pole" in name.lower() else "cargo",
-        box((0, 0, height / 2), (length, width, height)),
-    )
-
-
-def _gantry(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add_mirrored("steel", box((0, width / 2, height / 2), (0.3, 0.3, height)))
-    mesh.add("steel", box((0, 0, height - 0.3), (0.3, width, 0.6)))
-
-
-def _island(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
-    mesh.add("pavement", tapered_box((0, 0, height / 2), (length, width, height), (0.97 * length, 0.97 * width)))
-
-
-_BUILDERS: Mapping[str, Callable[[Mesh, str, float, float, float, float], None]] = {
-    "tree": _tree,
-    "vegetation": _bush,
-    "pole": _pole,
-    "post": _pole,
-    "lamp": _lamp,
-    "guide post": _guide_post,
-    "barrier": _barrier,
-    "railing": _railing,
-    "obstacle": _obstacle,
-    "gantry": _gantry,
-    "island": _island,
-}
 
 
 def roadside_unit(frame: BodyDimensions) -> Mesh:
