@@ -18,7 +18,7 @@ from eidrive_scenario.driving.station_warnings import areas_off_road
 from eidrive_scenario.errors import Diagnostic, InputError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import Pose, PositionError, RoadNetwork
-from eidrive_scenario.roads.model.map_warnings import MAP_RULES
+from eidrive_scenario.roads.model.map_warnings import MapRule
 from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
@@ -101,7 +101,7 @@ def _invalid_geo_reference(context: HasRoads) -> Iterator[Diagnostic]:
 
 
 ROAD_FILE_RULES: tuple[Rule[HasRoads], ...] = (
-    *(Rule(rule.name, Level.WARNING, rule.summary, map_warning_rule(rule.name)) for rule in MAP_RULES),
+    *(Rule(rule.id, Level.WARNING, rule.value, map_warning_rule(rule.id)) for rule in MapRule),
     Rule("geo-reference", Level.WARNING, "a geoReference that cannot be used", _invalid_geo_reference),
 )
 """Rules that need only the road file."""

@@ -193,7 +193,7 @@ def horizon(weather: Weather) -> Array:
 
 @lru_cache(maxsize=1)
 def _directions() -> tuple[Array, Array, Array, Bools]:
-    """Return the unit vectors of the pixels of the dome, those of the horizon outside its circle, and which are inside."""
+    """Return the unit vectors of the pixels of the dome, those of the horizon outside its circle, and a mask of it."""
     axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
     u, v = np.meshgrid(axis, axis)
     reach = np.hypot(u, v)

@@ -11,15 +11,7 @@ from itertools import pairwise
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lateral_axis
 from eidrive_scenario.roads.model.location import LaneKey
-from eidrive_scenario.roads.model.map_warnings import (
-    GEOMETRY_GAP,
-    HEADING_DISCONTINUITY,
-    JUNCTION_CONNECTION,
-    LANE_LINK,
-    LANE_WIDTH,
-    ROAD_SURFACE,
-    MapWarning,
-)
+from eidrive_scenario.roads.model.map_warnings import MapRule, MapWarning
 from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, LaneSection, Road, RoadLink
 from eidrive_scenario.roads.routing.graph import LaneWays
 from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
@@ -68,13 +60,14 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
     spans = "geometries that overlap or leave a gap in s"
     if abs(curves[0].s) > JUMP:
         message = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
-        yield MapWarning(GEOMETRY_GAP, spans, message, "start it at s=0", curves[0].line)
+        yield MapWarning(MapRule.GEOMETRY_GAP, spans, message, "start it at s=0", curves[0].line)
     for curve, following in pairwise(curves):
         missing = following.s - curve.s - curve.length
         if abs(missing) > JUMP:
             relation = "ends before the next one starts" if missing > 0.0 else "overlaps the next one"
             message = f"{name}: the geometry at s = {curve.s:g} m {relation}, by {abs(missing):.3g} m"
-            yield MapWarning(GEOMETRY_GAP, spans, message, "set s to the sum of the preceding lengths", following.line)
+            hint = "set s to the sum of the preceding lengths"
+            yield MapWarning(MapRule.GEOMETRY_GAP, spans, message, hint, following.line)
             continue
         end, start = curve.at(curve.length), following.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
@@ -82,30 +75,24 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         if apart > JUMP:
             message = f"{name} jumps by {apart:.3g} m at s = {following.s:g} m"
             hint = "start each geometry at the end of its predecessor"
-            yield MapWarning(GEOMETRY_GAP, "such jumps", message, hint, following.line)
+            yield MapWarning(MapRule.GEOMETRY_GAP, "such jumps", message, hint, following.line)
         elif KINK < turn < CORNER:
             message = f"{name} has a kink of {turn:.3g} rad at s = {following.s:g} m"
-            yield MapWarning(
-                HEADING_DISCONTINUITY,
-                "such kinks",
-                message,
-                "start each geometry with the final heading of its predecessor",
-                following.line,
-            )
+            hint = "start each geometry with the final heading of its predecessor"
+            yield MapWarning(MapRule.HEADING_DISCONTINUITY, "such kinks", message, hint, following.line)
     over = curves[-1].s + curves[-1].length - road.length
     if abs(over) > JUMP:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
         message = f"{name} has length {road.length:g} m, but its geometry ends {there}"
-        yield MapWarning(
-            GEOMETRY_GAP, "lengths that differ from the geometry", message, "correct the length", road.line
-        )
+        hint = "correct the length"
+        yield MapWarning(MapRule.GEOMETRY_GAP, "lengths that differ from the geometry", message, hint, road.line)
 
 
 def _tilts(road: Road) -> Iterator[MapWarning]:
     for start, tilt, *_ in road.superelevation.pieces:
         if abs(tilt) > STEEP:
             message = f"road {road.id!r} is tilted by {tilt:.3g} rad at s = {start:g} m"
-            yield MapWarning(ROAD_SURFACE, "such tilts", message, "give <superelevation> in radians", road.line)
+            yield MapWarning(MapRule.ROAD_SURFACE, "such tilts", message, "give <superelevation> in radians", road.line)
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning]:
@@ -116,15 +103,16 @@ def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning
     if lane.width_from > JUMP:
         until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
         message = f"{name} has no width{until}"
-        yield MapWarning(LANE_WIDTH, "lanes without a width", message, 'give a <width> at sOffset="0"', lane.line)
+        hint = 'give a <width> at sOffset="0"'
+        yield MapWarning(MapRule.LANE_WIDTH, "lanes without a width", message, hint, lane.line)
     widths = list(_extremes(lane, section.length))
     least, most = min(widths), max(widths)
     if least < NARROW:
         message = f"{name} becomes {least:.3g} m wide"
-        yield MapWarning(LANE_WIDTH, "negative widths", message, "give widths of at least 0", lane.line)
+        yield MapWarning(MapRule.LANE_WIDTH, "negative widths", message, "give widths of at least 0", lane.line)
     if most > WIDE:
         message = f"{name} becomes {most:.3g} m wide"
-        yield MapWarning(LANE_WIDTH, "implausible widths", message, "correct its coefficients", lane.line)
+        yield MapWarning(MapRule.LANE_WIDTH, "implausible widths", message, "correct its coefficients", lane.line)
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:
@@ -164,7 +152,7 @@ def _broken(road: Road, section: LaneSection, side: int, lanes: Mapping[int, Lan
                 word = "successor" if side > 0 else "predecessor"
                 message = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
                 hint = "known: " + ", ".join(map(str, sorted(lanes)))
-                yield MapWarning(LANE_LINK, "links to lanes that do not exist", message, hint, lane.line)
+                yield MapWarning(MapRule.LANE_LINK, "links to lanes that do not exist", message, hint, lane.line)
 
 
 def missing_lane_link(
@@ -247,8 +235,9 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
         message += f" in {link.element_type} {link.element_id!r}"
     if link is not None and link.element_type == "junction":
         hint = "add a <laneLink> from it to a <connection>"
-        return MapWarning(LANE_LINK, "lanes without a successor at junctions", message, hint, lane.line)
-    return MapWarning(LANE_LINK, "lanes without a successor", message, "link it or reduce its width to 0", lane.line)
+        return MapWarning(MapRule.LANE_LINK, "lanes without a successor at junctions", message, hint, lane.line)
+    hint = "link it or reduce its width to 0"
+    return MapWarning(MapRule.LANE_LINK, "lanes without a successor", message, hint, lane.line)
 
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
@@ -265,7 +254,8 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
         if apart > JUMP:
             names = f"lane {end.lane.lane} of road {road.id!r} and lane {other_end.lane.lane} of road {beyond.id!r}"
             message = f"{names} are linked but their ends are {apart:.3g} m apart"
-            yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", message, "make their ends meet", lane.line)
+            hint = "make their ends meet"
+            yield MapWarning(MapRule.GEOMETRY_GAP, "linked lanes that do not meet", message, hint, lane.line)
 
 
 @dataclass(frozen=True)
@@ -302,7 +292,7 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     if not incoming.sections or not connecting.sections:
         return
     name = f"connection {connection.id!r} of junction {junction.id!r}"
-    rule = JUNCTION_CONNECTION
+    rule = MapRule.JUNCTION_CONNECTION
     ends = [link for link in (incoming.predecessor, incoming.successor) if link is not None]
     touches = any(link.element_type == "junction" and link.element_id == junction.id for link in ends)
     if junction.type == "default" and not touches:

@@ -302,7 +302,7 @@ class RoadNetwork(RoadAttributes):
                 raise
             (diagnostic,) = error.diagnostics
             message = f"{diagnostic.message} ({self.source}:{missing.line}: {missing.message})"
-            named = replace(diagnostic, message=message, hint=missing.hint, rule=missing.rule.name)
+            named = replace(diagnostic, message=message, hint=missing.hint, rule=missing.rule.id)
             raise RouteError(named) from None
 
     def distance(

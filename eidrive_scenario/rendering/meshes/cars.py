@@ -72,7 +72,10 @@ def _cabin(
     # Corners of the faces from left to right seen from outside, at the bottom and at the top
     rear, front, right = (np.concatenate([bottom[ends], top[ends]]) for ends in ([3, 0], [1, 2], [0, 1]))
     mesh.add("glass", _pane(rear, 0.08, 0.92, 0.10, 0.92), _pane(front, 0.05, 0.95, 0.04, 0.95))
-    mesh.add_mirrored("glass", _pane(right, 0.07, 0.455, 0.10, 0.88), _pane(right, 0.485, 0.92, 0.10, 0.88))
+    post = 0.47
+    mesh.add_mirrored(
+        "glass", _pane(right, 0.07, post - 0.015, 0.10, 0.88), _pane(right, post + 0.015, 0.92, 0.10, 0.88)
+    )
 
 
 def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:

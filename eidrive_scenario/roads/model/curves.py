@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -28,11 +28,10 @@ _BOTH = np.array([_SINE, _COSINE]).T[:, :, None]
 """Coefficients of the sine and the cosine integral: (_TERMS, 2, 1)."""
 
 
-@overload
-def fresnel(x: float) -> tuple[float, float]: ...
-@overload
-def fresnel(x: Array) -> tuple[Array, Array]: ...
-def fresnel(x: float | Array) -> tuple[float | Array, float | Array]:
+Argument = TypeVar("Argument", float, Array)
+
+
+def fresnel(x: Argument) -> tuple[Argument, Argument]:
     """Return the integrals of sin(pi t²/2) and cos(pi t²/2) from 0 to x (DLMF 7.2.7, 7.2.8), of a number or (N,).
 
     Up to `LONGEST` the series of DLMF 7.6.4 and 7.6.6 has an error below 2e-15, and needs no import of scipy, which
@@ -48,11 +47,7 @@ def fresnel(x: float | Array) -> tuple[float | Array, float | Array]:
     return sine, cosine
 
 
-@overload
-def _series(x: float) -> tuple[float, float]: ...
-@overload
-def _series(x: Array) -> tuple[Array, Array]: ...
-def _series(x: float | Array) -> tuple[float | Array, float | Array]:
+def _series(x: Argument) -> tuple[Argument, Argument]:
     square = x * x
     fourth = square * square
     if isinstance(x, float):
@@ -84,6 +79,10 @@ STANDSTILL = 1e-9
 """Maximum path length per unit of the parameter of a cubic at which it has no direction, and no curvature."""
 MAX_CUBICS = 20_000
 """Maximum number of cubics that replace one poly3. Cubics of a longer poly3 are longer than a meter."""
+
+
+Coefficients = tuple[float, float, float, float]
+"""Coefficients of a cubic polynomial in ascending order."""
 
 
 class CurvePoint(NamedTuple):
@@ -186,8 +185,8 @@ class Spiral(Curve):
 class Cubic(Curve):
     """Curve u(p), v(p), cubic in the local frame of the start, with p = ds·pace."""
 
-    u: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 0.0)
-    v: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    u: Coefficients = (0.0, 1.0, 0.0, 0.0)
+    v: Coefficients = (0.0, 0.0, 0.0, 0.0)
     pace: float = 1.0
 
     def bend(self, ds: float) -> tuple[float, float]:
@@ -225,7 +224,7 @@ def spiral(
 
 
 def poly3(
-    s: float, x: float, y: float, h: float, length: float, v: tuple[float, float, float, float], line: int | None = None
+    s: float, x: float, y: float, h: float, length: float, v: Coefficients, line: int | None = None
 ) -> list[Cubic]:
     """Return the curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
 
@@ -262,7 +261,7 @@ def poly3(
     return cubics
 
 
-def _hermite(value: Array, slope: Array, i: int, step: float) -> tuple[float, float, float, float]:
+def _hermite(value: Array, slope: Array, i: int, step: float) -> Coefficients:
     """Return the coefficients of the cubic with the given values and slopes at knots i and i + 1, `step` apart."""
     rise = (value[i + 1] - value[i]) / step
     c = (3.0 * rise - 2.0 * slope[i] - slope[i + 1]) / step

@@ -10,7 +10,7 @@ from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.roads.model.map_warnings import ROAD_MARK, MapRule, MapWarning
+from eidrive_scenario.roads.model.map_warnings import MapRule, MapWarning
 from eidrive_scenario.roads.model.polynomials import ROUNDING, Piece
 
 MAX_ERRORS = 100
@@ -30,15 +30,12 @@ class AttributeReader:
         self.map_warnings: list[MapWarning] = []
         self._spent: dict[str, float] = {}
 
-    def report_error(self, element: etree._Element | None, message: str, hint: str) -> None:
-        """Append an error of an element."""
-        self.append_diagnostic(Diagnostic(message, hint, self.source, line_of(element)))
-
-    def append_diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Append an error. Raise RoadError with all errors if there are too many."""
-        self.errors.append(diagnostic)
+    def report_error(self, where: etree._Element | int | None, message: str, hint: str) -> None:
+        """Append an error of an element or line. Raise RoadError with all errors if there are too many."""
+        line = where if isinstance(where, int) else line_of(where)
+        self.errors.append(Diagnostic(message, hint, self.source, line))
         if len(self.errors) >= MAX_ERRORS:
-            last = Diagnostic(f"reading ends after {MAX_ERRORS} errors", "", self.source, diagnostic.line)
+            last = Diagnostic(f"reading ends after {MAX_ERRORS} errors", "", self.source, line)
             raise RoadError([*sorted(self.errors, key=lambda error: error.line or 0), last])
 
     def spend(self, element: etree._Element, what: str, amount: float, limit: float) -> None:
@@ -91,7 +88,7 @@ class AttributeReader:
     def report_mark_warning(self, element: etree._Element, what: str) -> None:
         """Append a warning of an incomplete road mark."""
         message, hint = f"{what}, and is drawn without it", "correct it or remove the element"
-        self.report_warning(element, ROAD_MARK, "incomplete road marks", message, hint)
+        self.report_warning(element, MapRule.ROAD_MARK, "incomplete road marks", message, hint)
 
     def pieces(self, elements: Iterable[etree._Element], start: str) -> list[Piece]:
         """Return the pieces of a function, in the order of their starts.

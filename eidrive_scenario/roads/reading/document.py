@@ -11,13 +11,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, line_of, parse_untrusted
-from eidrive_scenario.roads.model.map_warnings import (
-    JUNCTION_CONNECTION,
-    LANE_LAYER,
-    ROAD_LINK,
-    ROAD_SURFACE,
-    MapWarning,
-)
+from eidrive_scenario.roads.model.map_warnings import MapRule, MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
 from eidrive_scenario.roads.model.road_map import (
     Connection,
@@ -31,8 +25,8 @@ from eidrive_scenario.roads.model.road_map import (
     RoadType,
 )
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
-from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
-from eidrive_scenario.roads.reading.objects_and_signals import read_controllers, read_objects, read_signals
+from eidrive_scenario.roads.reading.lanes import read_sections, read_speed
+from eidrive_scenario.roads.reading.objects_and_signals import read_controllers, read_object, read_signals
 from eidrive_scenario.roads.reading.plan_view import LONGEST, check_extent, read_reference_line
 
 LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
@@ -59,7 +53,7 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
         if number in roads:
             collector.report_error(element, f"road {number!r} occurs twice", "give each road a unique id")
         roads[number] = _read_road(number, element, collector)
-        objects.extend(read_objects(number, element, collector))
+        objects.extend(read_object(number, child, collector) for child in element.iterfind("objects/object"))
     if not elements:
         collector.report_error(root, "<OpenDRIVE> has no <road>", "add at least one")
     junctions = {}
@@ -98,7 +92,8 @@ def _read_header(root: etree._Element, collector: AttributeReader) -> Header:
     revision = tuple(
         int(text[:9]) if text.isdecimal() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
     )
-    reference = header.find("geoReference")
+    reference, offset = header.find("geoReference"), header.find("offset")
+    x, y, z, turn = (0.0 if offset is None else collector.number(offset, name, 0.0) for name in ("x", "y", "z", "hdg"))
     return Header(
         name=header.get("name", ""),
         revision=cast(tuple[int, int], revision),
@@ -106,15 +101,8 @@ def _read_header(root: etree._Element, collector: AttributeReader) -> Header:
         date=header.get("date", ""),
         geo_reference=((reference.text if reference is not None else None) or "").strip(),
         geo_reference_line=line_of(reference) if reference is not None else None,
-        offset=_read_offset(header.find("offset"), collector),
+        offset=(x, y, z, turn),
     )
-
-
-def _read_offset(element: etree._Element | None, collector: AttributeReader) -> tuple[float, float, float, float]:
-    if element is None:
-        return 0.0, 0.0, 0.0, 0.0
-    x, y, z, turn = (collector.number(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
-    return x, y, z, turn
 
 
 def _read_road(number: str, element: etree._Element, collector: AttributeReader) -> Road:
@@ -135,7 +123,7 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
     if lanes is None:
         collector.report_error(element, f"road {number!r} has no <lanes>", "add its lanes")
     else:
-        lane_offset = read_lane_offset(lanes, collector)
+        lane_offset = _profile(lanes, "laneOffset", collector)
         sections = read_sections(lanes, length, lane_offset, collector)
     junction = element.get("junction", "-1")
     for profile in element.iterfind("lateralProfile/*"):
@@ -144,7 +132,7 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
         ):
             message = f"road {number!r} has <{profile.tag}>, which is ignored: its cross section is straight"
             hint = "specify the slope by <superelevation>"
-            collector.report_warning(profile, ROAD_SURFACE, "ignored cross sections", message, hint)
+            collector.report_warning(profile, MapRule.ROAD_SURFACE, "ignored cross sections", message, hint)
     return Road(
         id=number,
         name=element.get("name", ""),
@@ -172,12 +160,12 @@ def _permanent_lanes(number: str, road: etree._Element, collector: AttributeRead
         if lanes is not permanent and lanes.get("layer") == "temporary":
             message = f"road {number!r} has a temporary layer of lanes, which is ignored"
             hint = "give a road file with the temporary lanes as its only ones"
-            collector.report_warning(lanes, LANE_LAYER, "ignored layers of lanes", message, hint)
+            collector.report_warning(lanes, MapRule.LANE_LAYER, "ignored layers of lanes", message, hint)
     return permanent
 
 
-def _profile(road: etree._Element, path: str, collector: AttributeReader) -> Polynomials:
-    return Polynomials(collector.pieces(road.iterfind(path), "s"))
+def _profile(parent: etree._Element, path: str, collector: AttributeReader) -> Polynomials:
+    return Polynomials(collector.pieces(parent.iterfind(path), "s"))
 
 
 def _read_types(road: etree._Element, collector: AttributeReader) -> list[RoadType]:
@@ -194,27 +182,23 @@ def _read_link(element: etree._Element | None, collector: AttributeReader) -> Ro
         return None
     kind = collector.text(element, "elementType", "road")
     if kind not in ("road", "junction"):
-        collector.report_error(
-            element, f"<{element.tag}> has elementType={kind!r}", suggestion(kind, ("road", "junction"))
-        )
+        hint = suggestion(kind, ("road", "junction"))
+        collector.report_error(element, f"<{element.tag}> has elementType={kind!r}", hint)
         return None
     number = collector.text(element, "elementId")
     if kind == "road" and element.get("elementS") is not None:
         # Virtual junctions (1.6 to 1.8) connect roads between their ends.
         message = f"a road is linked to road {number!r} between its ends; the link is ignored"
         hint = "split that road there and connect the parts by a junction"
-        collector.report_warning(element, ROAD_LINK, "roads linked to others between their ends", message, hint)
+        collector.report_warning(element, MapRule.ROAD_LINK, "roads linked to others between their ends", message, hint)
         return None
     contact = collector.contact(element, "contactPoint")
     return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
 
 
 def _read_junction(element: etree._Element, roads: dict[str, Road], collector: AttributeReader) -> Junction:
-    connections = []
-    for connection in element.iterfind("connection"):
-        read = _read_connection(connection, roads, collector)
-        if read is not None:
-            connections.append(read)
+    read = [_read_connection(connection, roads, collector) for connection in element.iterfind("connection")]
+    connections = [connection for connection in read if connection is not None]
     number, kind = collector.text(element, "id"), element.get("type", "default")
     if kind == "virtual":
         connections = [link for link in connections if _ends_at(roads[link.incoming_road], number)]
@@ -240,7 +224,7 @@ def _read_priorities(
             continue
         message = f"<priority> of junction {junction.get('id')!r} has no effect: high={pair[0]!r}, low={pair[1]!r}"
         hint = "specify the ids of two connecting roads"
-        collector.report_warning(element, JUNCTION_CONNECTION, "priorities without roads", message, hint)
+        collector.report_warning(element, MapRule.JUNCTION_CONNECTION, "priorities without roads", message, hint)
     return tuple(pairs)
 
 
@@ -259,9 +243,8 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], collector:
         return None
     missing = [number for number in (incoming, connecting) if number not in roads]
     for number in missing:
-        collector.report_error(
-            element, f"<connection> refers to road {number!r}, which does not exist", suggestion(number, roads)
-        )
+        message = f"<connection> refers to road {number!r}, which does not exist"
+        collector.report_error(element, message, suggestion(number, roads))
     links = tuple(
         (collector.integer(link, "from"), collector.integer(link, "to")) for link in element.iterfind("laneLink")
     )
@@ -282,12 +265,11 @@ def _with_valid_links(
             return link
         message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
         if link.element_type == "road":
-            collector.append_diagnostic(
-                Diagnostic(message, suggestion(link.element_id, targets), collector.source, link.line)
-            )
+            collector.report_error(link.line, message, suggestion(link.element_id, targets))
             return link
         hint = "remove the link or add the junction with its connections"
-        collector.map_warnings.append(MapWarning(ROAD_LINK, "links to missing junctions", message, hint, link.line))
+        warning = MapWarning(MapRule.ROAD_LINK, "links to missing junctions", message, hint, link.line)
+        collector.map_warnings.append(warning)
         return None
 
     return replace(road, predecessor=valid_link(road.predecessor), successor=valid_link(road.successor))

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.untrusted_xml import line_of
-from eidrive_scenario.roads.model.map_warnings import EMPTY_LANE_SECTION, LANE_SIDE
+from eidrive_scenario.roads.model.map_warnings import MapRule
 from eidrive_scenario.roads.model.polynomials import Polynomials, combine
 from eidrive_scenario.roads.model.road_map import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
@@ -34,11 +34,6 @@ def read_speed(element: etree._Element, collector: AttributeReader) -> float | N
     if unit not in UNITS:
         collector.report_error(element, f"<speed> has unit={unit!r}", "give m/s, km/h or mph")
     return collector.number(element, "max") * UNITS.get(unit, 1.0)
-
-
-def read_lane_offset(lanes: etree._Element, collector: AttributeReader) -> Polynomials:
-    """Return the distance of lane 0 from the reference line."""
-    return Polynomials(collector.pieces(lanes.iterfind("laneOffset"), "s"))
 
 
 def read_sections(
@@ -84,13 +79,12 @@ def _redirect_links(
     """
     if not any(lane.predecessors or lane.successors for lane in between.values()):
         return dict(lanes)
-    beyond = {n: lane.successors if way == "successors" else lane.predecessors for n, lane in between.items()}
-    led = {}
+    redirected = {}
     for number, lane in lanes.items():
-        own = lane.successors if way == "successors" else lane.predecessors
-        there = tuple(dict.fromkeys(n for k in own for n in beyond.get(k, ())))
-        led[number] = replace(lane, successors=there) if way == "successors" else replace(lane, predecessors=there)
-    return led
+        passed = [between[n] for n in getattr(lane, way) if n in between]
+        beyond: dict[str, Any] = {way: tuple(dict.fromkeys(n for other in passed for n in getattr(other, way)))}
+        redirected[number] = replace(lane, **beyond)
+    return redirected
 
 
 def _join_sides(elements: list[tuple[float, etree._Element]]) -> list[tuple[float, etree._Element]]:
@@ -143,15 +137,14 @@ def _read_section(
             hint = "left lanes have ids above 0, the center lane 0, right lanes ids below 0"
             if is_misplaced and number and sign:
                 # Links and positions refer to the id.
-                kind = "lanes under the wrong side"
-                collector.report_warning(element, LANE_SIDE, kind, f"{message}; its id determines the side", hint)
+                kind, message = "lanes under the wrong side", f"{message}; its id determines the side"
+                collector.report_warning(element, MapRule.LANE_SIDE, kind, message, hint)
             elif is_misplaced:
                 collector.report_error(element, message, hint)
                 continue
             if number in elements:
-                collector.report_error(
-                    element, f"lane {number} occurs twice in its section", "give each lane a unique id"
-                )
+                message, hint = f"lane {number} occurs twice in its section", "give each lane a unique id"
+                collector.report_error(element, message, hint)
             else:
                 elements[number] = element
     center = elements.get(0)
@@ -167,7 +160,7 @@ def _read_section(
         # RoadRunner exports the georeference as such a road. OpenDRIVE requires a lane on a side since 1.6.
         collector.report_warning(
             section,
-            EMPTY_LANE_SECTION,
+            MapRule.EMPTY_LANE_SECTION,
             "lane sections with only the center lane",
             "<laneSection> has no lane except the center lane, so vehicles cannot drive there",
             "add a lane under <left> or <right>",
@@ -179,11 +172,10 @@ def _lane(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, collector: AttributeReader
 ) -> Lane:
     begin = float(element.get(ORIGIN, "0"))
-    width, width_from = ZERO, 0.0
+    width, width_from, outer, center = ZERO, 0.0, inner, inner
     if number:
         width, width_from = _read_width(element, number, inner, lane_offset, collector)
-    outer = inner if number == 0 else combine([(1.0, inner), (1.0, width)])
-    center = inner if number == 0 else combine([(1.0, inner), (0.5, width)])
+        outer, center = (combine([(1.0, inner), (share, width)]) for share in (1.0, 0.5))
     link = element.find("link")
     speeds = ((collector.number(e, "sOffset") + begin, read_speed(e, collector)) for e in element.iterfind("speed"))
     return Lane(

@@ -8,7 +8,7 @@ from lxml import etree
 from msgspec.structs import replace
 
 from eidrive_scenario.roads.geometry.poses import BEYOND
-from eidrive_scenario.roads.model.map_warnings import SIGNAL_OFF_ROAD
+from eidrive_scenario.roads.model.map_warnings import MapRule
 from eidrive_scenario.roads.model.road_map import (
     Corner,
     Repeat,
@@ -55,9 +55,8 @@ def read_signals(
         if number in signals:
             signals[number] = replace(signals[number], references=(*signals[number].references, position))
         else:
-            collector.report_error(
-                reference, f"<signalReference> refers to signal {number!r}, which does not exist", "correct the id"
-            )
+            message = f"<signalReference> refers to signal {number!r}, which does not exist"
+            collector.report_error(reference, message, "correct the id")
     return signals
 
 
@@ -67,8 +66,8 @@ def _read_place(road: Road, element: etree._Element, collector: AttributeReader)
     held = min(max(s, 0.0), road.length)
     if abs(s - held) > BEYOND:
         message = f"a signal is at s = {s:g} m of road {road.id!r}; s = {held:g} m is used"
-        hint = f"the road extends from 0 to {road.length:g} m"
-        collector.report_warning(element, SIGNAL_OFF_ROAD, "signals beyond the ends of their roads", message, hint)
+        kind, hint = "signals beyond the ends of their roads", f"the road extends from 0 to {road.length:g} m"
+        collector.report_warning(element, MapRule.SIGNAL_OFF_ROAD, kind, message, hint)
     return SignalPlace(
         road=road.id,
         s=held,
@@ -109,34 +108,26 @@ def read_controllers(
         for control in element.iterfind("control"):
             number = collector.text(control, "signalId")
             if number not in signals:
-                collector.report_error(
-                    control, f"<control> refers to signal {number!r}, which does not exist", "correct the id"
-                )
+                message = f"<control> refers to signal {number!r}, which does not exist"
+                collector.report_error(control, message, "correct the id")
             members.append(number)
         number = collector.text(element, "id")
         controllers[number] = SignalController(number, element.get("name", ""), tuple(members))
     return controllers
 
 
-def read_objects(road: str, element: etree._Element, collector: AttributeReader) -> list[RoadObject]:
-    """Return the objects of one road."""
-    return [_read_object(road, child, collector) for child in element.iterfind("objects/object")]
+def read_object(road: str, element: etree._Element, collector: AttributeReader) -> RoadObject:
+    """Return an object of a road."""
 
-
-def _read_object(road: str, element: etree._Element, collector: AttributeReader) -> RoadObject:
     def number(name: str) -> float:
         return collector.number(element, name, 0.0)
 
-    for name in ("length", "width", "height", "radius"):
-        if abs(number(name)) > MAX_OBJECT_SIZE:
-            collector.report_error(
-                element, f"<object> has {name}={number(name):g}", f"give at most {MAX_OBJECT_SIZE:g}"
-            )
-    for name in ("t", "zOffset"):
-        if abs(number(name)) > MAX_OBJECT_DISTANCE:
-            collector.report_error(
-                element, f"<object> has {name}={number(name):g}", f"give a number within {MAX_OBJECT_DISTANCE:g}"
-            )
+    sizes, distances = ("length", "width", "height", "radius"), ("t", "zOffset")
+    limits = {name: (MAX_OBJECT_SIZE, "give at most") for name in sizes}
+    limits |= {name: (MAX_OBJECT_DISTANCE, "give a number within") for name in distances}
+    for name, (limit, hint) in limits.items():
+        if abs(number(name)) > limit:
+            collector.report_error(element, f"<object> has {name}={number(name):g}", f"{hint} {limit:g}")
     collector.spend(element, "objects", 1, MAX_OBJECTS)
     outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
     corners = [tuple(_read_corners(outline, collector)) for outline in outlines]
@@ -163,18 +154,16 @@ def _read_object(road: str, element: etree._Element, collector: AttributeReader)
 
 
 def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[Corner]:
+    coordinates = {"cornerRoad": ("s", "t", "dz"), "cornerLocal": ("u", "v", "z")}
     corners = []
     for corner in outline:
-        if corner.tag == "cornerRoad":
-            x, y, z = collector.number(corner, "s"), collector.number(corner, "t"), collector.number(corner, "dz", 0.0)
-        elif corner.tag == "cornerLocal":
-            x, y, z = collector.number(corner, "u"), collector.number(corner, "v"), collector.number(corner, "z", 0.0)
-        else:
+        if corner.tag not in coordinates:
             continue
+        *names, up = coordinates[corner.tag]
+        x, y, z = *(collector.number(corner, name) for name in names), collector.number(corner, up, 0.0)
         if max(abs(x), abs(y), abs(z)) > MAX_OBJECT_DISTANCE:
-            collector.report_error(
-                corner, f"<{corner.tag}> is further away than {MAX_OBJECT_DISTANCE:g} m", "correct its position"
-            )
+            message = f"<{corner.tag}> is further away than {MAX_OBJECT_DISTANCE:g} m"
+            collector.report_error(corner, message, "correct its position")
             continue
         corners.append(Corner(corner.tag == "cornerRoad", x, y, z, collector.number(corner, "height", 0.0)))
     return corners
@@ -187,11 +176,11 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, collector: Att
         return start, collector.number(repeat, f"{name}End", start)
 
     length, distance = collector.number(repeat, "length"), collector.number(repeat, "distance", 0.0)
-    if length > MAX_REPETITIONS * (distance if distance > 0.0 else 1.0):
+    step = distance if distance > 0.0 else 1.0
+    if length > MAX_REPETITIONS * step:
         message = f"<repeat> has length={length:g} and distance={distance:g}: too many repetitions"
         collector.report_error(repeat, message, f"at most {MAX_REPETITIONS} repetitions are read")
         length = 0.0
-    step = distance if distance > 0.0 else 1.0
     collector.spend(repeat, "positions of objects", max(length, 0.0) / step, MAX_OBJECTS)
     for name in ("width", "height", "length", "radius", "t", "zOffset"):
         if max(map(abs, pair(name))) > MAX_OBJECT_SIZE:

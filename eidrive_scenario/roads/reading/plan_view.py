@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 
 from lxml import etree
 
-from eidrive_scenario.errors import Diagnostic, suggestion
+from eidrive_scenario.errors import suggestion
 from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.roads.model import curves
-from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
-from eidrive_scenario.roads.model.map_warnings import GEOMETRY_GAP
+from eidrive_scenario.roads.model.curves import Arc, Coefficients, Cubic, Curve, ReferenceLine
+from eidrive_scenario.roads.model.map_warnings import MapRule
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
@@ -49,7 +49,7 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there} and has priority"
         hint = "correct the length or complete the geometry"
-        collector.report_warning(road, GEOMETRY_GAP, "lengths that differ from the geometry", what, hint)
+        collector.report_warning(road, MapRule.GEOMETRY_GAP, "lengths that differ from the geometry", what, hint)
         length = covered
     return ReferenceLine(curves, length)
 
@@ -65,42 +65,41 @@ def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequ
         return []
     shape = next((child for child in geometry if isinstance(child.tag, str) and child.tag != "userData"), None)
     if shape is None:
-        collector.report_error(
-            geometry, "<geometry> has no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS)
-        )
+        hint = "add one of " + ", ".join(f"<{kind}>" for kind in KINDS)
+        collector.report_error(geometry, "<geometry> has no shape", hint)
         return []
-    line = line_of(geometry)
-    if shape.tag == "line":
-        return [Arc(s, x, y, h, length, line=line)]
-    if shape.tag == "arc":
-        return [Arc(s, x, y, h, length, collector.number(shape, "curvature"), line=line)]
-    if shape.tag == "spiral":
-        start, end = collector.number(shape, "curvStart"), collector.number(shape, "curvEnd")
-        return [curves.spiral(s, x, y, h, length, start, end, line=line)]
-    if shape.tag == "poly3":
-        a, b, c, d = (collector.number(shape, name) for name in "abcd")
-        collector.spend(geometry, "meters of poly3", length, LONGEST_POLY3)
-        return curves.poly3(s, x, y, h, length, (a, b, c, d), line)
-    if shape.tag == "paramPoly3":
-        return [_read_param_poly3(shape, s, x, y, h, length, collector)]
+    start, line = (s, x, y, h, length), line_of(geometry)
+    match shape.tag:
+        case "line":
+            return [Arc(*start, line=line)]
+        case "arc":
+            return [Arc(*start, collector.number(shape, "curvature"), line=line)]
+        case "spiral":
+            ends = collector.number(shape, "curvStart"), collector.number(shape, "curvEnd")
+            return [curves.spiral(*start, *ends, line=line)]
+        case "poly3":
+            a, b, c, d = (collector.number(shape, name) for name in "abcd")
+            collector.spend(geometry, "meters of poly3", length, LONGEST_POLY3)
+            return curves.poly3(*start, (a, b, c, d), line)
+        case "paramPoly3":
+            return [Cubic(*start, *_read_param_poly3(shape, length, collector), line=line)]
     collector.report_error(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
     return []
 
 
 def _read_param_poly3(
-    shape: etree._Element, s: float, x: float, y: float, h: float, length: float, collector: AttributeReader
-) -> Cubic:
+    shape: etree._Element, length: float, collector: AttributeReader
+) -> tuple[Coefficients, Coefficients, float]:
+    """Return the polynomials of u and v, and the change of their parameter per meter."""
     u0, u1, u2, u3 = (collector.number(shape, name) for name in ("aU", "bU", "cU", "dU"))
     v0, v1, v2, v3 = (collector.number(shape, name) for name in ("aV", "bV", "cV", "dV"))
     span = shape.get("pRange", "normalized")
     if span not in ("arcLength", "normalized"):
-        collector.report_error(
-            shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized"))
-        )
+        hint = suggestion(span, ("arcLength", "normalized"))
+        collector.report_error(shape, f"<paramPoly3> has pRange={span!r}", hint)
     if not any((u1, u2, u3, v1, v2, v3)):
         collector.report_error(shape, "<paramPoly3> is a single point", "give polynomials for u and v")
-    pace = 1.0 if span == "arcLength" else 1.0 / length
-    return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace, line=line_of(shape.getparent()))
+    return (u0, u1, u2, u3), (v0, v1, v2, v3), 1.0 if span == "arcLength" else 1.0 / length
 
 
 MAX_SHAPE = 1e6
@@ -123,7 +122,7 @@ def check_extent(roads: Mapping[str, Road], collector: AttributeReader) -> None:
         _check_cross_section(road, collector)
     if lanes > MAX_LANE_LENGTH:
         message = f"the lanes are {lanes:g} m long in total"
-        collector.append_diagnostic(Diagnostic(message, f"at most {MAX_LANE_LENGTH:g} m are read", collector.source, 1))
+        collector.report_error(1, message, f"at most {MAX_LANE_LENGTH:g} m are read")
 
 
 def _check_geometries(road: Road, collector: AttributeReader) -> None:
@@ -140,7 +139,7 @@ def _check_geometries(road: Road, collector: AttributeReader) -> None:
             farthest[line] = max(away, farthest.get(line, 0.0))
     for line, away in farthest.items():
         message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
-        collector.append_diagnostic(Diagnostic(message, f"at most {MAX_SHAPE:g} m are read", collector.source, line))
+        collector.report_error(line, message, f"at most {MAX_SHAPE:g} m are read")
 
 
 def _check_cross_section(road: Road, collector: AttributeReader) -> None:
@@ -152,14 +151,10 @@ def _check_cross_section(road: Road, collector: AttributeReader) -> None:
             edges = [abs(offset + lane.side * lane.outer.value(ds)) for lane in outermost]
             if not max(edges) <= MAX_WIDTH:
                 message = f"a lane of road {road.id!r} reaches {max(edges):g} m from the reference line"
-                collector.append_diagnostic(
-                    Diagnostic(message, f"at most {MAX_WIDTH:g} m are read", collector.source, road.line)
-                )
+                collector.report_error(road.line, message, f"at most {MAX_WIDTH:g} m are read")
                 return
             height = abs(road.elevation.value(section.s + ds))
             if not height <= MAX_HEIGHT:
                 message = f"road {road.id!r} is {height:g} m high"
-                collector.append_diagnostic(
-                    Diagnostic(message, f"at most {MAX_HEIGHT:g} m are read", collector.source, road.line)
-                )
+                collector.report_error(road.line, message, f"at most {MAX_HEIGHT:g} m are read")
                 return

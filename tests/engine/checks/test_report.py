@@ -17,7 +17,7 @@ from eidrive_scenario.checks.scenario_checks import (
     check_scenario,
 )
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic
-from eidrive_scenario.roads.model.map_warnings import MAP_RULES
+from eidrive_scenario.roads.model.map_warnings import MapRule
 
 TWO_LINES = (
     '<geometry s="0" x="0" y="0" hdg="0" length="50"><line/></geometry>\n'
@@ -48,7 +48,7 @@ def test_report_collect_more_than_the_maximum_counts_the_others() -> None:
 def test_registry_defines_each_name_and_summary_once() -> None:
     assert len({rule.name for rule in ALL_RULES}) == len(ALL_RULES)
     assert len({rule.summary for rule in ALL_RULES}) == len(ALL_RULES)
-    assert {rule.name for rule in MAP_RULES} <= {rule.name for rule in ALL_RULES}
+    assert {rule.id for rule in MapRule} <= {rule.name for rule in ALL_RULES}
 
 
 def test_check_of_road_file_and_of_scenario_report_the_same_map_warnings(tmp_path: Path) -> None:
