@@ -24,8 +24,8 @@ from eidrive_scenario.roads.objects import placed_objects as placed_objects
 from eidrive_scenario.roads.routing.distance import Chain as Chain
 from eidrive_scenario.roads.routing.graph import Cost as Cost
 from eidrive_scenario.roads.routing.graph import RouteError as RouteError
-from eidrive_scenario.roads.routing.movement import Branch as Branch
-from eidrive_scenario.roads.routing.movement import BranchSelector as BranchSelector
+from eidrive_scenario.roads.routing.route import Branch as Branch
+from eidrive_scenario.roads.routing.route import BranchSelector as BranchSelector
 from eidrive_scenario.roads.routing.route import Route as Route
 from eidrive_scenario.roads.surfaces import KINDS as KINDS
 from eidrive_scenario.roads.surfaces import SurfaceMesh as SurfaceMesh

@@ -224,9 +224,17 @@ class Road:
         directions = {0: 1}
         for section in self.sections:
             for number, lane in section.lanes.items():
-                usual = -1 if (number > 0) == (self.rule == "RHT") else 1
+                usual = self._usual_direction(number)
                 directions.setdefault(number, -usual if lane.direction == "reversed" else usual)
         return directions
+
+    def driving_direction(self, lane_id: int) -> int:
+        """Return `directions` of a lane, also of one that the road does not have."""
+        direction = self.directions.get(lane_id)
+        return self._usual_direction(lane_id) if direction is None else direction
+
+    def _usual_direction(self, lane_id: int) -> int:
+        return -1 if (lane_id > 0) == (self.rule == "RHT") else 1
 
     def section_at(self, s: float) -> LaneSection:
         """Return the lane section at s."""

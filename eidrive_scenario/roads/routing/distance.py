@@ -11,7 +11,6 @@ from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.routing.graph import JUNCTION_COST
 from eidrive_scenario.roads.routing.links import LaneLinks
-from eidrive_scenario.roads.routing.movement import driving_direction
 
 Chain = Literal["shortest", "fastest", "leastIntersections"]
 """Criterion that selects the chain of roads of a distance."""
@@ -44,7 +43,7 @@ class RoadDistances:
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", only: int = 0
     ) -> tuple[float, float, int] | None:
         """Return `between`, and +1 if s of both roads increases in the same direction along the chain, else -1."""
-        direction = driving_direction(self._roads[a.road], a.lane)
+        direction = self._roads[a.road].driving_direction(a.lane)
         options: list[tuple[float, float, int, float, int]] = []
         if a.road == b.road:
             ahead, left_of_a = (b.s - a.s) * direction, (b.t - a.t) * direction
@@ -109,7 +108,8 @@ def locate_near(
     location = _on(road, x, y, hint.s)
     if location is not None:
         return location
-    for direction in (driving_direction(road, hint.lane), -driving_direction(road, hint.lane)):
+    ahead = road.driving_direction(hint.lane)
+    for direction in (ahead, -ahead):
         last = len(road.sections) - 1 if direction > 0 else 0
         ways = links.beyond(LaneKey(road.id, last, hint.lane), direction) if hint.lane else ()
         for other, way in ways:

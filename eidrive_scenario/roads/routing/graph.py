@@ -17,7 +17,6 @@ from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.routing.links import LaneLinks
-from eidrive_scenario.roads.routing.movement import driving_direction
 
 Cost = Callable[[LaneKey, LaneKey, Mapping[str, Any]], float]
 """Cost of an edge of the lane graph: lane, following lane, data of the edge."""
@@ -86,24 +85,18 @@ class LaneWays:
 
 def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
     """Return the lanes of a road network and the edges between them."""
-    roads = {road.id: road for road in tables.roads}
-    directions = {
-        (road.id, number): driving_direction(road, number)
-        for road in roads.values()
-        for section in road.sections
-        for number in section.lanes
-    }
     rows = {key: row for key, row in tables.lane_keys() if key.lane}
+    directions = {key: tables.by_id[key.road].directions[key.lane] for key in rows}
     nodes = _measure(rows, tables, directions)
     successors: dict[LaneKey, dict[LaneKey, dict[str, Any]]] = {key: {} for key in nodes}
     for key, data in nodes.items():
-        for other, direction in links.beyond(key, directions[key.road, key.lane]):
-            if other in nodes and directions[other.road, other.lane] == direction:
+        for other, direction in links.beyond(key, directions[key]):
+            if directions.get(other) == direction:
                 successors[key][other] = {"weight": data["length"], "kind": "successor"}
-    for road in roads.values():
+    for road in tables.roads:
         for section in road.sections:
             for lane, neighbor in _neighbors(section):
-                if directions[road.id, lane] == directions[road.id, neighbor]:
+                if road.directions[lane] == road.directions[neighbor]:
                     cost = LANE_CHANGE_COST + SHORT_SECTION_COST / max(section.length, 1.0)
                     left, right = LaneKey(road.id, section.index, lane), LaneKey(road.id, section.index, neighbor)
                     successors[left][right] = {"weight": cost, "kind": "change"}
@@ -112,7 +105,7 @@ def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
 
 
 def _measure(
-    rows: Mapping[LaneKey, int], tables: RoadTables, directions: Mapping[tuple[str, int], int]
+    rows: Mapping[LaneKey, int], tables: RoadTables, directions: Mapping[LaneKey, int]
 ) -> dict[LaneKey, dict[str, Any]]:
     """Return the data of lanes; the length of the center line is found by Gauss-Legendre quadrature."""
     row = np.array(list(rows.values()), dtype=np.int64)
@@ -122,7 +115,7 @@ def _measure(
     length = np.zeros(len(row))
     for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
         length += 0.5 * weight * span * tables.stretch(row, start + 0.5 * (1.0 + node) * span)
-    forward = np.array([directions[key.road, key.lane] > 0 for key in rows], dtype=bool)
+    forward = np.array([direction > 0 for direction in directions.values()], dtype=bool)
     ends = tables.lane_poses(row, np.where(forward, start + span, start), np.zeros(len(row)))
     measured = zip(
         rows, tables.lane_drivable[row].tolist(), length.tolist(), ends.x.tolist(), ends.y.tolist(), strict=True
@@ -159,7 +152,7 @@ def find_lanes(
         x, y = ways.nodes[LaneKey(*key[:3])]["end"]
         return max(0.99 * (math.hypot(goal[0] - x, goal[1] - y) - last) - 1.0, 0.0)
 
-    behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < -REACHED_DISTANCE
+    behind = (end.s - start.s) * roads[end.road].driving_direction(end.lane) < -REACHED_DISTANCE
     if source[:2] == target[:2] and behind and source in successors:
         successors, source = _with_start_copy(successors, source)
     path = None

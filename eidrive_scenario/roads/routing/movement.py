@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import LEAST_STRETCH, lane_at, lane_t, pose_in_lane
@@ -12,47 +11,13 @@ from eidrive_scenario.roads.model.curves import Arc
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.routing.links import LaneLinks
+from eidrive_scenario.roads.routing.route import Branch, BranchSelector, Route
 from eidrive_scenario.roads.routing.steady_lanes import LEAST_REST, STRIDE, SteadyLane
 
 EQUAL_TURN = 1e-6
 """Maximum difference of the sizes of two turns that count as equal [rad]."""
 LOOK_AHEAD = 30.0
 """Distance ahead at which the direction of a branch is evaluated outside of connecting roads [m]."""
-
-
-class Branch(NamedTuple):
-    """Branch of a fork.
-
-    direction  +1 if it is entered in the direction of s, else -1
-    turn       change of heading up to its end, left positive, in (-π, π] [rad]
-    """
-
-    lane: LaneKey
-    direction: int
-    turn: float
-
-
-BranchSelector = Callable[[Sequence[Branch]], Branch]
-
-
-class BranchGuide(Protocol):
-    """Selects branches along a planned route; `Route` implements it."""
-
-    def visit(self, road: str, visit: int) -> int:
-        """Return the number of the visit of the route at which it enters the road `road`, from `visit` on."""
-        ...
-
-    def pick(self, branches: Sequence[Branch], road: str, visit: int) -> Branch | None:
-        """Return the branch on the route, or None if the route contains none of them."""
-        ...
-
-
-def driving_direction(road: Road, lane_id: int) -> int:
-    """Return +1 if traffic of the lane drives in the direction of s, else -1; +1 for lane 0."""
-    direction = road.directions.get(lane_id)
-    if direction is not None:
-        return direction
-    return -1 if (lane_id > 0) == (road.rule == "RHT") else 1
 
 
 class Movement:
@@ -67,7 +32,7 @@ class Movement:
         self,
         location: LaneLocation,
         distance: float,
-        route: BranchGuide | None = None,
+        route: Route | None = None,
         choose: BranchSelector | None = None,
         visit: int = 0,
         to_end: bool = False,
@@ -84,7 +49,7 @@ class Movement:
         """
         road = self._roads[location.road]
         section, lane = lane_at(road, location.lane, location.s)
-        direction = driving_direction(road, lane.id)
+        direction = road.driving_direction(lane.id)
         with_traffic = distance >= 0.0
         if not with_traffic:
             direction = -direction
@@ -130,7 +95,7 @@ class Movement:
         steady = self._steady.get((name, number))
         if steady is None:
             road = self._roads[name]
-            steady = self._steady[name, number] = SteadyLane(road, number, driving_direction(road, number))
+            steady = self._steady[name, number] = SteadyLane(road, number, road.driving_direction(number))
         stepped = steady.step(s, offset, distance)
         if stepped is not None:
             return stepped
@@ -139,7 +104,7 @@ class Movement:
         lane = section.lanes.get(number)
         if lane is None or not 0.0 <= s <= road.length:
             return None
-        direction = driving_direction(road, number) if distance >= 0.0 else -driving_direction(road, number)
+        direction = road.driving_direction(number) if distance >= 0.0 else -road.driving_direction(number)
         if direction < 0 and s == section.s and section.index > 0:
             return None
         s, remaining = _along(road, section, lane, s, offset, direction, abs(distance))
@@ -159,7 +124,7 @@ class Movement:
         with_traffic: bool,
         offset: float,
         *,
-        route: BranchGuide | None,
+        route: Route | None,
         choose: BranchSelector | None,
         visit: int,
     ) -> tuple[LaneKey, int, float] | None:
@@ -184,7 +149,7 @@ class Movement:
         """Return the branches at the end of a lane in the order of the file, preferably those with the traffic."""
         beyond = list(self._links.beyond(key, direction))
         wanted = 1 if with_traffic else -1
-        along = [(k, d) for k, d in beyond if driving_direction(self._roads[k.road], k.lane) * d == wanted]
+        along = [(k, d) for k, d in beyond if self._roads[k.road].driving_direction(k.lane) * d == wanted]
         beyond = along or beyond
         if len(beyond) == 1:
             return [Branch(*beyond[0], 0.0)]

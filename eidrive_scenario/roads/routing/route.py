@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -19,12 +19,26 @@ from eidrive_scenario.roads.geometry.poses import lane_pose_at, lane_t
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Road
-from eidrive_scenario.roads.routing.movement import Branch, driving_direction
 
 POINT_SPACING = 0.25
 """Distance between the stored points of a path [m]."""
 LANE_CHANGE_LENGTH = 40.0
 """Length of a lane change if its section is long enough [m]."""
+
+
+class Branch(NamedTuple):
+    """Branch of a fork.
+
+    direction  +1 if it is entered in the direction of s, else -1
+    turn       change of heading up to its end, left positive, in (-π, π] [rad]
+    """
+
+    lane: LaneKey
+    direction: int
+    turn: float
+
+
+BranchSelector = Callable[[Sequence[Branch]], Branch]
 
 
 class Leg(msgspec.Struct, frozen=True):
@@ -41,6 +55,11 @@ class Leg(msgspec.Struct, frozen=True):
     def direction(self) -> int:
         """+1 along s, -1 against it."""
         return 1 if self.s_end >= self.s else -1
+
+    def contains(self, location: LaneLocation) -> bool:
+        """Return whether a location is on the road between both ends, on any lane."""
+        low, high = sorted((self.s, self.s_end))
+        return self.road == location.road and low - 1e-6 <= location.s <= high + 1e-6
 
 
 @dataclass(frozen=True)
@@ -83,7 +102,7 @@ class Route:
             road = self.roads[group[0].road]
             section = road.sections[group[0].section]
             s, s_end = section.s, section.end
-            if (driving_direction(road, group[0].lane) < 0) != self.against_traffic:
+            if (road.driving_direction(group[0].lane) < 0) != self.against_traffic:
                 s, s_end = s_end, s
             if number == 0:
                 s = self.start.s
@@ -158,8 +177,7 @@ class Route:
         """Return the distance along the route to the road and s of a location, or None if the route misses it."""
         _, along, owner, places = self._path
         for number, leg in enumerate(self.legs):
-            low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
-            if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
+            if leg.contains(location):
                 on_leg = np.flatnonzero(owner == number)
                 order = places[on_leg] * leg.direction
                 return float(np.interp(location.s * leg.direction, order, along[on_leg]))
@@ -174,7 +192,7 @@ class Route:
         pass_a, pass_b = self._passes(a), self._passes(b)
         if pass_a is None or pass_b is None:
             return None
-        sense = pass_a[1] * driving_direction(self.roads[a.road], a.lane)
+        sense = pass_a[1] * self.roads[a.road].driving_direction(a.lane)
         along = pass_b[0] - pass_a[0]
         if self.closed:
             total = self.reference_length
@@ -188,10 +206,9 @@ class Route:
         """
         done = 0.0
         for leg in self.legs:
-            low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
-            if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
+            if leg.contains(location):
                 return done + abs(location.s - leg.s), leg.direction
-            done += high - low
+            done += abs(leg.s_end - leg.s)
         onward = None if self.lap is None else self.lap._passes(location)
         return None if onward is None else (done + onward[0], onward[1])
 

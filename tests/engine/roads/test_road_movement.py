@@ -7,7 +7,7 @@ import pytest
 from opendrive_xml import junction_xml, lane_links_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.routing.movement import Branch
+from eidrive_scenario.roads.routing.route import Branch
 
 
 def lane(number: int, link: str = "", width: str = 'a="3" b="0" c="0" d="0"') -> str:
