@@ -17,3 +17,9 @@ Bytes = NDArray[np.uint8]
 def of_each(function: Callable[[float], float], values: Array) -> Array:
     """Return the values (N,) of a function of `math`, whose bits differ from those of array functions."""
     return np.fromiter(map(function, values.tolist()), float, len(values))
+
+
+def number_in_groups(counts: Integers) -> tuple[Integers, Integers]:
+    """Return the group of each element of consecutive groups with `counts` elements, and its number in the group."""
+    group = np.arange(len(counts)).repeat(counts)
+    return group, np.arange(len(group)) - (counts.cumsum() - counts)[group]

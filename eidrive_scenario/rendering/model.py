@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.arrays import Array, Floats, Integers, number_in_groups
 from eidrive_scenario.base.content_digest import content_digest
 from eidrive_scenario.rendering.materials import MATERIALS, Color, finish_of
 
@@ -73,10 +73,8 @@ class Cells(NamedTuple):
 
     def rows(self, chosen: NDArray[np.bool_]) -> Integers:
         """Return the triangles of the selected cells."""
-        first, count = self.first[chosen], self.counts[chosen]
-        ends = np.cumsum(count)
-        rows: Integers = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
-        return rows
+        cell, number = number_in_groups(self.counts[chosen])
+        return np.asarray(self.first[chosen][cell] + number)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 from eidrive_scenario.base.geometry import wrap_angle
@@ -14,7 +14,7 @@ from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.map_warnings import MapRule, MapWarning
 from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, LaneSection, Road, RoadLink
 from eidrive_scenario.roads.routing.graph import LaneWays
-from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
+from eidrive_scenario.roads.routing.links import LaneLinks, end_section, side_at
 
 JUMP = 0.01
 """Maximum gap between the end of a geometry and the start of the next one [m]; also in s."""
@@ -96,7 +96,8 @@ def _tilts(road: Road) -> Iterator[MapWarning]:
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning]:
-    is_valid = lane.width.is_constant and NARROW <= lane.width.value(0.0) <= WIDE
+    constant = lane.width.constant_value
+    is_valid = constant is not None and NARROW <= constant <= WIDE
     if lane.id == 0 or (is_valid and lane.width_from <= JUMP):
         return
     name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
@@ -242,49 +243,33 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
     """Yield warnings of linked lanes of two roads whose ends do not meet. The reference lines need not meet."""
-    ends: dict[tuple[str, int], EndCrossSection] = {}
-    for end, other_end in links.between_roads():
-        road, beyond = roads[end.lane.road], roads[other_end.lane.road]
-        lane = road.sections[end.lane.section].lanes[end.lane.lane]
-        if not lane.drivable or not beyond.sections[other_end.lane.section].lanes[other_end.lane.lane].drivable:
-            continue
-        x, y = _lane_end(road, end, ends)
-        u, v = _lane_end(beyond, other_end, ends)
-        apart = math.hypot(u - x, v - y)
-        if apart > JUMP:
-            names = f"lane {end.lane.lane} of road {road.id!r} and lane {other_end.lane.lane} of road {beyond.id!r}"
-            message = f"{names} are linked but their ends are {apart:.3g} m apart"
-            hint = "make their ends meet"
-            yield MapWarning(MapRule.GEOMETRY_GAP, "linked lanes that do not meet", message, hint, lane.line)
 
-
-@dataclass(frozen=True)
-class EndCrossSection:
-    """Cross section at an end of a road: point of the reference line [m], change of x and y per meter of t, and lane
-    offset [m].
-    """
-
-    x: float
-    y: float
-    dx: float
-    dy: float
-    offset: float
-
-
-def _lane_end(road: Road, end: LaneEnd, cross_sections: dict[tuple[str, int], EndCrossSection]) -> tuple[float, float]:
-    """Return the end of the center line of a lane [m]. The cross sections are cached by road and side."""
-    cross_section = cross_sections.get((road.id, end.side))
-    if cross_section is None:
-        s = road.length if end.side > 0 else 0.0
+    @cache
+    def cross_section(road_id: str, side: int) -> tuple[float, float, float, float, float]:
+        """Return x, y of an end of the reference line [m], their change per meter of t, and the lane offset [m]."""
+        road = roads[road_id]
+        s = road.length if side > 0 else 0.0
         x, y, heading, *_ = road.reference.at(s)
         ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
         sin, cos = math.sin(heading), math.cos(heading)
-        dx, dy = ahead * cos - left * sin, ahead * sin + left * cos
-        cross_section = cross_sections[road.id, end.side] = EndCrossSection(x, y, dx, dy, road.lane_offset.value(s))
-    section = road.sections[end.lane.section]
-    lane = section.lanes[end.lane.lane]
-    t = cross_section.offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)
-    return cross_section.x + t * cross_section.dx, cross_section.y + t * cross_section.dy
+        return x, y, ahead * cos - left * sin, ahead * sin + left * cos, road.lane_offset.value(s)
+
+    for ends in links.between_roads():
+        sections = [roads[end.lane.road].sections[end.lane.section] for end in ends]
+        lanes = [section.lanes[end.lane.lane] for section, end in zip(sections, ends, strict=True)]
+        if not (lanes[0].drivable and lanes[1].drivable):
+            continue
+        points = []
+        for end, section, lane in zip(ends, sections, lanes, strict=True):
+            x, y, dx, dy, offset = cross_section(end.lane.road, end.side)
+            t = offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)
+            points.append((x + t * dx, y + t * dy))
+        apart = math.dist(*points)
+        if apart > JUMP:
+            names = " and ".join(f"lane {end.lane.lane} of road {end.lane.road!r}" for end in ends)
+            message = f"{names} are linked but their ends are {apart:.3g} m apart"
+            kind, hint = "linked lanes that do not meet", "make their ends meet"
+            yield MapWarning(MapRule.GEOMETRY_GAP, kind, message, hint, lanes[0].line)
 
 
 def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[MapWarning]:
@@ -303,10 +288,8 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
         message = f"{name} uses road {connecting.id!r}, which does not belong to the junction"
         hint = f"give that road junction={junction.id!r}, or correct connectingRoad"
         yield MapWarning(rule, "connections over roads of no or another junction", message, hint, connection.line)
-    side, other_side = (
-        side_at(incoming, junction, connecting, connection.contact),
-        1 if connection.contact == "end" else -1,
-    )
+    side = side_at(incoming, junction, connecting, connection.contact)
+    other_side = 1 if connection.contact == "end" else -1
     incoming_lanes, connecting_lanes = end_section(incoming, side).lanes, end_section(connecting, other_side).lanes
     driven = [
         (n, m)

@@ -34,15 +34,10 @@ def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
         if road_object.repeats:
             yield from _repeated(network, road_object)
         else:
-            width = 2.0 * road_object.radius if road_object.radius else road_object.width
-            length = 2.0 * road_object.radius if road_object.radius else road_object.length
-            yield PlacedObject(
-                road_object,
-                _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset),
-                length,
-                width,
-                road_object.height,
-            )
+            width = 2.0 * road_object.radius or road_object.width
+            length = 2.0 * road_object.radius or road_object.length
+            pose = _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset)
+            yield PlacedObject(road_object, pose, length, width, road_object.height)
 
 
 def crosswalks(network: RoadNetwork) -> tuple[Array, ...]:
@@ -61,33 +56,24 @@ def outlines(network: RoadNetwork, road_object: RoadObject) -> list[Array]:
         return [_corners(network, road_object, outline) for outline in road_object.outlines if len(outline) >= 3]
     if road_object.length <= 0.0 or road_object.width <= 0.0:
         return []
-    half_length, half_width = 0.5 * road_object.length, 0.5 * road_object.width
-    rectangle = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    return [
-        _corners(
-            network, road_object, tuple(Corner(False, half_length * a, half_width * b, 0.0, 0.0) for a, b in rectangle)
-        )
-    ]
+    x, y = 0.5 * road_object.length, 0.5 * road_object.width
+    rectangle = tuple(Corner(False, a * x, b * y, 0.0, 0.0) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    return [_corners(network, road_object, rectangle)]
 
 
 def _corners(network: RoadNetwork, road_object: RoadObject, outline: tuple[Corner, ...]) -> Array:
     pose = _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset)
     cos, sin = math.cos(pose.h), math.sin(pose.h)
-    rows = []
+    points = []
     for corner in outline:
         if corner.on_road:
             s = min(max(corner.x, 0.0), network.roads[road_object.road].length)
             corner_pose = network.road_pose_at(road_object.road, s, corner.y)
-            rows.append((corner_pose.x, corner_pose.y, corner_pose.z + corner.z))
+            x, y, z, *_ = corner_pose
         else:
-            rows.append(
-                (
-                    pose.x + cos * corner.x - sin * corner.y,
-                    pose.y + sin * corner.x + cos * corner.y,
-                    pose.z + corner.z,
-                )
-            )
-    return np.array(rows)
+            x, y, z = pose.x + cos * corner.x - sin * corner.y, pose.y + sin * corner.x + cos * corner.y, pose.z
+        points.append((x, y, z + corner.z))
+    return np.array(points)
 
 
 def _pose(network: RoadNetwork, road_object: RoadObject, s: float, t: float, z_offset: float) -> Pose:
@@ -111,8 +97,6 @@ def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedO
             share = ds / repeat.length if repeat.length > 0.0 else 0.0
             ends = repeat.t, repeat.width, repeat.height, repeat.z_offset, repeat.size, repeat.radius
             t, width, height, z, length, radius = (a + (b - a) * share for a, b in ends)
-            length, width = (
-                (2.0 * radius, 2.0 * radius) if radius else (length or road_object.length, width or road_object.width)
-            )
+            length, width = 2.0 * radius or length or road_object.length, 2.0 * radius or width or road_object.width
             pose = _pose(network, road_object, repeat.s + ds, t, z)
             yield PlacedObject(road_object, pose, part if gapless else length, width, height or road_object.height)

@@ -5,8 +5,9 @@ Road marks are painted strips along lane edges, and painted areas.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,20 +78,13 @@ class SurfaceMesh:
         return KINDS[self.kind]
 
 
-@dataclass(frozen=True)
-class _Part:
-    kind: str
-    vertices: Array
-    faces: Integers
-
-
 def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMesh]:
     """Return all road surfaces and markings as one mesh per kind.
 
     `spacing` is the distance between the evaluated cross sections [m]. Cross sections within a centimeter of a straight
     surface are omitted.
     """
-    parts: list[_Part] = []
+    parts: list[SurfaceMesh] = []
     edges: dict[str, list[Array]] = {}
     for road in network.roads.values():
         for section in road.sections:
@@ -98,13 +92,12 @@ def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMe
             parts.extend(_lane_parts(network, road, section, s, edges))
             parts.extend(_strip_part(network, road, strip) for strip in lane_strips(road, section, s))
     parts.extend(_fillings(edges))
-    for kind, polygon in object_strips(network):
+    for polygon in painted_areas(network):
         lifted = np.add(polygon, (0.0, 0.0, MARKING_HEIGHT))
         faces = np.array([(0, i, i + 1) for i in range(1, len(polygon) - 1)], dtype=np.int64)
-        parts.append(_Part(kind, lifted, _upwards(lifted, faces)))
-    return [
-        mesh for kind in KINDS if (mesh := _merged(kind, (part for part in parts if part.kind == kind))) is not None
-    ]
+        parts.append(SurfaceMesh("marking_white", lifted, _upwards(lifted, faces)))
+    by_kind = {kind: [part for part in parts if part.kind == kind] for kind in KINDS}
+    return [_merged(kind, group) for kind, group in by_kind.items() if group]
 
 
 def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spacing: float) -> Array:
@@ -145,7 +138,7 @@ def _keep(shape: Array, s: Array, kept: NDArray[np.bool_], first: int, last: int
 
 def _lane_parts(
     network: RoadNetwork, road: Road, section: LaneSection, s: Array, edges: dict[str, list[Array]]
-) -> Iterable[_Part]:
+) -> Iterable[SurfaceMesh]:
     offset = np.array([road.lane_offset.value(float(at)) for at in s])
     for lane in section.lanes.values():
         ds = [float(at) - section.s for at in s]
@@ -164,10 +157,11 @@ def _lane_parts(
             low, high = low - (0.0, 0.0, CYCLE_DEPTH), high - (0.0, 0.0, CYCLE_DEPTH)
         lift_inner, lift_outer = _lift(lane, ds)
         raised = low + np.outer(lift_inner, (0.0, 0.0, 1.0))
-        faces = _ribbon(len(s))
-        yield _part(kind, raised, high + np.outer(lift_outer, (0.0, 0.0, 1.0)), faces)
+        vertices = np.concatenate([raised, high + np.outer(lift_outer, (0.0, 0.0, 1.0))])
+        faces = _ribbons(1, len(s))
+        yield SurfaceMesh(kind, vertices, _upwards(vertices, faces))
         if np.any(lift_inner > 1e-3):
-            yield _part("curb", low, raised, faces, keep_order=lane.side > 0)
+            yield SurfaceMesh("curb", np.concatenate([low, raised]), faces if lane.side > 0 else faces[:, ::-1])
 
 
 def _kind(road: Road, lane: Lane) -> str | None:
@@ -191,33 +185,26 @@ def _points(network: RoadNetwork, road: Road, s: Array, t: Array) -> Array:
     return np.column_stack([pose.x, pose.y, pose.z])
 
 
-def _ribbon(count: int) -> Integers:
-    """Return triangles between two rows of `count` points. The second row is numbered after the first."""
-    i = np.arange(count - 1)
-    return np.concatenate([np.column_stack([i, i + 1, i + count]), np.column_stack([i + 1, i + count + 1, i + count])])
+def _ribbons(pieces: int, count: int) -> Integers:
+    """Return triangles between the low and the high edges of some pieces with `count` points on each edge.
+
+    The points of all high edges are numbered after those of all low edges.
+    """
+    i = (np.arange(pieces)[:, None] * count + np.arange(count - 1)).ravel()
+    above = i + pieces * count
+    return np.concatenate([np.column_stack([i, i + 1, above]), np.column_stack([i + 1, above + 1, above])])
 
 
-def _part(kind: str, first: Array, second: Array, faces: Integers, keep_order: bool | None = None) -> _Part:
-    vertices = np.concatenate([first, second])
-    if keep_order is None:
-        return _Part(kind, vertices, _upwards(vertices, faces))
-    return _Part(kind, vertices, faces if keep_order else faces[:, ::-1])
-
-
-def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> _Part:
-    count = strip.s.shape[1]
+def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> SurfaceMesh:
     flat = strip.s.ravel()
     low = _points(network, road, flat, (strip.t - 0.5 * strip.width).ravel())
     high = _points(network, road, flat, (strip.t + 0.5 * strip.width).ravel())
     vertices = np.concatenate([low, high])
     vertices[:, 2] += MARKING_HEIGHT
-    i = (np.arange(strip.s.shape[0])[:, None] * count + np.arange(count - 1)).ravel()
-    above = i + flat.size
-    faces = np.concatenate([np.column_stack([i, i + 1, above]), np.column_stack([i + 1, above + 1, above])])
-    return _Part(strip.kind, vertices, faces)
+    return SurfaceMesh(strip.kind, vertices, _ribbons(*strip.s.shape))
 
 
-def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
+def _fillings(edges: dict[str, list[Array]]) -> Iterable[SurfaceMesh]:
     """Yield the surface of junctions between and below their connecting lanes."""
     for lines in edges.values():
         from scipy.spatial import Delaunay, QhullError
@@ -233,7 +220,7 @@ def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
         radius = sides[0] * sides[1] * sides[2] / np.maximum(2.0 * double_area, 1e-9)
         faces = faces[radius <= FILL_RADIUS]
         if faces.size:
-            yield _Part("junction", points - (0.0, 0.0, FILL_DEPTH), _upwards(points, faces))
+            yield SurfaceMesh("junction", points - (0.0, 0.0, FILL_DEPTH), _upwards(points, faces))
 
 
 def _upwards(vertices: Array, faces: Integers) -> Integers:
@@ -243,15 +230,10 @@ def _upwards(vertices: Array, faces: Integers) -> Integers:
     return np.where((up < 0.0)[:, None], faces[:, ::-1], faces)
 
 
-def _merged(kind: str, parts: Iterable[_Part]) -> SurfaceMesh | None:
-    vertices, faces, count = [], [], 0
-    for part in parts:
-        vertices.append(part.vertices)
-        faces.append(part.faces + count)
-        count += len(part.vertices)
-    if not vertices:
-        return None
-    return SurfaceMesh(kind, np.concatenate(vertices), np.concatenate(faces))
+def _merged(kind: str, parts: Sequence[SurfaceMesh]) -> SurfaceMesh:
+    first = accumulate((len(part.vertices) for part in parts), initial=0)
+    faces = [part.faces + start for part, start in zip(parts, first, strict=False)]
+    return SurfaceMesh(kind, np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
 
 
 DASH, GAP = 3.0, 6.0
@@ -340,25 +322,22 @@ def _edge(road: Road, section: LaneSection, lane: Lane, s: Array) -> Array:
     return np.array(flat).reshape(s.shape)
 
 
-def object_strips(network: RoadNetwork) -> Iterator[tuple[str, Array]]:
+def painted_areas(network: RoadNetwork) -> Iterator[Array]:
     """Yield painted areas among the objects as convex polygons (M, 3). Crosswalks are split into stripes."""
     for road_object in network.objects:
-        if road_object.type == "crosswalk":
+        if road_object.type in ("crosswalk", "roadMark"):
             for outline in outlines(network, road_object):
-                yield from _stripes(outline)
-        elif road_object.type == "roadMark":
-            for outline in outlines(network, road_object):
-                yield "marking_white", outline
+                yield from _stripes(outline) if road_object.type == "crosswalk" else (outline,)
 
 
-def _stripes(outline: Array) -> Iterator[tuple[str, Array]]:
+def _stripes(outline: Array) -> Iterator[Array]:
     corners = outline[:-1] if len(outline) > 4 and np.allclose(outline[0], outline[-1]) else outline
     if len(corners) != 4:
-        yield "marking_white", corners
+        yield corners
         return
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     a, b, c, d = np.roll(corners, -int(np.argmax(sides)), axis=0)
     count = min(max(round(float(sides.max()) / (2.0 * STRIPE)), 1), MOST_STRIPES)
     for i in range(count):
         low, high = (i + 0.25) / count, (i + 0.75) / count
-        yield "marking_white", np.array([a + low * (b - a), a + high * (b - a), d + high * (c - d), d + low * (c - d)])
+        yield np.array([a + low * (b - a), a + high * (b - a), d + high * (c - d), d + low * (c - d)])

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.arrays import Array, number_in_groups
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import SignalPlace
@@ -152,9 +152,9 @@ class Crossings:
         lanes = self._lanes
         inside = np.array([lane for group in self._by_junction.values() for lane in group], dtype=np.int64)
         counts = np.maximum((lanes.length[inside] / SAMPLE).astype(np.int64), 1) + 1
-        lane_of = np.repeat(inside, counts)
-        step = np.arange(len(lane_of)) - np.repeat(np.cumsum(counts) - counts, counts)
-        progress = lanes.length[lane_of] * step / np.repeat(counts - 1, counts)
+        line, number = number_in_groups(counts)
+        lane_of = inside[line]
+        progress = lanes.length[lane_of] * number / (counts - 1)[line]
         poses = lanes.tables.lane_poses(lane_of, lanes.s(lane_of, progress), np.zeros(len(lane_of)))
         points = np.column_stack([poses.x, poses.y])
         low, high = np.full((len(lanes.keys), 2), np.inf), np.full((len(lanes.keys), 2), -np.inf)

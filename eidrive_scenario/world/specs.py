@@ -27,7 +27,7 @@ _MORE_PRECISE = {
     "truck": ("firetruck", "ambulance", "van"),
 }
 """Shapes that the name may select instead of that of the category."""
-_VEHICLES = {
+SHAPE_BY_CATEGORY = {
     "aircraft": "bus",
     "bicycle": "bicycle",
     "bus": "bus",
@@ -50,6 +50,7 @@ _VEHICLES = {
     "wheelchair": "bicycle",
     "workMachine": "truck",
 }
+"""Shape by vehicle category: the name of the most similar category among those with a shape."""
 _SHAPES: dict[str, tuple[str, float, Vector3]] = {
     "car": ("car", 1500.0, (4.5, 1.8, 1.5)),
     "firetruck": ("truck", 14000.0, (8.5, 2.5, 3.3)),
@@ -131,7 +132,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
     words = _words(entity)
     if isinstance(entity, MiscObject):
         return "rsu" if "rsu" in words else "box"
-    by_category = _VEHICLES[entity.vehicle_category.value]
+    by_category = SHAPE_BY_CATEGORY[entity.vehicle_category.value]
     named = next((shape for shape, names in _WORDS if not words.isdisjoint(names)), by_category)
     return named if named in _MORE_PRECISE.get(by_category, ()) else by_category
 

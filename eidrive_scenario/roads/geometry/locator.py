@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers, number_in_groups
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneLocations
@@ -42,12 +42,10 @@ class Overlaps:
 
     def beneath(self, road: Integers, x: Array, y: Array) -> tuple[Integers, Integers]:
         """Return pairs for points (N,): point index and nearest sample of a nearby other road."""
-        counts = self._counts[road]
-        point = np.arange(len(road)).repeat(counts)
+        point, number = number_in_groups(self._counts[road])
         if not point.size:
             return point, point
-        step = np.arange(len(point)) - (counts.cumsum() - counts).repeat(counts)
-        other = self._others[self._starts[road].repeat(counts) + step]
+        other = self._others[self._starts[road[point]] + number]
         px, py = x[point], y[point]
         low, high, reach = self._low[other], self._high[other], self._reach
         near = (px >= low[:, 0] - reach) & (px <= high[:, 0] + reach)
@@ -56,11 +54,10 @@ class Overlaps:
         if not point.size:
             return point, other
         first, sizes = self._first[other], self._last[other] - self._first[other]
-        owner = np.arange(len(point)).repeat(sizes)
-        begins = sizes.cumsum() - sizes
-        sample = np.arange(len(owner)) + (first - begins).repeat(sizes)
+        owner, number = number_in_groups(sizes)
+        sample = first[owner] + number
         gap = (self._points[sample, 0] - px[owner]) ** 2 + (self._points[sample, 1] - py[owner]) ** 2
-        least = np.minimum.reduceat(gap, begins)
+        least = np.minimum.reduceat(gap, sizes.cumsum() - sizes)
         # Ties select the first sample, as argmin does.
         at = (gap == least[owner]).nonzero()[0]
         at = at[owner[at].searchsorted(np.arange(len(point)))]
@@ -294,9 +291,7 @@ def _samples(tables: RoadTables) -> tuple[Integers, Array]:
     chosen = (width >= NARROW) | (width >= widest[section])
     lanes, length, section = lanes[chosen], length[chosen], section[chosen]
     counts = np.maximum(np.ceil(length / SPACING).astype(np.int64), 1) + 1
-    row = np.repeat(lanes, counts)
-    number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
-    part = number / np.repeat(counts - 1, counts)
+    lane, number = number_in_groups(counts)
     # The end of a section belongs to the next one; the sample is slightly inside.
-    s = np.repeat(tables.section_start[section], counts) + np.repeat(np.maximum(length - 1e-6, 0.0), counts) * part
-    return row, s
+    reach = np.maximum(length - 1e-6, 0.0)
+    return lanes[lane], tables.section_start[section][lane] + reach[lane] * (number / (counts - 1)[lane])

@@ -108,12 +108,11 @@ class RoadTables:
 
     def row_of(self, key: LaneKey) -> int:
         """Return the running number of a lane of a lane section. Raise KeyError if it does not exist."""
-        section = self.first_section[self.index[key.road]] + key.section
-        first = int(self.first_lane[section])
-        for row in range(first, first + int(self.left_count[section] + self.right_count[section]) + 1):
-            if self.lanes[row].id == key.lane:
-                return row
-        raise KeyError(key)
+        return self._rows[key]
+
+    @cached_property
+    def _rows(self) -> dict[LaneKey, int]:
+        return dict(self.lane_keys())
 
     def check(self, road: Integers, s: Array) -> None:
         """Raise PositionError for the first position beyond the ends of its road."""

@@ -19,7 +19,7 @@ ROUNDING = 1e-6
 class Polynomials:
     """Function of s on [0, ∞). Each piece extends to the start of the next; before the first the value is 0."""
 
-    __slots__ = ("constant_value", "is_constant", "is_zero", "pieces", "starts")
+    __slots__ = ("constant_value", "is_zero", "pieces", "starts")
 
     def __init__(self, pieces: Iterable[Piece] = ()) -> None:
         ordered = sorted(pieces, key=lambda piece: piece[0])
@@ -30,11 +30,9 @@ class Polynomials:
         ordered = _without_repetitions(ordered)
         self.pieces: list[Piece] = ordered
         self.starts = [piece[0] for piece in ordered]
-        single = len(ordered) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
-        self.constant_value: float | None = ordered[0][1] if single else None
+        is_constant = len(ordered) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
+        self.constant_value: float | None = ordered[0][1] if is_constant else None
         """Value of a function with a single, constant piece; None for others."""
-        self.is_constant = single
-        """True if the function has a single, constant piece."""
         self.is_zero = self.constant_value == 0.0
         """True if the function is 0 everywhere."""
 
@@ -68,12 +66,7 @@ class Polynomials:
         """Return the coefficients of the polynomial at s with ds counted from s."""
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
-        return (
-            a + ds * (b + ds * (c + ds * d)),
-            b + ds * (2.0 * c + 3.0 * ds * d),
-            c + 3.0 * ds * d,
-            d,
-        )
+        return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d), c + 3.0 * ds * d, d
 
     def shifted(self, origin: float) -> Polynomials:
         """Return the function with s counted from `origin`. The part before it is dropped."""

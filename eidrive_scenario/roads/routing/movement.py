@@ -224,7 +224,8 @@ def _along(
     The result is exact on a line or arc at constant t, else by the midpoint rule.
     """
     end = _end_of(road, section, direction)
-    steady = road.lane_offset.is_constant and (lane.id == 0 or lane.center.is_constant)
+    steady = road.lane_offset.constant_value is not None
+    steady = steady and (lane.id == 0 or lane.center.constant_value is not None)
     while remaining > 0.0:
         room = (end - s) * direction
         if room <= 0.0:

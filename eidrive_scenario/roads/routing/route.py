@@ -298,12 +298,8 @@ class Route:
         counts = np.maximum(np.ceil(ways / POINT_SPACING), 1.0).astype(np.int64) + 1
         owner = np.repeat(np.arange(len(legs)), counts)
         s = np.concatenate([np.linspace(leg.s, leg.s_end, count) for leg, count in zip(legs, counts, strict=True)])
-        row, row_end = (
-            np.array(
-                [tables.row_of(LaneKey(leg.road, leg.section, lane)) for leg, lane in zip(legs, lanes, strict=True)]
-            )
-            for lanes in ([leg.lane for leg in legs], [leg.lane_end for leg in legs])
-        )
+        row = np.array([tables.row_of(LaneKey(leg.road, leg.section, leg.lane)) for leg in legs])
+        row_end = np.array([tables.row_of(LaneKey(leg.road, leg.section, leg.lane_end)) for leg in legs])
         t = tables.lane_t(row[owner], s)[0]
         changes = np.flatnonzero((row != row_end)[owner])
         if changes.size:

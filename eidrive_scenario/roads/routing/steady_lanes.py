@@ -114,8 +114,9 @@ def _steady_part(road: Road, number: int, start: float, end: float) -> _SteadyPa
     lane = section.lanes.get(number)
     if lane is None or lane.heights or not 0.0 <= start < end <= road.length:
         return None
-    is_steady = road.lane_offset.is_constant and (number == 0 or lane.center.is_constant)
-    if not is_steady or not road.superelevation.is_zero:
+    if road.lane_offset.constant_value is None or not road.superelevation.is_zero:
+        return None
+    if number and lane.center.constant_value is None:
         return None
     is_last = section.index == len(road.sections) - 1
     end = end if is_last else min(end, section.end)

@@ -18,31 +18,12 @@ from eidrive_scenario.openscenario import Scenario, model, read_document
 from eidrive_scenario.openscenario.conventions import property_entries
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.specs import SHAPE_BY_CATEGORY, actor_spec
 
 T = TypeVar("T")
 
 MODULE = "eidrive.traffic"
 """Value of `module` of a controller with driver parameters of background traffic."""
-
-CATEGORY_FALLBACKS = {
-    VehicleCategory.AIRCRAFT: VehicleCategory.BUS,
-    VehicleCategory.HEAVY_TRUCK: VehicleCategory.TRUCK,
-    VehicleCategory.LAND_VEHICLE: VehicleCategory.CAR,
-    VehicleCategory.MICROMOBILITY_DEVICE: VehicleCategory.BICYCLE,
-    VehicleCategory.MOTORCYCLE: VehicleCategory.MOTORBIKE,
-    VehicleCategory.OTHER: VehicleCategory.CAR,
-    VehicleCategory.SEMITRACTOR: VehicleCategory.TRUCK,
-    VehicleCategory.SEMITRAILER: VehicleCategory.TRUCK,
-    VehicleCategory.STANDUP_SCOOTER: VehicleCategory.BICYCLE,
-    VehicleCategory.TRAILER: VehicleCategory.TRUCK,
-    VehicleCategory.TRAIN: VehicleCategory.BUS,
-    VehicleCategory.TRAM: VehicleCategory.BUS,
-    VehicleCategory.WATERCRAFT: VehicleCategory.BUS,
-    VehicleCategory.WHEELCHAIR: VehicleCategory.BICYCLE,
-    VehicleCategory.WORK_MACHINE: VehicleCategory.TRUCK,
-}
-"""Replacements of vehicle categories that cannot drive alone, or of which the library has no vehicle."""
 
 _OLD_ROLES = {Role.FIRE_BRIGADE: Role.FIRE, Role.ROADSIDE_ASSISTANCE: Role.ROAD_ASSISTANCE}
 """Names of roles before OpenSCENARIO 1.4, which the vehicles of the library have."""
@@ -136,7 +117,7 @@ class TrafficMix:
         if self._groups is not None:
             return self._groups.draw(rng).draw(rng)
         category, role, settings = self._categories.draw(rng), self._roles.draw(rng), self._drivers.draw(rng)
-        bodies = library_bodies(CATEGORY_FALLBACKS.get(category, category))
+        bodies = library_bodies(SHAPE_BY_CATEGORY[category.value])
         fitting = [body for body, its_role in bodies if its_role is role] or [
             body for body, its_role in bodies if its_role is Role.NONE
         ]
@@ -148,8 +129,8 @@ class TrafficMix:
         """Categories of all bodies that can be drawn."""
         if self._groups is None:
             pairs = zip(self._categories.choices, self._categories.weights, strict=True)
-            categories = [CATEGORY_FALLBACKS.get(category, category) for category, weight in pairs if weight > 0.0]
-            return frozenset(body.category for category in categories for body, _ in library_bodies(category))
+            similar = [SHAPE_BY_CATEGORY[category.value] for category, weight in pairs if weight > 0.0]
+            return frozenset(body.category for category in similar for body, _ in library_bodies(category))
         return frozenset(member.spec.category for group in self._groups.choices for member in group.choices)
 
     def _entries(self, distribution: model.TrafficDistribution) -> list[model.TrafficDistributionEntry]:
@@ -206,12 +187,12 @@ def _driver_of(spec: ActorSpec) -> IntelligentDriver:
 
 
 @cache
-def library_bodies(category: VehicleCategory) -> tuple[tuple[ActorSpec, Role], ...]:
+def library_bodies(category: str) -> tuple[tuple[ActorSpec, Role], ...]:
     """Return the library vehicles of a category with their roles (NONE for everyday vehicles)."""
     document = read_document(library_path() / CATALOGS / "vehicles.xosc")
     vehicles = document.catalog.vehicle if document.catalog is not None else ()
     return tuple(
         (actor_spec(vehicle.name, vehicle), Role.NONE if vehicle.role in (None, Role.CIVIL) else vehicle.role)
         for vehicle in vehicles
-        if vehicle.vehicle_category is category
+        if vehicle.vehicle_category.value == category
     )

@@ -15,7 +15,7 @@ from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, quoted
 from eidrive_scenario.openscenario.model import Element
-from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
+from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix, WeightedChoice
 from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Changes, Population
 from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites, is_wide_enough
 from eidrive_scenario.world.view import WorldView
@@ -170,9 +170,8 @@ class Swarm(MaintainedTraffic):
     def _direction(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Bools:
         if self.directions is None:
             return np.ones(len(sites), dtype=bool)
-        same, opposite = self.directions
-        with_it: Bools = np.cos(sites.heading - center.heading) >= 0.0
-        return with_it if rng.uniform(0.0, same + opposite) < same else ~with_it
+        same: Bools = np.cos(sites.heading - center.heading) >= 0.0
+        return WeightedChoice((same, ~same), self.directions).draw(rng)
 
     def _sector(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Bools:
         """Select one of the four sectors of 90° around the entity."""
@@ -181,8 +180,7 @@ class Swarm(MaintainedTraffic):
         bearing = np.arctan2(sites.y - center.y, sites.x - center.x) - center.heading
         quarter = np.round(bearing / (math.pi / 2)).astype(np.int64) % 4
         front, rear, left, right = self.sectors
-        shares = np.cumsum([front, left, rear, right])
-        return np.asarray(quarter == np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))
+        return np.asarray(quarter == WeightedChoice(range(4), (front, left, rear, right)).draw(rng))
 
 
 @dataclass

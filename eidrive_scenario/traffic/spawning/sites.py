@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers, number_in_groups
 from eidrive_scenario.base.car_following import Drivers
 from eidrive_scenario.base.geometry import overlap, points_in_polygon
 from eidrive_scenario.errors import Diagnostic
@@ -50,9 +50,9 @@ class SpawnSites:
     def along(cls, lanes: TrafficLanes, selected: Integers, spacing: float = SPACING) -> SpawnSites:
         """Return equidistant sites along lanes."""
         counts = np.maximum(np.floor(lanes.length[selected] / spacing).astype(np.int64), 1)
-        lane = np.repeat(selected, counts)
-        number = np.arange(len(lane)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return cls.at(lanes, lane, (number + 0.5) * lanes.length[lane] / np.repeat(counts, counts))
+        group, number = number_in_groups(counts)
+        lane = selected[group]
+        return cls.at(lanes, lane, (number + 0.5) * lanes.length[lane] / counts[group])
 
     @classmethod
     def at(cls, lanes: TrafficLanes, lane: Integers, progress: Array) -> SpawnSites:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import astuple
 
-from eidrive_scenario.base.arrays import Array, Bools, Integers, of_each
+from eidrive_scenario.base.arrays import Array, Bools, Integers, number_in_groups, of_each
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
@@ -61,9 +61,8 @@ class Footprints(NamedTuple):
         # A footprint is paired with its followers in x up to the last one that the largest circle can reach.
         last = sorted_x.searchsorted(sorted_x + radius[order] + radius.max() + gap, side="right")
         counts = last - np.arange(len(x)) - 1
-        left = np.arange(len(x)).repeat(counts)
-        within = np.arange(len(left)) - (counts.cumsum() - counts).repeat(counts)
-        first, second = order[left], order[left + within + 1]
+        left, number = number_in_groups(counts)
+        first, second = order[left], order[left + number + 1]
         near = np.hypot(x[first] - x[second], y[first] - y[second]) <= radius[first] + radius[second] + gap
         near &= moved[first] | moved[second]
         near[near] = ~self._are_apart(first[near], second[near], gap)

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Integers, number_in_groups
 from eidrive_scenario.base.geometry import footprint_distance, quaternion
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.world.actor import Vector3
@@ -267,8 +267,7 @@ def covering_circles(boxes: Sequence[Box]) -> Array:
     yaw = np.where(length >= width, yaw, yaw + np.pi / 2.0)
     # A box is cut along its longer side into parts that are about as long as wide, each with its circle.
     count = np.ceil(long / np.maximum(wide, _SHORTEST)).clip(1.0).astype(int)
-    of = np.arange(len(count)).repeat(count)
-    number = np.arange(len(of)) - (np.cumsum(count) - count)[of]
+    of, number = number_in_groups(count)
     part = (long / count)[of]
     along = (number + 0.5) * part - long[of] / 2.0
     center_x, center_y = x[of] + along * np.cos(yaw[of]), y[of] + along * np.sin(yaw[of])

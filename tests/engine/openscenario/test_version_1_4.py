@@ -16,7 +16,7 @@ from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import Scenario, load_scenario, model
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.traffic import TrafficMix
-from eidrive_scenario.world.specs import _VEHICLES, actor_spec
+from eidrive_scenario.world.specs import SHAPE_BY_CATEGORY, actor_spec
 
 Kind = TypeVar("Kind")
 
@@ -88,7 +88,7 @@ def test_categories_and_roles_of_vehicles(category: str, role: str, body: str) -
 
 
 def test_every_category_has_a_body() -> None:
-    assert set(_VEHICLES) == {category.value for category in model.VehicleCategory}
+    assert set(SHAPE_BY_CATEGORY) == {category.value for category in model.VehicleCategory}
 
 
 def test_names_before_1_4_are_deprecated() -> None:

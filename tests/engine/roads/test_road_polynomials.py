@@ -18,7 +18,7 @@ def test_value_before_the_first_piece_is_zero() -> None:
     late = Polynomials([(5.0, 2.0, 0.0, 0.0, 0.0)])
     assert (late.value(4.9), late.value(5.0)) == (0.0, 2.0)
     assert Polynomials().is_zero
-    assert not late.is_constant
+    assert late.constant_value is None
 
 
 def test_first_piece_near_zero_extends_to_zero() -> None:
