@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.roads import LaneLocation, PlacedObject, Pose, RoadNetwork, Signal, outlines, placed_objects
+from eidrive_scenario.roads import PlacedObject, Pose, RoadNetwork, Signal, outlines, placed_objects
 from eidrive_scenario.world.actor import Vector3
 
 SIZES: Mapping[str, tuple[float, float, float]] = {
@@ -158,7 +158,8 @@ def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
     heads = []
     for row, (signal, pose) in enumerate(zip(standing, poses, strict=True)):
         here = below.location(row)
-        over_traffic = here is not None and below.outside[row] <= 0.0 and _drivable(roads, here)
+        lane = None if here is None else roads.roads[here.road].section_at(here.s).lanes.get(here.lane)
+        over_traffic = lane is not None and lane.drivable and below.outside[row] <= 0.0
         heads.append(_head(signal, pose, carried=not over_traffic))
     return heads
 
@@ -180,11 +181,6 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
     ahead = POST + 0.03 + (0.5 * width if lamps else 0.0)
     x, y = pose.x + ahead * math.cos(pose.h), pose.y + ahead * math.sin(pose.h)
     return SignalHead(signal, pose._replace(x=x, y=y, z=low), width, height, carried)
-
-
-def _drivable(roads: RoadNetwork, here: LaneLocation) -> bool:
-    lane = roads.roads[here.road].section_at(here.s).lanes.get(here.lane)
-    return lane is not None and lane.drivable
 
 
 def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
 from eidrive_scenario.openscenario.conventions import property_entries
-from eidrive_scenario.openscenario.model import MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.openscenario.model import MiscObject, Pedestrian, Property, Vehicle
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 
 SHAPE_PROPERTY = "eidrive.shape"
@@ -75,8 +75,8 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     is the Property `eidrive.color` (`#rrggbb`). Some catalogs omit the box by dimensions of 0; these are replaced by
     defaults of the shape. Raise ScenarioError with the line of an invalid Property or dimension.
     """
-    properties = {entry.name: entry.value for entry in property_entries(entity)}
-    shape = _shape(entity, properties)
+    properties = {entry.name: entry for entry in property_entries(entity)}
+    shape = _shape(entity, properties.get(SHAPE_PROPERTY))
     category, usual_mass, usual_size = _SHAPES[shape]
     dimensions, center = entity.bounding_box.dimensions, entity.bounding_box.center
     given = (dimensions.length, dimensions.width, dimensions.height)
@@ -92,8 +92,8 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
         size=(length, width, height),
         offset=(center.x, center.y, center.z + lift),
         mass=entity.mass or usual_mass,
-        properties=properties,
-        color=_color(entity, properties),
+        properties={name: entry.value for name, entry in properties.items()},
+        color=_color(properties.get(COLOR_PROPERTY)),
     )
     return _with_axles(common, entity) if isinstance(entity, Vehicle) else common
 
@@ -120,13 +120,12 @@ def _with_axles(spec: ActorSpec, vehicle: Vehicle) -> ActorSpec:
     )
 
 
-def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> str:
-    wanted = properties.get(SHAPE_PROPERTY)
+def _shape(entity: Vehicle | Pedestrian | MiscObject, wanted: Property | None) -> str:
     if wanted is not None:
-        if wanted not in SHAPES:
-            line, source = _line_and_source(entity, SHAPE_PROPERTY)
-            raise ScenarioError(Diagnostic(f"unknown shape {wanted!r}", suggestion(wanted, SHAPES), source, line))
-        return wanted
+        if wanted.value not in SHAPES:
+            hint = suggestion(wanted.value, SHAPES)
+            raise ScenarioError(Diagnostic.at(wanted, f"unknown shape {wanted.value!r}", hint))
+        return wanted.value
     if isinstance(entity, Pedestrian):
         return "pedestrian"
     words = _words(entity)
@@ -147,17 +146,10 @@ def _words(entity: Vehicle | MiscObject) -> set[str]:
     return words
 
 
-def _color(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> Vector3 | None:
-    text = properties.get(COLOR_PROPERTY)
-    if text is None:
+def _color(wanted: Property | None) -> Vector3 | None:
+    if wanted is None:
         return None
-    if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
-        line, source = _line_and_source(entity, COLOR_PROPERTY)
-        raise ScenarioError(Diagnostic(f"color {text!r} is invalid", "write it as #rrggbb", source, line))
-    red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    if not re.fullmatch(r"#[0-9a-fA-F]{6}", wanted.value):
+        raise ScenarioError(Diagnostic.at(wanted, f"color {wanted.value!r} is invalid", "write it as #rrggbb"))
+    red, green, blue = (int(wanted.value[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return red, green, blue
-
-
-def _line_and_source(entity: Vehicle | Pedestrian | MiscObject, name: str) -> tuple[int, str]:
-    entries = (entry for entry in property_entries(entity) if entry.name == name)
-    return next(((entry.line, entry.source) for entry in entries), (entity.line, entity.source))

@@ -37,8 +37,6 @@ class Surfaces(msgspec.Struct, frozen=True):
         if reflectivity is None:
             reflectivity = np.ones(len(triangles))
         first = np.append(np.arange(0, len(triangles), size), len(triangles))
-        if not len(triangles):
-            return cls(triangles, np.zeros(1, dtype=np.int64), np.zeros((0, 4)), reflectivity, closed)
         low = np.minimum.reduceat(triangles.min(axis=1), first[:-1])
         high = np.maximum.reduceat(triangles.max(axis=1), first[:-1])
         center = (low + high) / 2.0

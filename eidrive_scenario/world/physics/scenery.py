@@ -204,24 +204,25 @@ _MAX_KEPT = 2
 
 
 class RoadScenery:
-    """Static objects of a road network, computed when they are first used.
+    """Static objects of a road network, computed when they are first used; only level ground without one.
 
     entities  ids of objects that are actors instead
     """
 
-    def __init__(self, roads: RoadNetwork, entities: frozenset[str]) -> None:
+    def __init__(self, roads: RoadNetwork | None, entities: frozenset[str]) -> None:
         self._roads = roads
         self._entities = entities
+        self.level = roads is None or roads.is_level
 
     @cached_property
     def buildings(self) -> Sequence[Building]:
         """Buildings."""
-        return tuple(buildings(self._roads, without=self._entities))
+        return () if self._roads is None else tuple(buildings(self._roads, self._entities))
 
     @cached_property
     def road_objects(self) -> Sequence[RoadObjectBody]:
         """Road objects except buildings."""
-        return tuple(road_object_bodies(self._roads, self._entities))
+        return () if self._roads is None else tuple(road_object_bodies(self._roads, self._entities))
 
     @cached_property
     def obstacles(self) -> Obstacles:
@@ -240,18 +241,17 @@ class RoadScenery:
     @cached_property
     def surfaces(self) -> Surfaces:
         """Surfaces of the ground and of all bodies."""
-        if self._roads.is_level:
-            ground = LEVEL_GROUND
-        else:
+        ground = LEVEL_GROUND
+        if not self.level:
             triangles = [vertices[faces] for vertices, faces in self.ground]
             ground = Surfaces.group(np.concatenate(triangles), _NEIGHBORS)
         return Surfaces.join(ground, Surfaces.of_boxes(np.array(self._boxes)))
 
     @cached_property
     def ground(self) -> Sequence[tuple[Array, Integers]]:
-        """Meshes of the ground: vertices (N, 3) [m], faces (M, 3) of rows in them."""
+        """Meshes of the ground on hilly roads: vertices (N, 3) [m], faces (M, 3) of rows in them."""
         parts = []
-        for mesh in surface_meshes(self._roads, _SPACING):
+        for mesh in [] if self._roads is None else surface_meshes(self._roads, _SPACING):
             if mesh.kind.startswith("marking"):
                 continue
             for start in range(0, len(mesh.faces), MAX_FACES):
@@ -294,20 +294,19 @@ class Scenery:
 
     def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
-        self._of_roads = _shared_scenery(roads, frozenset(entities)) if roads is not None else None
+        self._of_roads = _shared_scenery(roads, frozenset(entities))
         self.buildings: list[Building] = []
         self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
         """Center and radius of each building in plan view [m]."""
         self._client = client
         self._ground: set[int] = set()
-        self.level = roads is None or roads.is_level
+        self.level = self._of_roads.level
         self._raised = False
         self._obstacles: Obstacles | None = None
         self._obstacle_handles: frozenset[int] = frozenset()
         self._built: dict[int, Sequence[Building]] = {}
         """Buildings of each body in pybullet, which takes 0.2 ms to create one, whatever its shape."""
-        if self._of_roads is not None:
-            self.add_buildings(self._of_roads.buildings)
+        self.add_buildings(self._of_roads.buildings)
 
     def add_buildings(self, buildings: Sequence[Building]) -> None:
         """Add buildings, which block vehicles and rays."""
@@ -337,7 +336,7 @@ class Scenery:
             return False
         self._raised = True
         in_client = {"physicsClientId": self._client}
-        if self.level or self._of_roads is None:
+        if self.level:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **in_client)
             # Without a visual shape pybullet loads a textured plane from a file, which takes 7 ms.
             shown = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), **in_client)
@@ -351,11 +350,11 @@ class Scenery:
     @property
     def road_objects(self) -> Sequence[RoadObjectBody]:
         """Road objects except buildings."""
-        return self._of_roads.road_objects if self._of_roads is not None else ()
+        return self._of_roads.road_objects
 
     def raise_obstacles(self) -> bool:
         """Create the bodies of road objects if they do not exist. Return True if they were created."""
-        if self._obstacles is not None or self._of_roads is None:
+        if self._obstacles is not None:
             return False
         self._obstacles = self._of_roads.obstacles
         self._obstacle_handles = frozenset(self._obstacles.raise_bodies(self._client))
@@ -364,20 +363,18 @@ class Scenery:
     @cached_property
     def circles(self) -> Array:
         """Circles (4, K) in plan view that cover all static objects: center x, y, radius, and top [m]."""
-        added = covering_circles(self._added_boxes)
-        return added if self._of_roads is None else np.concatenate([self._of_roads.circles, added], axis=1)
+        return np.concatenate([self._of_roads.circles, covering_circles(self._added_boxes)], axis=1)
 
     @cached_property
     def surfaces(self) -> Surfaces:
         """Surfaces of the ground and of all static objects."""
-        of_roads, added = LEVEL_GROUND if self._of_roads is None else self._of_roads.surfaces, self._added_boxes
+        of_roads, added = self._of_roads.surfaces, self._added_boxes
         return Surfaces.join(of_roads, Surfaces.of_boxes(np.array(added))) if added else of_roads
 
     @property
     def _added_boxes(self) -> list[Box]:
         """Buildings that the road network does not have."""
-        first = 0 if self._of_roads is None else len(self._of_roads.buildings)
-        return [building.box for building in self.buildings[first:]]
+        return [building.box for building in self.buildings[len(self._of_roads.buildings) :]]
 
     def name_of(self, handle: int, position: Vector3) -> str:
         """Return the name of the object with this body in pybullet at a point of contact."""
