@@ -150,12 +150,8 @@ def ambulance(frame: BodyDimensions) -> Mesh:
     for angle in (0.0, np.pi / 3, 2 * np.pi / 3):
         across, up = 0.30 * np.cos(angle), 0.30 * np.sin(angle)
         wide, high = -0.07 * np.sin(angle), 0.07 * np.cos(angle)
-        corners = [
-            (across + wide, up + high),
-            (-across + wide, -up + high),
-            (-across - wide, -up - high),
-            (across - wide, up - high),
-        ]
+        signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+        corners = [(i * across + j * wide, i * up + j * high) for i, j in signs]
         bar = polygon([(x(0.24) + a, -flank - 0.02, z(0.70) + b) for a, b in reversed(corners)])
         mesh.add_mirrored("blue_light", bar)
     _rear_doors(mesh, frame)
@@ -207,13 +203,8 @@ def _cab_details(mesh: Mesh, frame: BodyDimensions) -> None:
     lift *= 0.015 / np.linalg.norm(lift)
     mesh.add("glass", polygon([np.array((a, b * side, c)) + lift for a, b, c in screen]))
     y = -0.972 * side
-    window = [
-        (x(0.70), y, z(0.575)),
-        (x(0.885), y, z(0.575)),
-        (x(0.835), 0.985 * y, z(0.83)),
-        (x(0.70), 0.985 * y, z(0.86)),
-    ]
-    mesh.add_mirrored("glass", polygon(window))
+    sill, top = [(x(0.70), z(0.575)), (x(0.885), z(0.575))], [(x(0.835), z(0.83)), (x(0.70), z(0.86))]
+    mesh.add_mirrored("glass", polygon([*((a, y, b) for a, b in sill), *((a, 0.985 * y, b) for a, b in top)]))
     for share in (0.675, 0.895):
         mesh.add_mirrored("trim", box((x(share), 0.962 * side, z(0.36)), (0.014, 0.008, z(0.38))))
     mesh.add_mirrored("trim", box((x(0.715), 0.97 * side, z(0.52)), (0.16, 0.02, 0.03)))

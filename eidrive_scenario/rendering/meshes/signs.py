@@ -121,7 +121,7 @@ def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
     mesh = Mesh()
     outline = _outline(face.shape, width, height)
     mesh.add("steel", polygon(_at(outline, -LAYER))[:, ::-1])
-    middle = np.array([0.0, height / 2 if face.shape not in ("triangle", "yield") else _centroid(face.shape, height)])
+    middle = np.array([0.0, {"triangle": height / 3, "yield": 2 * height / 3}.get(face.shape, height / 2)])
     mesh.add(f"sign_{face.border or face.fill}", polygon(_at(outline, 0.0)))
     if face.border:
         inner = 1.0 - 2.0 * BORDERS.get(face.shape, BORDER if face != NO_ENTRY else 0.03)
@@ -135,26 +135,24 @@ def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
     return mesh.materials()
 
 
+_OUTLINES = {
+    "board": ((-1, 0), (1, 0), (1, 2), (-1, 2)),
+    "diamond": ((0, 0), (1, 1), (0, 2), (-1, 1)),
+    "triangle": ((-1, 0), (1, 0), (0, 2)),
+    "yield": ((0, 0), (1, 2), (-1, 2)),
+}
+"""Corners of plates with straight edges, in half widths and half heights."""
+
+
 def _outline(shape: str, width: float, height: float) -> Array:
     """Return the corners (M, 2), counter-clockwise as seen by the traffic."""
     half, tall = width / 2, height / 2
-    if shape == "board":
-        return np.array([(-half, 0.0), (half, 0.0), (half, height), (-half, height)])
-    if shape == "diamond":
-        return np.array([(0.0, 0.0), (half, tall), (0.0, height), (-half, tall)])
-    if shape == "triangle":
-        return np.array([(-half, 0.0), (half, 0.0), (0.0, height)])
-    if shape == "yield":
-        return np.array([(0.0, 0.0), (half, height), (-half, height)])
+    if shape in _OUTLINES:
+        return np.array(_OUTLINES[shape]) * (half, tall)
     corners = 8 if shape == "octagon" else 28
     turns = np.arange(corners) * (2 * math.pi / corners) + (math.pi / 8 if shape == "octagon" else 0.0)
     scale = 1.0 / math.cos(math.pi / 8) if shape == "octagon" else 1.0
     return np.stack([half * scale * np.cos(turns), tall + tall * scale * np.sin(turns)], axis=1)
-
-
-def _centroid(shape: str, height: float) -> float:
-    """Return the height of the center of a triangle."""
-    return height / 3 if shape == "triangle" else 2 * height / 3
 
 
 def _letters(text: str, middle: Array, width: float, height: float) -> list[Array]:

@@ -78,16 +78,9 @@ def bevelled_box(center: Point, size: Point, bevel: float) -> Array:
 
     def ring(at: float, inset: float) -> Array:
         w, h, b = width - inset, height - inset, bevel
-        outline = [
-            (-w + b, -h),
-            (w - b, -h),
-            (w, -h + b),
-            (w, h - b),
-            (w - b, h),
-            (-w + b, h),
-            (-w, h - b),
-            (-w, -h + b),
-        ]
+        right = [(w - b, -h), (w, -h + b), (w, h - b), (w - b, h)]
+        left = [(-across, up) for across, up in reversed(right)]
+        outline = [left[-1], *right, *left[:-1]]
         return np.array([(x + at, y + across, z + up) for across, up in reversed(outline)])
 
     return loft([ring(-length, bevel), ring(bevel - length, 0.0), ring(length - bevel, 0.0), ring(length, bevel)])
