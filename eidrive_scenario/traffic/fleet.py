@@ -245,7 +245,8 @@ class Fleet:
             self._crossings.take(lane, spec.name)
             self._cars.granted[index, 0] = True
         self._plans.extend(self._cars, index)
-        return self._placement(index, teleport=True)
+        x, y, z, h, p, r = self.poses[index].tolist()
+        return Placement(x, y, z, h, p, r, float(self._cars.speed[index]), teleport=True)
 
     def remove(self, name: str) -> None:
         """Remove a car."""
@@ -270,10 +271,6 @@ class Fleet:
         """Return the current placements of the cars."""
         rows = zip(self._index, self.poses.tolist(), self._cars.speed.tolist(), strict=True)
         return {name: Placement(x, y, z, h, p, r, speed) for name, (x, y, z, h, p, r), speed in rows}
-
-    def _placement(self, index: int, *, teleport: bool) -> Placement:
-        x, y, z, h, p, r = self.poses[index].tolist()
-        return Placement(x, y, z, h, p, r, float(self._cars.speed[index]), teleport)
 
     def observe(self, view: WorldView, *, everywhere: bool = True) -> None:
         """Observe the other actors; with `everywhere` False only those near the cars of the fleet."""

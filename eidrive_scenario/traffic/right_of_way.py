@@ -113,11 +113,6 @@ class Crossings:
         self.holders: dict[int, dict[str, float]] = {}
         """Cars that hold each lane of a junction, with the progress of their rear on it [m]."""
 
-    def junction_lanes(self, lane: int) -> list[int]:
-        """Return all lanes of the junction that contains a lane."""
-        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
-        return [] if junction is None else self._by_junction.get(junction, [])
-
     def meeting(self, lane: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
         if lane in self._meeting:
@@ -126,7 +121,8 @@ class Crossings:
         conflicts: dict[int, bool] = {}
         mine = lines[lane]
         points = NearestPoints(mine)
-        for other in self.junction_lanes(lane):
+        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
+        for other in () if junction is None else self._by_junction.get(junction, ()):
             reach = CLEARANCE + max(self._swings[lane], self._swings[other])
             near_by = np.all(low[other] <= high[lane] + reach) and np.all(low[lane] <= high[other] + reach)
             if self._lanes.road[other] == self._lanes.road[lane] or not near_by:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -24,18 +25,16 @@ class Overlaps:
         self._points, self._reach = points, reach
         count = len(tables.roads)
         self._first, self._last = np.searchsorted(road, [np.arange(count), np.arange(1, count + 1)])
-        groups: dict[str, list[int]] = {}
-        for index in range(count):
-            junction = tables.roads[index].junction_id
-            if junction is not None and self._last[index] > self._first[index]:
-                groups.setdefault(junction, []).append(index)
-        others: list[list[int]] = [[] for _ in range(count)]
-        for group in groups.values():
-            for index in group:
-                others[index] = [other for other in group if other != index]
-        self._counts = np.array([len(entry) for entry in others], dtype=np.int64)
+        sampled = self._last > self._first
+        junctions = [road.junction_id if has else None for road, has in zip(tables.roads, sampled, strict=True)]
+        groups: dict[str | None, list[int]] = {}
+        for index, junction in enumerate(junctions):
+            groups.setdefault(junction, []).append(index)
+        groups[None] = []
+        others = [[n for n in groups[junction] if n != index] for index, junction in enumerate(junctions)]
+        self._counts = np.array(list(map(len, others)), dtype=np.int64)
         self._starts = np.cumsum(self._counts) - self._counts
-        self._others = np.array([other for entry in others for other in entry], dtype=np.int64)
+        self._others = np.array(list(chain.from_iterable(others)), dtype=np.int64)
         self._low, self._high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
         np.minimum.at(self._low, road, points)
         np.maximum.at(self._high, road, points)

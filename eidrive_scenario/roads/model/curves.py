@@ -116,10 +116,9 @@ class Curve(ABC):
     def at(self, ds: float) -> CurvePoint:
         """Return the point `ds` after the start [m]."""
 
+    @abstractmethod
     def bend(self, ds: float) -> tuple[float, float]:
         """Return the curvature [1/m] and path length per meter of s at `ds`, as `at` does."""
-        point = self.at(ds)
-        return point.curvature, point.speed
 
 
 @dataclass(frozen=True)

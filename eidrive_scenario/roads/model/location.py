@@ -114,10 +114,5 @@ class LaneLocations:
         road = int(self.road[index])
         if road < 0:
             return None
-        return LaneLocation(
-            self.roads[road],
-            int(self.lane[index]),
-            float(self.s[index]),
-            float(self.offset[index]),
-            float(self.t[index]),
-        )
+        s, offset, t = self.s.item(index), self.offset.item(index), self.t.item(index)
+        return LaneLocation(self.roads[road], self.lane.item(index), s, offset, t)

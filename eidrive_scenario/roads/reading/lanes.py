@@ -229,10 +229,8 @@ def _linked(link: etree._Element | None, name: str, collector: AttributeReader) 
 def _read_marks(element: etree._Element, begin: float, collector: AttributeReader) -> Iterable[RoadMark]:
     for mark in element.iterfind("roadMark"):
         weight = mark.get("weight", "standard")
-        width = collector.mark_number(mark, "width", None)
-        lines = (
-            _read_line(line, width or MARK_WIDTHS.get(weight, 0.12), collector) for line in mark.iterfind("type/line")
-        )
+        width = collector.mark_number(mark, "width", None) or MARK_WIDTHS.get(weight, 0.12)
+        lines = (_read_line(line, width, collector) for line in mark.iterfind("type/line"))
         if mark.get("type") is None:
             collector.report_mark_warning(mark, "<roadMark> lacks the attribute 'type'")
         yield RoadMark(
@@ -240,7 +238,7 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
             type=mark.get("type", "none"),
             weight=weight,
             color=mark.get("color", "standard"),
-            width=width or MARK_WIDTHS.get(weight, 0.12),
+            width=width,
             lane_change=mark.get("laneChange", "both"),
             lines=tuple(line for line in lines if line is not None),
         )

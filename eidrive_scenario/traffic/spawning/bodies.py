@@ -118,10 +118,8 @@ class TrafficMix:
             return self._groups.draw(rng).draw(rng)
         category, role, settings = self._categories.draw(rng), self._roles.draw(rng), self._drivers.draw(rng)
         bodies = library_bodies(SHAPE_BY_CATEGORY[category.value])
-        fitting = [body for body, its_role in bodies if its_role is role] or [
-            body for body, its_role in bodies if its_role is Role.NONE
-        ]
-        fitting = fitting or [body for body, _ in bodies]
+        by_role = ([body for body, own in bodies if own is wanted] for wanted in (role, Role.NONE))
+        fitting = next(filter(None, by_role), [body for body, _ in bodies])
         return _participant(fitting[int(rng.integers(len(fitting)))], settings)
 
     @property
@@ -160,30 +158,25 @@ class TrafficMix:
             controller = self._scenario.resolved(holder.catalog_reference)
         if not isinstance(controller, model.Controller):
             return DriverSettings()
-        properties = {entry.name: entry.value for entry in property_entries(controller)}
+        entries = property_entries(controller)
+        properties, lines = {each.name: each.value for each in entries}, {each.name: each.line for each in entries}
         if properties.get("module") != MODULE:
             return DriverSettings()
-        lines = {entry.name: entry.line for entry in property_entries(controller)}
         return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line, lines=lines)
 
     def _weighted(self, choices: Sequence[T], entries: Sequence[model.Element]) -> WeightedChoice[T]:
         weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009
         if min(weights) < 0.0 or not sum(weights) > 0.0:
-            where = entries[0]
             message = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are invalid"
-            raise ScenarioError(Diagnostic.at(where, message, "give weights of at least 0, not all 0"))
+            raise ScenarioError(Diagnostic.at(entries[0], message, "give weights of at least 0, not all 0"))
         return WeightedChoice(choices, weights)
 
 
 def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:
-    usual = ON_FOOT if spec.category == "pedestrian" else _driver_of(spec)
-    return Participant(spec, settings.driver(usual), settings.speed_factor, settings.ignore_lights)
-
-
-def _driver_of(spec: ActorSpec) -> IntelligentDriver:
-    """Return the default driver with the acceleration limited to that of the vehicle."""
     usual = IntelligentDriver()
-    return replace(usual, acceleration=min(usual.acceleration, spec.max_acceleration))
+    usual = replace(usual, acceleration=min(usual.acceleration, spec.max_acceleration))
+    driver = settings.driver(ON_FOOT if spec.category == "pedestrian" else usual)
+    return Participant(spec, driver, settings.speed_factor, settings.ignore_lights)
 
 
 @cache

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import compress
 
 import numpy as np
 
@@ -131,7 +132,7 @@ class Swarm(MaintainedTraffic):
             names = list(self.members)
             x, y = population.fleet.positions(names)
             _, share = self._distances(center, x, y)
-            for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
+            for name in compress(names, share > 1.0):
                 population.despawn(name)
         self.fill(population, partial(self._spawn_one, population, center), 1 if self._filled else ATTEMPTS)
         self._filled = True
@@ -248,8 +249,8 @@ class Area(MaintainedTraffic):
         """Remove participants outside the area and spawn missing ones. Finish if the area is not continuous."""
         if self.members:
             names = list(self.members)
-            outside = ~self.covers(population.sites(names))
-            for name in [names[n] for n in np.flatnonzero(outside)]:
+            fleet = population.fleet
+            for name in compress(names, ~self.covers(SpawnSites.at(fleet.lanes, *fleet.places(names)))):
                 population.despawn(name)
         self.fill(population, partial(self._spawn_one, population))
         if not self.continuous:
@@ -286,10 +287,11 @@ class Sink(TrafficGenerator):
         """Remove the nearest cars within the radius as far as the rate permits."""
         if self.rate <= 0.0:
             return
-        names = [name for name in population.fleet.names if self._takes(population, name)]
+        fleet, taken = population.fleet, self.categories
+        names = [name for name in fleet.names if taken is None or fleet.spec(name).category in taken]
         if not names:
             return
-        x, y = population.fleet.positions(names)
+        x, y = fleet.positions(names)
         distance = np.hypot(x - self.position[0], y - self.position[1])
         for n in np.argsort(distance, kind="stable").tolist():
             if distance[n] > self.radius or self._next > population.time + TIME_TOLERANCE:
@@ -297,9 +299,6 @@ class Sink(TrafficGenerator):
             population.despawn(names[n])
             # Unused capacity is not accumulated.
             self._next = max(self._next, population.time - population.dt) + 1.0 / self.rate
-
-    def _takes(self, population: Population, name: str) -> bool:
-        return self.categories is None or population.fleet.spec(name).category in self.categories
 
 
 class BackgroundTraffic:

@@ -117,10 +117,6 @@ class Population:
         bend = np.sqrt(participant.driver.lateral_acceleration / np.maximum(lanes.tightest(sites.lane), 1e-6))
         return np.asarray(np.minimum(np.minimum(limit, bend), participant.spec.max_speed))
 
-    def sites(self, names: list[str]) -> SpawnSites:
-        """Return the sites on lanes at which cars are."""
-        return SpawnSites.at(self.fleet.lanes, *self.fleet.places(names))
-
     def spawn(
         self,
         group: CarGroup,
