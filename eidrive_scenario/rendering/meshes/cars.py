@@ -73,9 +73,8 @@ def _cabin(
     rear, front, right = (np.concatenate([bottom[ends], top[ends]]) for ends in ([3, 0], [1, 2], [0, 1]))
     mesh.add("glass", _pane(rear, 0.08, 0.92, 0.10, 0.92), _pane(front, 0.05, 0.95, 0.04, 0.95))
     post = 0.47
-    mesh.add_mirrored(
-        "glass", _pane(right, 0.07, post - 0.015, 0.10, 0.88), _pane(right, post + 0.015, 0.92, 0.10, 0.88)
-    )
+    halves = ((0.07, post - 0.015), (post + 0.015, 0.92))
+    mesh.add_mirrored("glass", *(_pane(right, start, end, 0.10, 0.88) for start, end in halves))
 
 
 def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:
@@ -99,9 +98,8 @@ def _details(mesh: Mesh, frame: BodyDimensions, belt: float, upright: bool) -> N
     mesh.add("chrome", box((nose - 0.025, 0, z(0.365)), (0.08, 1.0 * side, z(0.012))))
     mesh.add("plastic", box((nose - 0.05, 0, z(0.19)), (0.12, 1.36 * side, z(0.05))))
     mesh.add("plastic", box((tail + 0.05, 0, z(0.235)), (0.12, 1.5 * side, z(0.08))))
-    mesh.add(
-        "plate", box((nose - 0.01, 0, z(0.22)), (0.05, 0.52, 0.11)), box((tail + 0.005, 0, z(0.42)), (0.03, 0.52, 0.11))
-    )
+    mesh.add("plate", box((nose - 0.01, 0, z(0.22)), (0.05, 0.52, 0.11)))
+    mesh.add("plate", box((tail + 0.005, 0, z(0.42)), (0.03, 0.52, 0.11)))
     mesh.add_mirrored("headlight", box((x(0.972), 0.70 * side, z(belt - 0.19)), (0.16, 0.30 * side, z(0.055))))
     mesh.add_sided("indicator", box((x(0.955), 0.865 * side, z(belt - 0.19)), (0.12, 0.07 * side, z(0.045))))
     light = z(belt - 0.09)
@@ -188,9 +186,8 @@ def _body(mesh: Mesh, frame: BodyDimensions, roof_from: float) -> None:
         ]
     else:
         sections = [(roof_from, 0.965, 0.13, 0.53, 0.92), (0.74, 0.965, 0.13, 0.53, 0.93), *sections[1:]]
-        mesh.add(
-            "plastic", box((frame.x(0.32), 0, frame.z(0.16)), (0.62 * frame.length, 1.7 * frame.side, frame.z(0.08)))
-        )
+        floor = (0.62 * frame.length, 1.7 * frame.side, frame.z(0.08))
+        mesh.add("plastic", box((frame.x(0.32), 0, frame.z(0.16)), floor))
     mesh.add("paint", loft([_section(frame, *section) for section in sections]))
 
 

@@ -20,12 +20,8 @@ def truck(frame: BodyDimensions) -> Mesh:
     x, z, side = frame.x, frame.z, frame.side
     cab = min(2.2, 0.30 * frame.length)
     _cab(mesh, frame, cab, 0.90, "paint")
-    mesh.add(
-        "paint",
-        tapered_box(
-            (x(1.0) - 0.55 * cab, 0, z(0.93)), (0.75 * cab, 1.7 * side, z(0.10)), (0.35 * cab, 1.5 * side), -0.12
-        ),
-    )
+    above_cab, size = (x(1.0) - 0.55 * cab, 0, z(0.93)), (0.75 * cab, 1.7 * side, z(0.10))
+    mesh.add("paint", tapered_box(above_cab, size, (0.35 * cab, 1.5 * side), -0.12))
     floor = 2 * frame.wheel_radius + 0.12
     _cargo(mesh, frame, frame.length - cab - 0.12, floor)
     _tail(mesh, frame, floor)
@@ -50,16 +46,11 @@ def trailer(frame: BodyDimensions) -> Mesh:
 def _cargo(mesh: Mesh, frame: BodyDimensions, cargo: float, floor: float) -> None:
     """Add a closed body over `cargo` [m] from the rear end, with seams and a stripe."""
     x, side = frame.x, frame.side
-    middle = x(0.0) + cargo / 2
-    mesh.add(
-        "cargo", bevelled_box((middle, 0, (floor + frame.height) / 2), (cargo, 2 * side, frame.height - floor), 0.03)
-    )
+    along, up, high = x(0.0) + cargo / 2, (floor + frame.height) / 2, frame.height - floor
+    mesh.add("cargo", bevelled_box((along, 0, up), (cargo, 2 * side, high), 0.03))
     for share in range(1, 6):
-        seam = x(0.0) + cargo * share / 6
-        mesh.add_mirrored(
-            "gray", box((seam, side, (floor + frame.height) / 2), (0.03, 0.012, 0.96 * (frame.height - floor)))
-        )
-    mesh.add_mirrored("paint", box((middle, side, floor + 0.35 * (frame.height - floor)), (cargo, 0.016, 0.22)))
+        mesh.add_mirrored("gray", box((x(0.0) + cargo * share / 6, side, up), (0.03, 0.012, 0.96 * high)))
+    mesh.add_mirrored("paint", box((along, side, floor + 0.35 * high), (cargo, 0.016, 0.22)))
 
 
 def firetruck(frame: BodyDimensions) -> Mesh:
@@ -108,9 +99,8 @@ def bus(frame: BodyDimensions) -> Mesh:
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
     floor = 0.085
-    mesh.add(
-        "paint", bevelled_box((0, 0, z((floor + 0.97) / 2)), (frame.length - 0.02, 1.98 * side, z(0.97 - floor)), 0.10)
-    )
+    body = (frame.length - 0.02, 1.98 * side, z(0.97 - floor))
+    mesh.add("paint", bevelled_box((0, 0, z((floor + 0.97) / 2)), body, 0.10))
     mesh.add("white", bevelled_box((x(0.45), 0, z(0.965)), (0.62 * frame.length, 1.5 * side, z(0.07)), 0.05))
     mesh.add_mirrored("white", box((x(0.5), 0.99 * side, z(0.245)), (0.95 * frame.length, 0.016, z(0.05))))
     band, high = z(0.655), z(0.33)
@@ -119,9 +109,8 @@ def bus(frame: BodyDimensions) -> Mesh:
     for index in range(count):
         at = x(0.045) + (index + 0.5) * wide
         mesh.add_mirrored("glass", box((at, 0.99 * side, band), (wide - 0.10, 0.025, high)))
-    mesh.add_mirrored(
-        "trim", box((x(0.045) + 0.44 * frame.length, 0.99 * side, band), (0.88 * frame.length, 0.012, high + 0.10))
-    )
+    middle = x(0.045) + 0.44 * frame.length
+    mesh.add_mirrored("trim", box((middle, 0.99 * side, band), (0.88 * frame.length, 0.012, high + 0.10)))
     nose, tail = x(1.0) - 0.01, x(0.0) + 0.01
     mesh.add("glass", box((nose, 0, z(0.58)), (0.04, 1.76 * side, z(0.42))))
     mesh.add("trim", box((nose, 0, z(0.87)), (0.04, 1.5 * side, z(0.085))))
@@ -132,19 +121,15 @@ def bus(frame: BodyDimensions) -> Mesh:
             at = x(share) + leaf * 0.035 * frame.length
             mesh.add("trim", box((at, -0.99 * side, z(0.47)), (0.066 * frame.length, 0.03, z(0.66))))
             mesh.add("glass", box((at, -0.992 * side, z(0.49)), (0.052 * frame.length, 0.036, z(0.56))))
-    mesh.add(
-        "plastic",
-        box((nose - 0.02, 0, z(0.135)), (0.08, 1.9 * side, z(0.09))),
-        box((tail + 0.02, 0, z(0.135)), (0.08, 1.9 * side, z(0.09))),
-    )
+    for at in (nose - 0.02, tail + 0.02):
+        mesh.add("plastic", box((at, 0, z(0.135)), (0.08, 1.9 * side, z(0.09))))
     mesh.add_mirrored("headlight", box((nose, 0.74 * side, z(0.235)), (0.05, 0.30 * side, z(0.055))))
     mesh.add_sided("indicator", box((nose, 0.93 * side, z(0.235)), (0.05, 0.06 * side, z(0.055))))
     mesh.add_mirrored("taillight", box((tail, 0.86 * side, z(0.32)), (0.05, 0.14 * side, z(0.15))))
     mesh.add_sided("indicator", box((tail, 0.86 * side, z(0.425)), (0.05, 0.14 * side, z(0.045))))
     mesh.add_mirrored("reversing_light", box((tail, 0.86 * side, z(0.22)), (0.05, 0.14 * side, z(0.035))))
-    mesh.add(
-        "plate", box((nose + 0.02, 0, z(0.135)), (0.03, 0.52, 0.11)), box((tail - 0.0, 0, z(0.25)), (0.05, 0.52, 0.11))
-    )
+    mesh.add("plate", box((nose + 0.02, 0, z(0.135)), (0.03, 0.52, 0.11)))
+    mesh.add("plate", box((tail, 0, z(0.25)), (0.05, 0.52, 0.11)))
     mesh.add("plastic", box((0, 0, z(floor)), (0.96 * frame.length, 1.8 * side, z(0.04))))
     mesh.add_mirrored("trim", box((nose - 0.12, 0.95 * side, z(0.74)), (0.10, 0.14, z(0.12))))
     add_wheels(mesh, frame, 0.998 * side, 0.30)
@@ -158,56 +143,31 @@ def _cab(mesh: Mesh, frame: BodyDimensions, length: float, top: float, material:
     high, middle = roof - floor, nose - length / 2
     sill = floor + 0.50 * high
     mesh.add(material, bevelled_box((middle, 0, (floor + sill) / 2), (length, 1.96 * side, sill - floor), 0.05))
-    mesh.add(
-        material,
-        tapered_box(
-            (middle - 0.02, 0, (sill + roof) / 2),
-            (length - 0.06, 1.94 * side, roof - sill),
-            (length - 0.34, 1.80 * side),
-            -0.10,
-        ),
-    )
+    center, size = (middle - 0.02, 0, (sill + roof) / 2), (length - 0.06, 1.94 * side, roof - sill)
+    mesh.add(material, tapered_box(center, size, (length - 0.34, 1.80 * side), -0.10))
     # The windscreen follows the slope of the upper part.
     front_low, front_high = nose - 0.05, nose - 0.27
     glass_low, glass_high = sill + 0.06, roof - 0.16
-    share = (glass_high - glass_low) / (roof - sill)
-    lean = (front_low - front_high) * share
+    glass_middle, tall = (glass_low + glass_high) / 2, glass_high - glass_low
+    lean = (front_low - front_high) * (tall / (roof - sill))
     start = front_low - (front_low - front_high) * (glass_low - sill) / (roof - sill)
-    mesh.add(
-        "glass",
-        tapered_box(
-            (start - 0.02, 0, (glass_low + glass_high) / 2),
-            (0.06, 1.78 * side, glass_high - glass_low),
-            (0.06, 1.70 * side),
-            -lean,
-        ),
-    )
+    screen = (start - 0.02, 0, glass_middle)
+    mesh.add("glass", tapered_box(screen, (0.06, 1.78 * side, tall), (0.06, 1.70 * side), -lean))
     doors = ((0.30, 0.34), (0.72, 0.34)) if crew else ((0.42, 0.50),)
-    for back, wide in doors:
-        center = nose - back * length
-        mesh.add_mirrored(
-            "glass",
-            tapered_box(
-                (center, 0.925 * side, (glass_low + glass_high) / 2),
-                (wide * length, 0.10 * side, glass_high - glass_low),
-                (0.92 * wide * length, 0.02 * side),
-            ),
-        )
-        mesh.add_mirrored(
-            "trim",
-            box((center - 0.56 * wide * length, 0.982 * side, (floor + sill) / 2 + 0.2), (0.02, 0.012, sill - floor)),
-        )
-        mesh.add_mirrored("chrome", box((center - 0.42 * wide * length, 0.985 * side, sill - 0.12), (0.20, 0.03, 0.04)))
+    for back, share in doors:
+        at, wide = nose - back * length, share * length
+        window = (at, 0.925 * side, glass_middle)
+        mesh.add_mirrored("glass", tapered_box(window, (wide, 0.10 * side, tall), (0.92 * share * length, 0.02 * side)))
+        edge = (at - 0.56 * share * length, 0.982 * side, (floor + sill) / 2 + 0.2)
+        mesh.add_mirrored("trim", box(edge, (0.02, 0.012, sill - floor)))
+        mesh.add_mirrored("chrome", box((at - 0.42 * share * length, 0.985 * side, sill - 0.12), (0.20, 0.03, 0.04)))
     mesh.add("trim", box((nose - 0.01, 0, floor + 0.30 * high), (0.05, 1.3 * side, 0.22 * high)))
     mesh.add("plastic", bevelled_box((nose - 0.12, 0, floor + 0.06), (0.28, 1.96 * side, 0.30), 0.05))
     mesh.add("plate", box((nose + 0.005, 0, floor + 0.05), (0.05, 0.52, 0.11)))
-    mesh.add_mirrored(
-        "headlight", box((nose - 0.01, 0.78 * side, floor + 0.16 * high), (0.05, 0.28 * side, 0.10 * high))
-    )
-    mesh.add_sided("indicator", box((nose - 0.02, 0.95 * side, floor + 0.16 * high), (0.06, 0.06 * side, 0.10 * high)))
-    mesh.add_mirrored(
-        "trim", box((nose - 0.20, 0.965 * side, sill + 0.42 * (roof - sill)), (0.10, 0.13, 0.42 * (roof - sill)))
-    )
+    low, mirror = floor + 0.16 * high, 0.42 * (roof - sill)
+    mesh.add_mirrored("headlight", box((nose - 0.01, 0.78 * side, low), (0.05, 0.28 * side, 0.10 * high)))
+    mesh.add_sided("indicator", box((nose - 0.02, 0.95 * side, low), (0.06, 0.06 * side, 0.10 * high)))
+    mesh.add_mirrored("trim", box((nose - 0.20, 0.965 * side, sill + mirror), (0.10, 0.13, mirror)))
 
 
 def _tail(mesh: Mesh, frame: BodyDimensions, floor: float) -> None:
@@ -224,10 +184,8 @@ def _chassis(mesh: Mesh, frame: BodyDimensions) -> None:
     radius, side = frame.wheel_radius, frame.side
     mesh.add("trim", box((-0.02, 0, 1.3 * radius), (0.94 * frame.length, 0.9 * side, 0.6 * radius)))
     middle = (frame.front + frame.rear) / 2
-    mesh.add_mirrored(
-        "gray",
-        cylinder((middle - 0.5, 0.72 * side, 1.15 * radius), (middle + 0.5, 0.72 * side, 1.15 * radius), 0.55 * radius),
-    )
+    start, end = ((middle + along, 0.72 * side, 1.15 * radius) for along in (-0.5, 0.5))
+    mesh.add_mirrored("gray", cylinder(start, end, 0.55 * radius))
     add_wheels(mesh, frame, 0.985 * side, 0.32, axles=(frame.front,))
     add_wheels(mesh, frame, 0.985 * side, 0.55, axles=(frame.rear,))
     add_extra_wheels(mesh, frame, 0.985 * side, 0.55, steered=0.32)

@@ -134,9 +134,7 @@ def _lay_down(mesh: Mesh) -> None:
     whole = np.concatenate([solid.reshape(-1, 3) for solids in mesh.triangles.values() for solid in solids])
     middle, back = whole[:, 2].max() / 2, whole[:, 0].min()
     for solids in mesh.triangles.values():
-        solids[:] = [
-            np.stack([middle - solid[..., 2], solid[..., 1], solid[..., 0] - back], axis=-1) for solid in solids
-        ]
+        solids[:] = [np.stack([middle - part[..., 2], part[..., 1], part[..., 0] - back], axis=-1) for part in solids]
 
 
 def motorbike(frame: BodyDimensions) -> Mesh:
@@ -189,9 +187,8 @@ def bicycle(frame: BodyDimensions) -> Mesh:
     mesh.add("trim", cylinder((head + 0.02, -0.28, high + 0.09), (head + 0.02, 0.28, high + 0.09), 0.02, sides=6))
     mesh.add("headlight", box((head + 0.10, 0, high), (0.05, 0.06, 0.06)))
     mesh.add("taillight", box((x0 - 0.02, 0, high - 0.22), (0.03, 0.05, 0.05)))
-    _rider(
-        mesh, frame, saddle, high + 0.06, (head + 0.02, 0.0, high + 0.10), foot=(crank, 0.10, radius - 0.10), lean=0.16
-    )
+    bar = (head + 0.02, 0.0, high + 0.10)
+    _rider(mesh, frame, saddle, high + 0.06, bar, foot=(crank, 0.10, radius - 0.10), lean=0.16)
     return mesh
 
 
@@ -211,17 +208,12 @@ def _rider(
     lean: float,
 ) -> None:
     """Add a rider who sits at seat_x, seat_z, holds the bar and has the feet on the pedals."""
-    top = frame.height
-    head = 0.115
+    top, head = frame.height, 0.115
     shoulder_x, shoulder_z = seat_x + lean, top - 2 * head - 0.04
     reach = min(0.26, frame.side - 0.05)
-    chest = tapered_box(
-        (seat_x, 0, (seat_z + shoulder_z) / 2),
-        (0.24, 0.30, shoulder_z - seat_z),
-        (0.24, 2 * reach - 0.06),
-        shoulder_x - seat_x,
-    )
-    mesh.add("paint", chest)
+    chest = (0.24, 0.30, shoulder_z - seat_z)
+    middle = (seat_x, 0, (seat_z + shoulder_z) / 2)
+    mesh.add("paint", tapered_box(middle, chest, (0.24, 2 * reach - 0.06), shoulder_x - seat_x))
     mesh.add("skin", cylinder((shoulder_x, 0, shoulder_z - 0.01), (shoulder_x + 0.03, 0, top - head), 0.06, sides=8))
     mesh.add("white", ball((shoulder_x + 0.04, 0, top - head), (head + 0.02, head, head)))
     mesh.add("trim", ball((shoulder_x + 0.09, 0, top - head - 0.005), (0.09, 0.09, 0.055)))
