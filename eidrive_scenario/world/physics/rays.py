@@ -119,39 +119,28 @@ def find_crossings(client: int, scenery: Scenery, view: WorldView, begins: Array
     Static objects are found by pybullet, and actors from their boxes: a ray of pybullet also hits boxes that it passes
     at a distance of up to a millimeter.
     """
-    boxes = _Boxes(view)
+    rotation = rotation_matrix(*view.kinematics[:, 3:6].T)
+    centers, half = view.position + (rotation @ view.offset[:, :, None])[:, :, 0], view.size / 2.0
+    x, y, z = centers.T
+    reach_x, reach_y, reach_z = (np.abs(rotation) @ half[:, :, None])[:, :, 0].T
+    circles = np.stack([x, y, np.hypot(reach_x, reach_y), z + reach_z])
+    parts = []
     step = max(_MOST_CANDIDATES // max(len(view.names), 1), 1)
-    parts = [
-        boxes.crossed(begins[start : start + step], ends[start : start + step], start, most)
-        for start in range(0, max(len(begins), 1), step)
-    ]
-    lines, rows, shares = map(np.concatenate, zip(*parts, strict=True))
-    return Crossings(lines, rows, shares, _scenery_shares(client, scenery, begins, ends))
-
-
-class _Boxes:
-    """Bounding boxes of actors in all three dimensions."""
-
-    def __init__(self, view: WorldView) -> None:
-        self._rotation = rotation_matrix(*view.kinematics[:, 3:6].T)
-        self._centers = view.position + (self._rotation @ view.offset[:, :, None])[:, :, 0]
-        self._half = view.size / 2.0
-        reach = (np.abs(self._rotation) @ self._half[:, :, None])[:, :, 0]
-        x, y, z = self._centers.T
-        self._circles = np.stack([x, y, np.hypot(reach[:, 0], reach[:, 1]), z + reach[:, 2]])
-
-    def crossed(self, begins: Array, ends: Array, first: int, most: int) -> tuple[Integers, Integers, Array]:
-        """Return lines, rows and shares of `Crossings` for lines whose first has the index `first`."""
-        lines, rows = _near(begins, ends, self._circles)
-        to_body = self._rotation[rows].transpose(0, 2, 1)
-        begin = (to_body @ (begins[lines] - self._centers[rows])[:, :, None])[:, :, 0]
-        way = (to_body @ (ends[lines] - begins[lines])[:, :, None])[:, :, 0]
-        enters, leaves = _crossing_shares(begin, way, self._half[rows] - TOUCH)
+    for first in range(0, max(len(begins), 1), step):
+        start, end = begins[first : first + step], ends[first : first + step]
+        lines, rows = _near(start, end, circles)
+        # In the frames of the boxes
+        to_body = rotation[rows].transpose(0, 2, 1)
+        begin = (to_body @ (start[lines] - centers[rows])[:, :, None])[:, :, 0]
+        way = (to_body @ (end[lines] - start[lines])[:, :, None])[:, :, 0]
+        enters, leaves = _crossing_shares(begin, way, half[rows] - TOUCH)
         crossed = np.flatnonzero((enters < leaves) & (enters < 1.0) & (leaves > 0.0))
         lines, rows, shares = lines[crossed], rows[crossed], np.maximum(enters[crossed], 0.0)
         order = np.lexsort((rows, shares, lines))
         order = order[np.arange(len(order)) - np.searchsorted(lines[order], lines[order]) < most]
-        return lines[order] + first, rows[order], shares[order]
+        parts.append((lines[order] + first, rows[order], shares[order]))
+    lines, rows, shares = map(np.concatenate, zip(*parts, strict=True))
+    return Crossings(lines, rows, shares, _scenery_shares(client, scenery, begins, ends))
 
 
 def _scenery_shares(client: int, scenery: Scenery, begins: Array, ends: Array) -> Array:
