@@ -136,9 +136,7 @@ def load_weather(source: str | Path, *, origin: str = "") -> Weather:
         raise SettingError([replace(diagnostic, source=origin) for diagnostic in error.diagnostics]) from error
     data, lines = load_yaml_file(path)
     if not isinstance(data, Mapping):
-        given = "nothing" if data is None else type(data).__name__
-        raise SettingError(
-            Diagnostic(f"weather is not a mapping (got {given})", "write `cloud_cover: 0.5`", str(path), 1)
-        )
+        message = f"weather is not a mapping (got {'nothing' if data is None else type(data).__name__})"
+        raise SettingError(Diagnostic(message, "write `cloud_cover: 0.5`", str(path), 1))
     weather = parse_settings(Weather, data, source=str(path), line=1, lines=lines)
     return weather if weather.name else weather.model_copy(update={"name": path.stem})

@@ -227,7 +227,7 @@ class World:
         for name, driven in self._driven.items():
             if name in placements:
                 driven.teleport(placements[name])
-        if self._couplings.any_affected:
+        if not self._couplings.is_complete:
             self._update_attributes()
             self._couplings.update(self._bodies)
         touches = self._physics.tick(bodies, self._driven, controls, self._friction)

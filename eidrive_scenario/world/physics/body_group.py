@@ -86,17 +86,13 @@ class BodyGroup:
     """Bodies of a world while no actor is added or removed. They move one by one."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
-        self._bodies = tuple(bodies)
+        self.members = tuple(bodies)
+        """All bodies, whose attributes may be outdated; see `current`."""
         self._by_name = {body.name: body for body in bodies if isinstance(body, ScriptedBody)}
         self._widest = max((body.radius for body in bodies), default=0.0)
-        self._rows_format = struct.Struct(f"{14 * len(self._bodies)}d")
+        self._rows_format = struct.Struct(f"{14 * len(self.members)}d")
         self._moving = [*self._by_name.values()]
         """Scripted bodies that do not rest."""
-
-    @property
-    def members(self) -> Sequence[Body]:
-        """All bodies, whose attributes may be outdated; see `current`."""
-        return self._bodies
 
     def place(self, placements: Mapping[str, Placement]) -> None:
         """Move the scripted bodies to placements by name; a body without one stands."""
@@ -111,23 +107,23 @@ class BodyGroup:
 
     def current(self) -> Sequence[Body]:
         """Return all bodies with their current attributes."""
-        return self._bodies
+        return self.members
 
     def sync_poses(self) -> None:
         """Move the rigid bodies whose poses are outdated to the poses of the actors."""
-        for body in self._bodies:
+        for body in self.members:
             if body.stale:
                 body.sync_pose()
 
     def states(self) -> tuple[list[ActorState], Array]:
         """Return the states of all bodies, as scalars and as read-only rows (N, 14)."""
-        states = [body.state for body in self._bodies]
+        states = [body.state for body in self.members]
         table = np.frombuffer(self._rows_format.pack(*chain.from_iterable(states))).reshape(-1, 14)
         return states, table
 
     def moved_names(self) -> set[str]:
         """Return the names of the bodies whose pose the last step changed."""
-        return {body.name for body in self._bodies if body.moved}
+        return {body.name for body in self.members if body.moved}
 
     def neighbors(self, of: Sequence[Body], margin: float) -> list[Sequence[Body]]:
         """Return, for each of some bodies, those that can be within `margin` [m] of it in this step, in their order.
@@ -141,14 +137,14 @@ class BodyGroup:
             limit = reach + (body.radius + body.travel + margin + ROUNDING)
             near.append(np.flatnonzero(dx * dx + dy * dy <= limit * limit).tolist())
         self._update(set(chain.from_iterable(near)))
-        return [[self._bodies[row] for row in rows] for rows in near]
+        return [[self.members[row] for row in rows] for rows in near]
 
     def near_pairs(self, gap: float) -> list[tuple[Body, Body]]:
         """Return the pairs with a moved body that may be at most `gap` [m] apart, in the order of the bodies."""
-        if len(self._bodies) > FEW:
+        if len(self.members) > FEW:
             pairs = self._footprints().near_pairs(gap)
             self._update(set(chain.from_iterable(pairs)))
-            return [(self._bodies[row], self._bodies[other]) for row, other in pairs]
+            return [(self.members[row], self.members[other]) for row, other in pairs]
         # Without this comparison one by one, runs with few actors take 1.2 to 1.3 times longer.
         bodies, near = self.current(), []
         by_x = sorted([(body.center_x, row, body.moved) for row, body in enumerate(bodies)])
@@ -171,10 +167,10 @@ class BodyGroup:
 
     def _circles(self) -> Array:
         """Return x, y and radius (3, N) of circles around the bodies, with the displacement of this step [m]."""
-        return np.array([(body.center_x, body.center_y, body.radius + body.travel) for body in self._bodies]).T
+        return np.array([(body.center_x, body.center_y, body.radius + body.travel) for body in self.members]).T
 
     def _footprints(self) -> Footprints:
-        return Footprints.of(self._bodies)
+        return Footprints.of(self.members)
 
 
 MANY = 100
@@ -264,7 +260,7 @@ class BodyBatch(BodyGroup):
         if self._is_outdated:
             self._is_outdated = False
             self._write_back(np.arange(len(self._scripted)))
-        return self._bodies
+        return self.members
 
     def _update(self, rows: Collection[int]) -> None:
         if self._is_outdated and rows:
@@ -289,7 +285,7 @@ class BodyBatch(BodyGroup):
         states = dict(zip(self._rows[members].tolist(), self._state[members].tolist(), strict=True))
         # In the order of the bodies, on which the order of contacts in pybullet depends.
         for row in sorted([*states, *self._others]):
-            body = self._bodies[row]
+            body = self.members[row]
             if isinstance(body, ScriptedBody):
                 state = states[row]
                 body.move_rigid_body(state[:6], state[6:9], state[12])
@@ -300,7 +296,7 @@ class BodyBatch(BodyGroup):
     def states(self) -> tuple[list[ActorState], Array]:
         table = self._state
         if self._others:
-            table = np.empty((len(self._bodies), table.shape[1]))
+            table = np.empty((len(self.members), table.shape[1]))
             table[self._rows] = self._state
             for row, body in self._others.items():
                 table[row] = body.state
@@ -312,24 +308,19 @@ class BodyBatch(BodyGroup):
         return names.union(body.name for body in self._others.values() if body.moved)
 
     def _circles(self) -> Array:
+        # `ScriptedBody.travel`, but for rounding
+        covered = self._state[:, :5] - self._from[:, :5]
+        turn = np.abs(wrap_angle(covered[:, 3])) + np.abs(covered[:, 4])
         reach = self._radius.copy()
-        reach[self._rows] += self._travel()
+        reach[self._rows] += np.sqrt(np.sum(covered[:, :3] ** 2, axis=1)) + turn * 2.0 * self._radius[self._rows]
         for row, body in self._others.items():
             reach[row] += body.travel
         return np.stack([*self._centers(), reach])
 
-    def _travel(self) -> Array:
-        """Return `ScriptedBody.travel`, but for rounding."""
-        covered = self._state[:, :5] - self._from[:, :5]
-        turn = np.abs(wrap_angle(covered[:, 3])) + np.abs(covered[:, 4])
-        way: Array = np.sqrt(np.sum(covered[:, :3] ** 2, axis=1))
-        way += turn * 2.0 * self._radius[self._rows]
-        return way
-
     def _footprints(self) -> Footprints:
         x, y = self._centers()
-        cos, sin = np.empty((2, len(self._bodies)))
-        moved = np.empty(len(self._bodies), dtype=bool)
+        cos, sin = np.empty((2, len(self.members)))
+        moved = np.empty(len(self.members), dtype=bool)
         cos[self._rows], sin[self._rows], moved[self._rows] = self._cos, self._sin, self._moved
         for row, body in self._others.items():
             cos[row], sin[row], moved[row] = math.cos(body.yaw), math.sin(body.yaw), body.moved
@@ -338,7 +329,7 @@ class BodyBatch(BodyGroup):
 
     def _centers(self) -> Array:
         """Return x and y of the centers of all boxes (2, N)."""
-        centers = np.empty((2, len(self._bodies)))
+        centers = np.empty((2, len(self.members)))
         centers[:, self._rows] = self._center[:, :2].T
         for row, body in self._others.items():
             centers[:, row] = body.center_x, body.center_y

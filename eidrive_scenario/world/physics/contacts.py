@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,15 +28,10 @@ class Couplings:
         self._client = client
         self.pairs: frozenset[Pair] = frozenset()
         """Names of connected actors."""
-        self._is_complete = True
-        """Whether all of them, and no others, pass through each other."""
+        self.is_complete = True
+        """Whether all of them, and no others, pass through each other, so that `update` has nothing to do."""
         self._apart: dict[Pair, tuple[int, int]] = {}
         """Handles of the bodies that do not collide with each other."""
-
-    @property
-    def any_affected(self) -> bool:
-        """Whether `update` has pairs to process."""
-        return not self._is_complete
 
     def set_pairs(self, pairs: frozenset[Pair]) -> None:
         """Set which actors are connected."""
@@ -46,7 +40,7 @@ class Couplings:
 
     def note_change(self) -> None:
         """Note that bodies have entered or left."""
-        self._is_complete = not self.pairs and not self._apart
+        self.is_complete = not self.pairs and not self._apart
 
     def attached(self, name: str) -> frozenset[str]:
         """Return the actors that are connected to an actor directly or by others, without the actor itself."""
@@ -72,21 +66,17 @@ class Couplings:
             elif self._apart.get(pair) != handles:
                 self._collide(handles, False)
                 self._apart[pair] = handles
-        self._is_complete = self._apart.keys() <= self.pairs
+        self.is_complete = self._apart.keys() <= self.pairs
 
     def _collide(self, handles: tuple[int, int], enabled: bool) -> None:
         bullet.setCollisionFilterPair(*handles, -1, -1, int(enabled), physicsClientId=self._client)
 
 
-class Touch(NamedTuple):
-    """Contact that pybullet reported within the step."""
+Touches = dict[tuple[str, str], tuple[Vector3, float]]
+"""Points [m] and impact speeds [m/s] of the contacts that pybullet reported within a step.
 
-    position: Vector3
-    impact_speed: float
-
-
-Touches = dict[tuple[str, str], Touch]
-"""Contacts by pair of names in the order of the rows of the view, a building last."""
+The key is the pair of names in the order of the rows of the view, a building last.
+"""
 
 
 class ContactTracker:
@@ -163,7 +153,7 @@ class ContactTracker:
         for pair, touch in touches.items():
             if pair not in self._touching:
                 self._touching[pair] = None
-                begun.append(Contact(*pair, touch.position, touch.impact_speed))
+                begun.append(Contact(*pair, *touch))
         return tuple(begun)
 
 

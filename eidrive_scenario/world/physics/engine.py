@@ -12,7 +12,7 @@ from eidrive_scenario.world.actor import Control, Vector3
 from eidrive_scenario.world.physics.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.physics.body_group import BodyGroup
 from eidrive_scenario.world.physics.bullet import bullet
-from eidrive_scenario.world.physics.contacts import Touch, Touches
+from eidrive_scenario.world.physics.contacts import Touches
 from eidrive_scenario.world.physics.dynamics import Demand
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import FEW
@@ -204,10 +204,10 @@ class Physics:
             handle = second if first == body.handle else first
             if handle not in owners:
                 speed = math.dist(before[body.handle], (0.0, 0.0, 0.0))
-                touches.setdefault((body.name, self._scenery.name_of(handle, position)), Touch(position, speed))
+                touches.setdefault((body.name, self._scenery.name_of(handle, position)), (position, speed))
                 continue
             row, other = owners[handle]
             pair = (body.name, other.name) if owners[body.handle][0] < row else (other.name, body.name)
             if pair not in touches:
                 speed = math.dist(before[body.handle], before.get(handle, other.velocity))
-                touches[pair] = Touch(position, speed)
+                touches[pair] = position, speed

@@ -75,9 +75,8 @@ class VehicleParameters(msgspec.Struct, frozen=True):
         """Return the parameters of a vehicle. Raise SettingError if a Property is invalid."""
         if spec.wheelbase <= 0.0:
             message = f"{spec.name!r} cannot be driven: its wheelbase is not positive"
-            raise SettingError(
-                Diagnostic(message, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's")
-            )
+            hint = "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"
+            raise SettingError(Diagnostic(message, hint))
         axles = _axles(spec)
         front_group, rear_group = [axle.x for axle in axles if axle.front], [axle.x for axle in axles if not axle.front]
         wheelbase, rear, usual = spec.wheelbase, 0.0, 0.55
