@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road, RoadMark
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import outlines
@@ -90,7 +89,7 @@ def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMe
         for section in road.sections:
             s = cross_sections(network, road, section, spacing)
             parts.extend(_lane_parts(network, road, section, s, edges))
-            parts.extend(_strip_part(network, road, strip) for strip in lane_strips(road, section, s))
+            parts.extend(_lane_markings(network, road, section, s))
     parts.extend(_fillings(edges))
     for polygon in painted_areas(network):
         lifted = np.add(polygon, (0.0, 0.0, MARKING_HEIGHT))
@@ -111,16 +110,14 @@ def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spaci
     widths = [[lane.width.value(float(at) - section.s) for at in s] for lane in section.lanes.values()]
     offset = [road.lane_offset.value(float(at)) for at in s]
     shape = np.column_stack([*(axis for pose in outline for axis in pose[:3]), *widths, offset])
-    kept = np.zeros(count, dtype=bool)
+    return np.asarray(s[_needed_rows(shape, s)])
+
+
+def _needed_rows(shape: Array, s: Array) -> Bools:
+    """Return which rows a polyline through `shape` needs (Douglas and Peucker 1973)."""
+    kept = np.zeros(len(s), dtype=bool)
     kept[[0, -1]] = True
-    _keep(shape, s, kept, 0, count - 1)
-    sections: Array = s[kept]
-    return sections
-
-
-def _keep(shape: Array, s: Array, kept: NDArray[np.bool_], first: int, last: int) -> None:
-    """Mark the rows that a polyline through `shape` needs (Douglas and Peucker 1973)."""
-    waiting = [(first, last)]
+    waiting = [(0, len(s) - 1)]
     while waiting:
         first, last = waiting.pop()
         if last - first < 2:
@@ -134,6 +131,7 @@ def _keep(shape: Array, s: Array, kept: NDArray[np.bool_], first: int, last: int
             worst = (first + last) // 2
         kept[worst] = True
         waiting += [(first, worst), (worst, last)]
+    return kept
 
 
 def _lane_parts(
@@ -195,15 +193,6 @@ def _ribbons(pieces: int, count: int) -> Integers:
     return np.concatenate([np.column_stack([i, i + 1, above]), np.column_stack([i + 1, above + 1, above])])
 
 
-def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> SurfaceMesh:
-    flat = strip.s.ravel()
-    low = _points(network, road, flat, (strip.t - 0.5 * strip.width).ravel())
-    high = _points(network, road, flat, (strip.t + 0.5 * strip.width).ravel())
-    vertices = np.concatenate([low, high])
-    vertices[:, 2] += MARKING_HEIGHT
-    return SurfaceMesh(strip.kind, vertices, _ribbons(*strip.s.shape))
-
-
 def _fillings(edges: dict[str, list[Array]]) -> Iterable[SurfaceMesh]:
     """Yield the surface of junctions between and below their connecting lanes."""
     for lines in edges.values():
@@ -253,17 +242,7 @@ CURVED = 0.01
 """Minimum curvature at which a dash is drawn bent [1/m]."""
 
 
-@dataclass(frozen=True)
-class Strip:
-    """Paint along a road: `s` and `t` (K, P) of K pieces with P points each, and `width` [m]."""
-
-    kind: str
-    s: Array
-    t: Array
-    width: float
-
-
-def lane_strips(road: Road, section: LaneSection, cuts: Array) -> Iterator[Strip]:
+def _lane_markings(network: RoadNetwork, road: Road, section: LaneSection, cuts: Array) -> Iterator[SurfaceMesh]:
     """Yield the marks of a lane section. Solid lines may bend at the values of s in `cuts`."""
     for lane in section.lanes.values():
         if road.junction_id is not None and lane.type == "none" and lane.id:
@@ -273,13 +252,18 @@ def lane_strips(road: Road, section: LaneSection, cuts: Array) -> Iterator[Strip
             start = section.s + max(mark.s_offset, 0.0)
             end = section.end if following is None else min(section.s + following.s_offset, section.end)
             if mark.type in PAINTED and end - start > 1e-3:
-                yield from _mark_strips(road, section, lane, mark, start, end, cuts)
+                kind = "marking_yellow" if mark.color == "yellow" else "marking_white"
+                for s, t, width in _mark_strips(road, section, lane, mark, start, end, cuts):
+                    low, high = (_points(network, road, s.ravel(), (t + k * width).ravel()) for k in (-0.5, 0.5))
+                    vertices = np.concatenate([low, high])
+                    vertices[:, 2] += MARKING_HEIGHT
+                    yield SurfaceMesh(kind, vertices, _ribbons(*s.shape))
 
 
 def _mark_strips(
     road: Road, section: LaneSection, lane: Lane, mark: RoadMark, start: float, end: float, cuts: Array
-) -> Iterator[Strip]:
-    kind = "marking_yellow" if mark.color == "yellow" else "marking_white"
+) -> Iterator[tuple[Array, Array, float]]:
+    """Yield paint along a road: s and t (K, P) of K pieces with P points each, and width [m]."""
     for offset, width, dash, gap, phase in _lines(lane, mark):
         period = dash + gap
         if dash > 0.0 and gap > 0.0 and period > FINEST and end - start < MOST_DASHES * period:
@@ -291,7 +275,7 @@ def _mark_strips(
             s = starts[:, None] + (np.minimum(starts + dash, end) - starts)[:, None] * share
         else:
             s = np.array([start, *(cut for cut in cuts if start < cut < end), end])[None, :]
-        yield Strip(kind, s, _edge(road, section, lane, s) + offset, width)
+        yield s, _edge(road, section, lane, s) + offset, width
 
 
 def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float, float]]:
