@@ -6,7 +6,8 @@ Routes have the length as cost, or one of the costs here: travel time, junctions
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from eidrive_scenario.base.arrays import Array, Integers
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.roads.geometry import poses
 from eidrive_scenario.roads.geometry.locator import REACH, Locator
 from eidrive_scenario.roads.geometry.tables import RoadTables
@@ -107,13 +108,10 @@ class RoadNetwork:
         """Geodetic reference of the map. Raise PositionError if the file omits it or if it is invalid."""
         text = self.header.geo_reference
         if not text:
-            raise PositionError(
-                Diagnostic("the road network has no geoReference", "add <geoReference> to its <header>", self.source)
-            )
-        try:
+            hint = "add <geoReference> to its <header>"
+            raise PositionError(Diagnostic("the road network has no geoReference", hint, self.source))
+        with self._geo_reference_errors():
             return parse_geo_reference(text)
-        except ValueError as error:
-            raise self._geo_reference_error(error) from error
 
     @cached_property
     def is_level(self) -> bool:
@@ -124,9 +122,14 @@ class RoadNetwork:
     def _locator(self) -> Locator:
         return Locator(self.tables)
 
-    def _geo_reference_error(self, error: ValueError) -> PositionError:
-        hint = "write <geoReference> as a PROJ string, such as +proj=utm +zone=32 +datum=WGS84"
-        return PositionError(Diagnostic(str(error), hint, self.source, self.header.geo_reference_line))
+    @contextmanager
+    def _geo_reference_errors(self) -> Iterator[None]:
+        """Report errors of the geodetic reference with its line."""
+        try:
+            yield
+        except ValueError as error:
+            hint = "write <geoReference> as a PROJ string, such as +proj=utm +zone=32 +datum=WGS84"
+            raise PositionError(Diagnostic(str(error), hint, self.source, self.header.geo_reference_line)) from error
 
     # Attributes at a position
 
@@ -134,7 +137,7 @@ class RoadNetwork:
         """Return the road with this id. Raise PositionError if it does not exist."""
         road = self.roads.get(road_id)
         if road is None:
-            raise poses.unknown_road(road_id, list(self.roads))
+            raise PositionError(Diagnostic(f"road {road_id!r} does not exist", suggestion(road_id, self.roads)))
         return road
 
     def driving_direction(self, road_id: str, lane_id: int) -> int:
@@ -235,18 +238,14 @@ class RoadNetwork:
         reference = self.geo_reference
         dx, dy, _, turn = self.header.offset
         cos, sin = math.cos(turn), math.sin(turn)
-        try:
+        with self._geo_reference_errors():
             return reference.geodetic(x * cos - y * sin + dx, x * sin + y * cos + dy)
-        except ValueError as error:
-            raise self._geo_reference_error(error) from error
 
     def geographic(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Return x and y [m] of a point in WGS 84 [rad]. Raise PositionError if the map has no position for it."""
         reference = self.geo_reference
-        try:
+        with self._geo_reference_errors():
             x, y = reference.plane(latitude, longitude)
-        except ValueError as error:
-            raise self._geo_reference_error(error) from error
         dx, dy, _, turn = self.header.offset
         x, y, cos, sin = x - dx, y - dy, math.cos(turn), math.sin(turn)
         return x * cos + y * sin, y * cos - x * sin

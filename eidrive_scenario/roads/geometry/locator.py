@@ -98,15 +98,18 @@ class Locator:
     def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
         """Return road and lane coordinates of points (N,). Without z, the nearest road in plan view is selected."""
         samples, points, distance, nearest = self._nearest_samples(x, y, z, reach)
-        if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
+        count = len(points)
+        if count <= MANY and distance.max(initial=0.0) < np.inf:
             return self._located(samples, points, nearest, reach)
         # Sorted points make the lookup in the tables faster.
         order = np.flatnonzero(distance < np.inf)
         order = order[np.argsort(nearest[order])]
-        some = self._located(samples, points[order], nearest[order], reach)
-        locations = LaneLocations(self._tables.ids, *_nowhere(len(points)))
+        near = self._located(samples, points[order], nearest[order], reach)
+        road, lane, outside = np.full(count, -1), np.zeros(count, dtype=np.int64), np.full(count, np.inf)
+        s, t, offset, heading = np.zeros((4, count))
+        locations = LaneLocations(self._tables.ids, road, lane, s, t, offset, heading, outside)
         for field in fields(locations)[1:]:
-            getattr(locations, field.name)[order] = getattr(some, field.name)
+            getattr(locations, field.name)[order] = getattr(near, field.name)
         return locations
 
     def _nearest_samples(
@@ -116,13 +119,12 @@ class Locator:
 
         The distance is inf for a point that is farther than `reach` from all roads.
         """
-        solid = z is not None and self._solid is not None
-        samples = self._solid if solid and self._solid is not None else self._flat
-        points = np.array([x, y, z] if solid and z is not None else [x, y]).T
-        # A point that is far from all samples is outside the reach of every road.
-        hopeless = np.inf if solid else reach + self._from_samples
-        distance, nearest = samples.nearest(points, within=hopeless)
-        return samples, points, distance, nearest
+        if z is not None and self._solid is not None:
+            samples, points, hopeless = self._solid, np.array([x, y, z]).T, np.inf
+        else:
+            # A point that is far from all samples is outside the reach of every road.
+            samples, points, hopeless = self._flat, np.array([x, y]).T, reach + self._from_samples
+        return samples, points, *samples.nearest(points, within=hopeless)
 
     def _located(self, samples: NearestPoints, points: Array, nearest: Integers, reach: float) -> LaneLocations:
         """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `samples`."""
@@ -271,12 +273,6 @@ class Locator:
             off = np.abs(refined_along[at_end])
             beyond[at_end] = np.where(off > 1e-6, off, 0.0)
         return refined_s, refined_t, beyond, last_change == 0.0
-
-
-def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:
-    """Return the columns of LaneLocations for points without a road within reach."""
-    s, t, offset, heading = np.zeros((4, count))
-    return np.full(count, -1), np.zeros(count, dtype=np.int64), s, t, offset, heading, np.full(count, np.inf)
 
 
 def _samples(tables: RoadTables) -> tuple[Integers, Array]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from eidrive_scenario.errors import Diagnostic, suggestion
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads.model.location import Pose, PositionError
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 
@@ -160,9 +160,8 @@ def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
     lane = section.lanes.get(lane_id)
     if lane is None:
         lanes = ", ".join(str(number) for number in section.lanes)
-        raise PositionError(
-            Diagnostic(f"road {road.id!r} has no lane {lane_id} at s = {s:g} m", f"its lanes are {lanes}")
-        )
+        message = f"road {road.id!r} has no lane {lane_id} at s = {s:g} m"
+        raise PositionError(Diagnostic(message, f"its lanes are {lanes}"))
     return section, lane
 
 
@@ -219,11 +218,5 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
 
 def off_road(road: Road, s: float) -> PositionError:
     """Return the error for a position beyond the ends of a road."""
-    return PositionError(
-        Diagnostic(f"s = {s:g} m is not on road {road.id!r}", f"the road extends from 0 to {road.length:g} m")
-    )
-
-
-def unknown_road(number: str, roads: list[str]) -> PositionError:
-    """Return the error for a road that does not exist."""
-    return PositionError(Diagnostic(f"road {number!r} does not exist", suggestion(number, roads)))
+    hint = f"the road extends from 0 to {road.length:g} m"
+    return PositionError(Diagnostic(f"s = {s:g} m is not on road {road.id!r}", hint))

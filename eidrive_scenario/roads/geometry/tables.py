@@ -13,7 +13,7 @@ from eidrive_scenario.roads.geometry.poses import BEYOND, LEAST_STRETCH, lane_he
 from eidrive_scenario.roads.model.curve_table import CurveTable
 from eidrive_scenario.roads.model.location import LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model.polynomials import PolynomialTable
-from eidrive_scenario.roads.model.road_map import AT_END, STEP, Lane, LaneSection, Road
+from eidrive_scenario.roads.model.road_map import AT_END, STEP, Road
 
 
 class RoadTables:
@@ -46,21 +46,24 @@ class RoadTables:
         self.first_section = np.searchsorted(self.section_road, np.arange(len(self.roads)))
         self._section_borders = (self.curves.base[self.section_road] + self.section_start)[1:]
         """Starts of all sections but the first one, on the common axis of all roads."""
-        ordered = [_inside_out(section) for section in sections]
-        counts = np.array([len(lanes) for lanes in ordered])
-        self.left_count = np.array([sum(1 for lane in lanes if lane.id > 0) for lanes in ordered])
+        # Lanes from the middle outwards, first those on the left
+        inside_out = [
+            [section.lanes[number] for number in sorted(section.lanes, key=lambda n: (n < 0, abs(n)))]
+            for section in sections
+        ]
+        counts = np.array([len(lanes) for lanes in inside_out])
+        self.left_count = np.array([sum(1 for lane in lanes if lane.id > 0) for lanes in inside_out])
         self.right_count = counts - self.left_count - 1
         self.first_lane = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
         self._sides = self._index_sides()
         """First and last lane on the right and on the left of each section: rows 2·section and 2·section + 1. On a
         side without lanes the last one is -1, the first one is on the other side if there is any."""
-        lanes = [lane for group in ordered for lane in group]
-        self.lanes = lanes
+        self.lanes = lanes = [lane for group in inside_out for lane in group]
         self._lifted = np.array([bool(lane.heights) for lane in lanes])
         self.lane_section = np.repeat(np.arange(len(sections)), counts)
         self.lane_id = np.array([lane.id for lane in lanes], dtype=np.int64)
         self.lane_drivable = np.array([lane.drivable for lane in lanes])
-        spans = [section.length for section, group in zip(sections, ordered, strict=True) for _ in group]
+        spans = [section.length for section, group in zip(sections, inside_out, strict=True) for _ in group]
         self.center = PolynomialTable([lane.center for lane in lanes], spans)
         self.outer = PolynomialTable([lane.outer for lane in lanes], spans)
         self.width = PolynomialTable([lane.width for lane in lanes], spans)
@@ -98,11 +101,8 @@ class RoadTables:
             end = self.first_lane[section[n]] + left[n] + right[n] + 1
             near = np.flatnonzero(self.lane_id[self.first_lane[section[n]] : end] == lane[n])
             if not near.size:
-                raise PositionError(
-                    Diagnostic(
-                        f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m", "correct the lane"
-                    )
-                )
+                message = f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m"
+                raise PositionError(Diagnostic(message, "correct the lane"))
             row[n] = self.first_lane[section[n]] + near[0]
         return np.asarray(row, dtype=np.int64)
 
@@ -239,10 +239,3 @@ class RoadTables:
             open_ = open_[~ends]
             row[open_] += 1
         return row, outside
-
-
-def _inside_out(section: LaneSection) -> list[Lane]:
-    lanes = list(section.lanes.values())
-    left = sorted((lane for lane in lanes if lane.id > 0), key=lambda lane: lane.id)
-    right = sorted((lane for lane in lanes if lane.id < 0), key=lambda lane: -lane.id)
-    return [section.lanes[0], *left, *right]

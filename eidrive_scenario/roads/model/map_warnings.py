@@ -56,14 +56,11 @@ def group_map_warnings(warnings: Iterable[MapWarning], source: str) -> tuple[Dia
     kinds: dict[tuple[MapRule, str], list[MapWarning]] = {}
     for warning in warnings:
         kinds.setdefault((warning.rule, warning.kind), []).append(warning)
-    return tuple(_group_diagnostic(group, source) for group in kinds.values())
-
-
-def _group_diagnostic(group: list[MapWarning], source: str) -> Diagnostic:
-    first = group[0]
-    message = first.message
-    if len(group) > 1:
-        lines = [str(warning.line) for warning in group[1 : 1 + SHOWN]]
-        more = ", …" if len(group) > 1 + SHOWN else ""
-        message += f"; {len(group) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
-    return Diagnostic(message, first.hint, source, first.line, first.rule.id)
+    diagnostics = []
+    for first, *others in kinds.values():
+        message = first.message
+        if others:
+            lines = ", ".join([*(str(warning.line) for warning in others[:SHOWN]), *["…"] * (len(others) > SHOWN)])
+            message += f"; {len(others)} more of {first.kind}: line {lines}"
+        diagnostics.append(Diagnostic(message, first.hint, source, first.line, first.rule.id))
+    return tuple(diagnostics)

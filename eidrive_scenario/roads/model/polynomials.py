@@ -27,10 +27,13 @@ class Polynomials:
             ordered[0] = (0.0, *ordered[0][1:])
         if not ordered or ordered[0][0] > 0.0:
             ordered.insert(0, (0.0, 0.0, 0.0, 0.0, 0.0))
-        ordered = _without_repetitions(ordered)
-        self.pieces: list[Piece] = ordered
-        self.starts = [piece[0] for piece in ordered]
-        is_constant = len(ordered) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
+        self.pieces: list[Piece] = ordered[:1]
+        for piece in ordered[1:]:
+            before = self.pieces[-1]
+            if not piece[1:] == (before[1], 0.0, 0.0, 0.0) == before[1:]:  # unless it continues a constant value
+                self.pieces.append(piece)
+        self.starts = [piece[0] for piece in self.pieces]
+        is_constant = len(self.pieces) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
         self.constant_value: float | None = ordered[0][1] if is_constant else None
         """Value of a function with a single, constant piece; None for others."""
         self.is_zero = self.constant_value == 0.0
@@ -72,15 +75,6 @@ class Polynomials:
         """Return the function with s counted from `origin`. The part before it is dropped."""
         first = (0.0, *self.coefficients_at(origin))
         return Polynomials([first, *((p[0] - origin, *p[1:]) for p in self.pieces if p[0] > origin)])
-
-
-def _without_repetitions(pieces: Sequence[Piece]) -> list[Piece]:
-    """Return pieces without those that continue the constant value of the piece before."""
-    kept = [pieces[0]]
-    for piece in pieces[1:]:
-        if not piece[1:] == (kept[-1][1], 0.0, 0.0, 0.0) == kept[-1][1:]:
-            kept.append(piece)
-    return kept
 
 
 def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:

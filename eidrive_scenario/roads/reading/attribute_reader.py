@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Literal, overload
+from typing import cast, overload
 
 from lxml import etree
 
@@ -12,6 +12,7 @@ from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
 from eidrive_scenario.files.untrusted_xml import line_of
 from eidrive_scenario.roads.model.map_warnings import MapRule, MapWarning
 from eidrive_scenario.roads.model.polynomials import ROUNDING, Piece
+from eidrive_scenario.roads.model.road_map import Contact
 
 MAX_ERRORS = 100
 """Maximum number of errors of a file. Reading ends when it is reached."""
@@ -129,13 +130,11 @@ class AttributeReader:
         self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", "give a whole number")
         return 0
 
-    def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
+    def contact(self, element: etree._Element, name: str) -> Contact | None:
         """Return the contact point, an end of a road, or None if the attribute is missing."""
         text = element.get(name)
-        if text == "start":
-            return "start"
-        if text == "end":
-            return "end"
+        if text in ("start", "end"):
+            return cast(Contact, text)
         if text is not None:
             self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", suggestion(text, ("start", "end")))
         return None

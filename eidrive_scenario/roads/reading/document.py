@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Literal, cast
 
@@ -146,7 +147,7 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
         sections=sections,
         predecessor=_read_link(element.find("link/predecessor"), collector),
         successor=_read_link(element.find("link/successor"), collector),
-        types=tuple(sorted(_read_types(element, collector), key=lambda kind: kind.s)),
+        types=tuple(sorted((_read_type(kind, collector) for kind in element.iterfind("type")), key=attrgetter("s"))),
         line=line_of(element),
         section_starts=tuple(section.s for section in sections),
     )
@@ -168,13 +169,10 @@ def _profile(parent: etree._Element, path: str, collector: AttributeReader) -> P
     return Polynomials(collector.pieces(parent.iterfind(path), "s"))
 
 
-def _read_types(road: etree._Element, collector: AttributeReader) -> list[RoadType]:
-    types = []
-    for element in road.iterfind("type"):
-        speed = element.find("speed")
-        limit = None if speed is None else read_speed(speed, collector)
-        types.append(RoadType(collector.number(element, "s"), element.get("type", "unknown"), limit))
-    return types
+def _read_type(element: etree._Element, collector: AttributeReader) -> RoadType:
+    speed = element.find("speed")
+    limit = None if speed is None else read_speed(speed, collector)
+    return RoadType(collector.number(element, "s"), element.get("type", "unknown"), limit)
 
 
 def _read_link(element: etree._Element | None, collector: AttributeReader) -> RoadLink | None:

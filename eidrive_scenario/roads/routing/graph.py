@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, pairwise
@@ -15,7 +15,7 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.roads.geometry.poses import lane_at
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
-from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.routing.links import LaneLinks
 
 Cost = Callable[[LaneKey, LaneKey, Mapping[str, Any]], float]
@@ -95,8 +95,10 @@ def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
                 successors[key][other] = {"weight": data["length"], "kind": "successor"}
     for road in tables.roads:
         for section in road.sections:
-            for lane, neighbor in _neighbors(section):
-                if road.directions[lane] == road.directions[neighbor]:
+            middle, lanes = 0.5 * section.length, {number: lane for number, lane in section.lanes.items() if number}
+            wide = {n: lane.drivable and lane.width.value(middle) >= MIN_CHANGE_WIDTH for n, lane in lanes.items()}
+            for lane, neighbor in pairwise(lanes):  # also across lane 0
+                if wide[lane] and wide[neighbor] and road.directions[lane] == road.directions[neighbor]:
                     cost = LANE_CHANGE_COST + SHORT_SECTION_COST / max(section.length, 1.0)
                     left, right = LaneKey(road.id, section.index, lane), LaneKey(road.id, section.index, neighbor)
                     successors[left][right] = {"weight": cost, "kind": "change"}
@@ -123,18 +125,6 @@ def _measure(
     return {key: {"drivable": drivable, "length": meters, "end": (x, y)} for key, drivable, meters, x, y in measured}
 
 
-def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
-    """Yield pairs of adjacent drivable lanes, also across lane 0."""
-    lanes = [lane for number, lane in section.lanes.items() if number]
-    for lane, neighbor in pairwise(lanes):
-        if _usable(lane, section) and _usable(neighbor, section):
-            yield lane.id, neighbor.id
-
-
-def _usable(lane: Lane, section: LaneSection) -> bool:
-    return lane.drivable and lane.width.value(0.5 * section.length) >= MIN_CHANGE_WIDTH
-
-
 def find_lanes(
     ways: LaneWays, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation, cost: Cost | None = None
 ) -> tuple[LaneKey, ...]:
@@ -159,13 +149,9 @@ def find_lanes(
     if source in successors and target in successors:
         path = cheapest_path(successors, source, target, cost, bound if cost is None else None)
     if path is None:
-        raise RouteError(
-            Diagnostic(
-                f"no route over the lanes leads from road {start.road!r} lane {start.lane} s {start.s:.1f} "
-                f"to road {end.road!r} lane {end.lane} s {end.s:.1f}",
-                "check the direction of the lanes and the links between them",
-            )
-        )
+        ends = " to ".join(f"road {place.road!r} lane {place.lane} s {place.s:.1f}" for place in (start, end))
+        hint = "check the direction of the lanes and the links between them"
+        raise RouteError(Diagnostic(f"no route over the lanes leads from {ends}", hint))
     return tuple(LaneKey(*key[:3]) for key in path)
 
 
