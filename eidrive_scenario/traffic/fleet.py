@@ -36,7 +36,7 @@ class Plans:
         plan = [lane for lane in cars.plan[index].tolist() if lane >= 0]
         ahead = sum(lengths[lane] for lane in plan[1:])
         while ahead < LOOK_AHEAD and len(plan) <= PLANNED:
-            choices = self._lanes.following(plan[-1])
+            choices = self._lanes.following[plan[-1]]
             if not choices:
                 break
             pick = 0

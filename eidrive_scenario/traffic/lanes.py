@@ -26,6 +26,7 @@ class TrafficLanes:
 
     left, right                neighbor of the same direction to which the marking permits a change, -1 if there is none
     beside_left, beside_right  neighbor of the same direction with any marking
+    following                  successors with the same kind of users, in the order of the map
     onward, backward           first successor and first predecessor, -1 if there is none
     ends_at                    progress at which a lane ends while an adjacent lane continues, else inf
     """
@@ -47,7 +48,7 @@ class TrafficLanes:
         self.left_hand = np.array([roads.roads[key.road].rule == "LHT" for key in self.keys])
         self.onward = np.full(len(self.keys), -1)
         self.backward = np.full(len(self.keys), -1)
-        self._ways: list[list[int]] = []
+        self.following: list[list[int]] = []
         self._link()
         self.left, self.right, self.beside_left, self.beside_right = (np.full(len(self.keys), -1) for _ in range(4))
         self._join_neighbors()
@@ -71,7 +72,7 @@ class TrafficLanes:
                 if edge["kind"] == "successor"
                 and (drivable[lane], self.walkable[lane]) == (drivable[other := self.row_of[way]], self.walkable[other])
             ]
-            self._ways.append(successors)
+            self.following.append(successors)
             if successors:
                 self.onward[lane] = successors[0]
             for other in successors:
@@ -155,10 +156,6 @@ class TrafficLanes:
             before = chain[:, d - 1]
             chain[:, d] = np.where(before >= 0, self.onward[before], -1)
         return chain
-
-    def following(self, lane: int) -> list[int]:
-        """Return the successors of a lane with the same kind of users in the order of the map."""
-        return self._ways[lane]
 
     def stretch(self, lane: Integers, progress: Array) -> Array:
         """Return the path length per meter of progress at the center lines of lanes."""

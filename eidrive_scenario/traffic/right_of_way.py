@@ -57,13 +57,11 @@ class StopLines:
         road = lanes.roads.roads.get(place.road)
         if road is None:
             return []
-        section = road.section_at(place.s)
-        positions = []
-        for number in lanes.roads.signal_lanes(place):
-            lane = lanes.row_of[LaneKey(road.id, section.index, number)]
-            progress = float(lanes.progress(np.array([lane]), np.array([place.s]))[0])
-            positions.append((lane, 0.0 if road.junction_id is not None else progress))
-        return positions
+        section = road.section_at(place.s).index
+        signal_lanes = [lanes.row_of[LaneKey(road.id, section, number)] for number in lanes.roads.signal_lanes(place)]
+        if road.junction_id is not None:
+            return [(lane, 0.0) for lane in signal_lanes]
+        return [(lane, float(lanes.progress(np.array(lane), np.array(place.s)))) for lane in signal_lanes]
 
     def closed(self) -> Occupants:
         """Return the stop lines at which traffic has to stop now as occupants."""
@@ -270,6 +268,6 @@ class RightOfWay:
                 passage.append(lane)
             elif passage:
                 return passage
-        while (ways := lanes.following(passage[-1])) and lanes.road[ways[0]] == lanes.road[passage[-1]]:
+        while (ways := lanes.following[passage[-1]]) and lanes.road[ways[0]] == lanes.road[passage[-1]]:
             passage.append(ways[0])
         return passage

@@ -244,6 +244,7 @@ class Area(MaintainedTraffic):
     continuous: bool
     covers: Covers
     _inside: dict[bool, SpawnSites] = field(default_factory=dict, init=False)
+    """Sites inside the area for vehicles and for pedestrians."""
 
     def step(self, population: Population) -> None:
         """Remove participants outside the area and spawn missing ones. Finish if the area is not continuous."""
@@ -259,15 +260,11 @@ class Area(MaintainedTraffic):
     def _spawn_one(self, population: Population) -> bool:
         rng = self.rng(population)
         participant = self.mixture.draw(rng)
-        sites = self._sites(population, participant)
-        speed = population.starting_speed(sites, participant)
-        return len(sites) > 0 and population.spawn(self, participant, sites, speed, rng, None)
-
-    def _sites(self, population: Population, participant: Participant) -> SpawnSites:
-        """Return the sites inside the area, which are constant for vehicles and for pedestrians."""
         if participant.walks not in self._inside:
             self._inside[participant.walks] = population.ground.covered(participant, self.covers)
-        return self._inside[participant.walks]
+        sites = self._inside[participant.walks]
+        speed = population.starting_speed(sites, participant)
+        return len(sites) > 0 and population.spawn(self, participant, sites, speed, rng, None)
 
 
 @dataclass

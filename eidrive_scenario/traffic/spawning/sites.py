@@ -289,6 +289,5 @@ def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list
                 other = RoadEnd(end.road, -end.side)
                 seen |= {end, other}
                 queue.append([*chain, end, other])
-    raise PositionError(
-        Diagnostic(f"no chain of roads leads from road {start!r} to road {goal!r}", "correct the road cursors")
-    )
+    message = f"no chain of roads leads from road {start!r} to road {goal!r}"
+    raise PositionError(Diagnostic(message, "correct the road cursors"))

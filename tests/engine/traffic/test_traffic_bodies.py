@@ -45,7 +45,7 @@ def drawn(mixture: TrafficMix, count: int = 400) -> Counter[str]:
 
 def test_mix_without_definition_contains_library_cars() -> None:
     found = drawn(TrafficMix(SimpleNamespace(), None, None))  # type: ignore[arg-type]
-    assert set(found) == {spec.name for spec, role in library_bodies(VehicleCategory.CAR) if role is Role.NONE}
+    assert set(found) == {spec.name for spec, role in library_bodies("car") if role is Role.NONE}
     assert len(found) >= 3
 
 
