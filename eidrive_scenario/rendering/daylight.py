@@ -77,7 +77,7 @@ def daylight(weather: Weather) -> Daylight:
         total /= 1.0 + weather.precipitation_intensity / THICKENING
     direct = beam * (1.0 - cover)
     clear = min(clear_sky * (1.0 - cover), total)
-    clouds = max(total - direct * height - clear, 0.0) if height > 0.0 else max(total - clear, 0.0)
+    clouds = max(total - direct * height - clear, 0.0)
     if height > 0.0:
         thick = max(weather.extinction - CLEAR_AIR, 0.0)
         left = math.exp(-thick * FOG_HEIGHT / max(height, 0.05))

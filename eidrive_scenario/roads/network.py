@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -456,13 +456,10 @@ MAX_FACTOR = 10.0
 
 def fastest(network: RoadNetwork) -> Cost:
     """Return the travel time at the speed limits [s] as cost."""
-    speeds: dict[LaneKey, float] = {}
+    usual_speed = cache(network.usual_speed)
 
     def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
-        key = LaneKey(*lane[:3])
-        if key not in speeds:
-            speeds[key] = network.usual_speed(key)
-        return float(data["weight"]) / speeds[key]
+        return float(data["weight"]) / usual_speed(LaneKey(*lane[:3]))
 
     return cost
 
