@@ -44,7 +44,8 @@ def points_of(body: RoadObjectBody) -> np.ndarray:
 def test_clearance_is_the_distance_of_the_nearest_body_up_to_its_bound(most: float) -> None:
     rng = np.random.default_rng(3)
     sizes = [(60.0, 40.0), (40.0, 60.0), (25.0, 0.3), (0.3, 45.0), (9.0, 9.0), (18.0, 2.0)]
-    walls = [wall(*rng.uniform(-150.0, 150.0, 2), rng.uniform(0.0, 6.3), *size) for size in sizes]
+    places = rng.uniform((-150.0, -150.0, 0.0), (150.0, 150.0, 6.3), (len(sizes), 3)).tolist()
+    walls = [wall(x, y, yaw, length, width) for (x, y, yaw), (length, width) in zip(places, sizes, strict=True)]
     obstacles, points = Obstacles(walls), np.concatenate([points_of(each) for each in walls])
     for x, y in rng.uniform(-200.0, 200.0, (400, 2)).tolist():
         expected = min(float(np.hypot(points[:, 0] - x, points[:, 1] - y).min()), most)
