@@ -449,7 +449,7 @@ def _obstacle(
     if fastest > 0.5:
         if wanted - fastest < SLOWER or not all(_is_steady(situation, hypothesis) for hypothesis in objects):
             return None
-        gain = settings.passing_acceleration * MEAN_SHARE
+        gain = settings.acceleration * MEAN_SHARE
         rear = situation.s - body.rear - BEFORE_OBSTACLE
         ends = [
             end + own * _catch_up_time(end - rear, situation.speed - own, wanted - own, gain)

@@ -106,12 +106,6 @@ class LateralProfile(msgspec.Struct, frozen=True):
         """Whether the vehicle enters a lane of the opposite direction."""
         return self.side * max(self.values, key=abs) > self.border
 
-    @property
-    def is_brief(self) -> bool:
-        """Whether the maneuver should not take long: it overtakes slower traffic, or uses a lane of the opposite
-        direction."""
-        return self.overtakes > 0.0 or self.uses_oncoming
-
 
 def blend(share: Array) -> Array:
     """Return the quintic blend from 0 to 1, with derivatives of 0 at both ends."""

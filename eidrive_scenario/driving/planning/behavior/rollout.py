@@ -99,6 +99,9 @@ ROLLED = 6
 """Number of first steps whose causes are kept."""
 NEGLIGIBLE = 1e-6
 """Deceleration due to a leader below which there is none [m/s²], and difference of accelerations that is none."""
+BRISK = 2.4
+"""Acceleration past standing objects in a lane of the opposite direction, where the vehicle should not stay long, if it
+does not accelerate more anyway [m/s²]; nuPlan's limit of comfort. After overtaking it has to slow down again."""
 LEAST_GAP, LEAST_SPEED = 1e-3, 1e-3
 """Minimum of gaps [m] and of desired speeds [m/s], by which the model divides."""
 
@@ -141,7 +144,7 @@ class Roller:
             deceleration=settings.comfortable_deceleration,
             emergency=settings.hard_deceleration,
         )
-        self._passing_driver = replace(self._driver, acceleration=settings.passing_acceleration)
+        self._brisk_driver = replace(self._driver, acceleration=max(settings.acceleration, BRISK))
 
     def roll(
         self,
@@ -167,7 +170,8 @@ class Roller:
             number, ahead = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
             time_gap = self._driver.time_gap if option.time_gap is None else option.time_gap
-            driver = self._passing_driver if option.profile.is_brief else self._driver
+            profile = option.profile
+            driver = self._brisk_driver if profile.uses_oncoming and not profile.overtakes else self._driver
             key = (
                 driver.acceleration,
                 proposal.share,

@@ -11,10 +11,6 @@ from eidrive_scenario.driving.planner_settings import PlannerSettings
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Deceleration = Annotated[float, Field(gt=0.0, le=12.0)]
 
-PASSING_ACCELERATION = 2.4
-"""Acceleration with which slower traffic is overtaken, and a lane of the opposite direction is left again [m/s²];
-nuPlan's limit of comfort."""
-
 
 class BehaviorSettings(PlannerSettings):
     """Settings of the planner `behavior`.
@@ -59,8 +55,3 @@ class BehaviorSettings(PlannerSettings):
     possible_existence: Share = 0.3
     caution: bool = False
     memory: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
-
-    @property
-    def passing_acceleration(self) -> float:
-        """Acceleration of maneuvers that should not take long [m/s²]."""
-        return max(self.acceleration, PASSING_ACCELERATION)
