@@ -146,7 +146,7 @@ class Decider:
     def __init__(self, settings: BehaviorSettings, spec: ActorSpec, times: Array, view: float) -> None:
         self._settings = settings
         self._times = times
-        self._roller = Roller(settings, times)
+        self._roller = Roller(settings, times, spec.max_acceleration)
         self._center = spec.offset[0]
         self._half_length, self._half_width = spec.size[0] / 2.0, spec.size[1] / 2.0
         self._front = self._center + self._half_length

@@ -102,8 +102,8 @@ NEGLIGIBLE = 1e-6
 BRISK = 2.4
 """Acceleration past standing objects in a lane of the opposite direction, where the vehicle should not stay long, if it
 does not accelerate more anyway [m/s²]; nuPlan's limit of comfort. After overtaking it has to slow down again."""
-LEAST_GAP, LEAST_SPEED = 1e-3, 1e-3
-"""Minimum of gaps [m] and of desired speeds [m/s], by which the model divides."""
+LEAST_GAP, LEAST_SPEED, LEAST_ACCELERATION = 1e-3, 1e-3, 1e-3
+"""Minimum of gaps [m], desired speeds [m/s] and accelerations of vehicles [m/s²], by which the model divides."""
 
 Leader = tuple[float, int, float, float]
 """Leader at a time: place of the reference point of the vehicle in contact with its rear [m], index of the hypothesis,
@@ -131,20 +131,23 @@ class Roller:
 
     Below the wanted speed its gap in equilibrium is that of the settings, and it does not brake for larger ones.
     It computes with single numbers: for few proposals with few leaders each, arrays take four times as long.
+
+    max_acceleration  of the vehicle [m/s²]
     """
 
-    def __init__(self, settings: BehaviorSettings, times: Array) -> None:
+    def __init__(self, settings: BehaviorSettings, times: Array, max_acceleration: float) -> None:
         self._times: list[float] = times.tolist()
         self._steps: list[float] = np.diff(times).tolist()
         self._braking = settings.comfortable_deceleration
+        able = max(max_acceleration, LEAST_ACCELERATION)
         self._driver = IntelligentDriver(
             time_gap=settings.time_gap,
             standstill_gap=settings.standstill_gap,
-            acceleration=settings.acceleration,
+            acceleration=min(settings.acceleration, able),
             deceleration=settings.comfortable_deceleration,
             emergency=settings.hard_deceleration,
         )
-        self._brisk_driver = replace(self._driver, acceleration=max(settings.acceleration, BRISK))
+        self._brisk_driver = replace(self._driver, acceleration=min(max(settings.acceleration, BRISK), able))
 
     def roll(
         self,
