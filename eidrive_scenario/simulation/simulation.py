@@ -276,8 +276,10 @@ class Simulation:
 
     def attribute(self, error: BaseException) -> None:
         """Raise ExtensionError from an error that an extension of this run raised; return otherwise."""
+        # It may be raised before the constructor has set any attribute.
         world: World | None = getattr(self, "world", None)
-        report_extension(error, time=None if world is None else world.time, observers=tuple(self._observers))
+        observers: Collection[Observer] = getattr(self, "_observers", ())
+        report_extension(error, time=None if world is None else world.time, observers=tuple(observers))
 
     def describe_hang(self, limit: float, frame: FrameType | None) -> WallLimitError:
         """Return the error of this run, which hangs in `frame`; close the observers to complete their files."""

@@ -68,6 +68,11 @@ def test_argument_of_another_type_raises(argument: dict[str, Any], message: str)
         assert str(caught.value) == message
 
 
+def test_unknown_argument_of_a_simulation_is_named() -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'parameters'"):
+        Simulation(ONE, parameters={})  # type: ignore[call-arg]
+
+
 def test_parameters_of_another_type_raise() -> None:
     with pytest.raises(SettingError, match="parameters is 3; give a mapping of names to values"):
         load_scenario(ONE, cast("Any", 3))
