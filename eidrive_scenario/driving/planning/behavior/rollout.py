@@ -101,7 +101,8 @@ NEGLIGIBLE = 1e-6
 """Deceleration due to a leader below which there is none [m/s²], and difference of accelerations that is none."""
 BRISK = 2.4
 """Acceleration past standing objects in a lane of the opposite direction, where the vehicle should not stay long, if it
-does not accelerate more anyway [m/s²]; nuPlan's limit of comfort. After overtaking it has to slow down again."""
+does not accelerate more anyway [m/s²]; nuPlan's limit of comfort. Not before curves and lower limits, and not to
+overtake: it would have to slow down again."""
 LEAST_GAP, LEAST_SPEED, LEAST_ACCELERATION = 1e-3, 1e-3, 1e-3
 """Minimum of gaps [m], desired speeds [m/s] and accelerations of vehicles [m/s²], by which the model divides."""
 
@@ -173,8 +174,8 @@ class Roller:
             number, ahead = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
             time_gap = self._driver.time_gap if option.time_gap is None else option.time_gap
-            profile = option.profile
-            driver = self._brisk_driver if profile.uses_oncoming and not profile.overtakes else self._driver
+            passes = limits is None and not option.profile.overtakes and option.profile.uses_oncoming
+            driver = self._brisk_driver if passes else self._driver
             key = (
                 driver.acceleration,
                 proposal.share,
