@@ -49,6 +49,12 @@ def test_ego_without_messages_knows_the_child_late_and_collides() -> None:
 
 
 @pytest.mark.exhaustive
+def test_emergency_braking_ends_at_standstill() -> None:
+    """The cyclist appears late: the ego stops beside its way, instead of creeping into it with the last 0.4 m/s."""
+    assert "collision" not in failed(play("cyclist_right_turn", "none", seed=4))
+
+
+@pytest.mark.exhaustive
 def test_ghost_stops_the_ego() -> None:
     assert failed(play("ghost", "rsu")) == {"min_speed"}
 

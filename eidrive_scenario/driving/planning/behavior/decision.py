@@ -109,6 +109,9 @@ PERSISTENT = 0.5
 """Time for which another maneuver has to be the best one before it starts [s]."""
 RELEASE = 0.75
 """Share of the hard deceleration below which a proposal ends emergency braking."""
+ALMOST_AT_REST = 1.5
+"""Speed below which emergency braking goes on until the vehicle stands [m/s]: walking pace, from which it stops within
+a few decimeters, whereas it would creep on into the way of what it brakes for."""
 VIEWED = 10.0
 """Distance ahead at which the oncoming lane is determined [m]."""
 CRUISE = Proposal(0, 1.0, "all", 4.0)
@@ -253,12 +256,13 @@ class Decider:
         return msgspec.structs.replace(decision, reason=f"walking pace: {decision.reason}", is_free=False)
 
     def _with_brake(self, options: Options, best: int) -> int:
-        """Return the best proposal, or emergency braking if it was active and the best one still brakes hard."""
+        """Return the best proposal, or emergency braking if it was active and the best one still brakes hard, or if the
+        vehicle almost stands: it decides again when it does."""
         emergencies = {options.options[index].proposal.deceleration: index for index in options.emergencies}
         if self._braking in emergencies and not options.options[best].proposal.is_emergency:
-            steps = np.diff(options.rolled.speed[best]) / np.diff(self._times)
-            hardest = float(steps[: round(URGENT / self._times[1])].min())
-            if hardest < -RELEASE * self._settings.hard_deceleration:
+            speed = options.rolled.speed[best]
+            hardest = float((np.diff(speed) / np.diff(self._times))[: round(URGENT / self._times[1])].min())
+            if hardest < -RELEASE * self._settings.hard_deceleration or AT_REST < float(speed[0]) < ALMOST_AT_REST:
                 best = emergencies[self._braking]
         proposal = options.options[best].proposal
         self._braking = proposal.deceleration if proposal.is_emergency else 0.0
