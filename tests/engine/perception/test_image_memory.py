@@ -60,10 +60,10 @@ def processed_images(used: ImageNetwork, monkeypatch: pytest.MonkeyPatch) -> lis
 def test_equal_images_are_processed_once(memory: ImageMemory, monkeypatch: pytest.MonkeyPatch) -> None:
     first, second = network(), network()
     processed = processed_images(first, monkeypatch)
-    found = first.find_in(image(10))
-    assert second.find_in(image(10)) is found
+    stored = first.find_in(image(10))
+    assert second.find_in(image(10)) is stored
     assert len(processed) == 1
-    assert not found.boxes.flags.writeable
+    assert not stored.boxes.flags.writeable
     first.find_in(image(11))
     first.find_in(image(10, width=40))
     assert len(processed) == 3, "another content and another size"
@@ -156,8 +156,8 @@ def test_station_results_are_shared_for_equal_readings_only(
 
     monkeypatch.setattr(LearnedDetector, "_detect_objects", process)
     first, second = YoloDetector(), YoloDetector()
-    found = first.detect(readings_of())
-    assert second.detect(readings_of()) is found
+    stored = first.detect(readings_of())
+    assert second.detect(readings_of()) is stored
     assert len(processed) == 1
     for number, readings in enumerate(OTHER_READINGS):
         second.detect(readings)
