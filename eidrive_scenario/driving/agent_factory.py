@@ -125,7 +125,7 @@ def build_agent(
     detector.setup(installation)
     fusion = build_fusion(settings, detector)
     used = [sensor for sensor in sensors.values() if sensor.kind in detector.needs]
-    view = view_sectors(used, spec)
+    view = view_sectors(used, spec, detector.range_of)
     listens = planner != NO_PLANNER or settings.restricts_senders
     driver: Planner | None = None
     if planner != NO_PLANNER:

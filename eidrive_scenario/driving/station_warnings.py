@@ -119,13 +119,13 @@ def short_views(settings: Mapping[str, AgentSettings], detectors: Mapping[str, D
         if detector is None or deceleration is None or speed is None:
             continue
         sensors = station.rig_sensors(detector.needs, detector.default_sensors).values()
-        ranges = [getattr(sensor, "range", math.inf) for sensor in sensors if sensor.kind in detector.needs]
+        ranges = [detector.range_of(sensor) for sensor in sensors if sensor.kind in detector.needs]
         view, needed = max(ranges, default=math.inf), speed * REACTION + speed**2 / (2.0 * deceleration)
         if needed > view:
             yield Diagnostic(
-                f"the sensors of {name!r} detect objects up to {view:g} m: from its target speed of {speed:g} m/s it "
+                f"the sensors of {name!r} show a car up to {view:.3g} m: from its target speed of {speed:g} m/s it "
                 f"stops within {needed:.0f} m",
-                "set the property 'range' of its sensors, or a lower target speed",
+                "set a longer 'range', more rays or more pixels of its sensors, or a lower target speed",
             )
 
 

@@ -17,6 +17,7 @@ from eidrive_scenario.base.geometry import iou_bev
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
+from eidrive_scenario.sensing.sensor import nominal_range
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -134,6 +135,13 @@ class Detector(ABC):
         A tracker does not count objects out of view as missed. By default, all objects are in view.
         """
         return np.ones(len(boxes))
+
+    def range_of(self, sensor: SensorSettings) -> float:
+        """Return the distance up to which a car that comes towards this sensor is detected in clear air [m].
+
+        By default the setting `range` of the sensor; inf if it has none.
+        """
+        return nominal_range(sensor)
 
     def signals(self) -> Sequence[SignalReading]:
         """Return the signals of the map found in the last readings, of the kinds in `detectable_signals`."""

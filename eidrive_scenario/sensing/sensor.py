@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol, Self
 
 import msgspec
@@ -88,16 +88,23 @@ def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
     return Mounting(center_x + x, center_y + y, z, yaw)
 
 
-def view_sectors(sensors: Iterable[SensorSettings], spec: ActorSpec) -> tuple[ViewSector, ...]:
-    """Return the sectors of sensors on a body. A sensor without a setting for its opening angle covers all directions,
-    one without `range` is not limited."""
+def nominal_range(settings: SensorSettings) -> float:
+    """Return the setting `range` of a sensor [m]; inf if it has none."""
+    return getattr(settings, "range", math.inf)
+
+
+def view_sectors(
+    sensors: Iterable[SensorSettings], spec: ActorSpec, range_of: Callable[[SensorSettings], float] = nominal_range
+) -> tuple[ViewSector, ...]:
+    """Return the sectors of sensors on a body. A sensor without a setting for its opening angle covers all directions.
+
+    range_of  returns the range of a sensor [m]
+    """
     sectors = []
     for settings in sensors:
         mount = mounting(settings, spec, "front" if isinstance(settings, CameraSettings) else "roof")
         angle = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0)))
-        sectors.append(
-            ViewSector(mount.x, mount.y, mount.z, mount.yaw, angle / 2.0, getattr(settings, "range", math.inf))
-        )
+        sectors.append(ViewSector(mount.x, mount.y, mount.z, mount.yaw, angle / 2.0, range_of(settings)))
     return tuple(sectors)
 
 

@@ -39,7 +39,7 @@ def make(tmp_path: Path) -> Make:
 
 
 def ours(warnings: tuple[str, ...]) -> list[str]:
-    words = ("never started", "covered only", "step of", "never holds a vehicle", "detect objects up to")
+    words = ("never started", "covered only", "step of", "never holds a vehicle", "show a car up to")
     return [warning for warning in warnings if any(word in warning for word in words)]
 
 
@@ -164,7 +164,7 @@ def test_target_speed_beyond_the_view_is_reported(make: Make, speed: float, warn
     path = make(('name="module" value="eidrive"/>', f'name="module" value="eidrive"/>{speed_property}'))
     warnings = ours(run_file(path, settings=RunSettings(planner="behavior", time_limit=0.3)).warnings)
     assert [warning.partition(": from")[0] for warning in warnings] == (
-        ["the sensors of 'Ego' detect objects up to 50 m"] if warns else []
+        ["the sensors of 'Ego' show a car up to 50 m"] if warns else []
     )
 
 

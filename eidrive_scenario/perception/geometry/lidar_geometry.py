@@ -17,6 +17,9 @@ LEAST_STEP = math.radians(0.02)
 USUAL_STEP = math.radians(1.0)
 """Angle between rays if there are too few points to estimate it [rad]."""
 
+CAR_FRONT = 1.8 * 0.8
+"""Area of the front of a car between its sill and its windows, which return nothing: width and height [m²]."""
+
 
 @dataclass(frozen=True)
 class LevelFrame:
@@ -88,6 +91,10 @@ class Pattern(NamedTuple):
     elevation: float
     highest: float
     half_field: float = math.pi
+
+    def range_of_car(self, points: int) -> float:
+        """Return the distance at which this number of rays meets the front of a car on average [m]."""
+        return math.sqrt(CAR_FRONT / (self.azimuth * self.elevation * points))
 
 
 def pattern_from_settings(settings: LidarSettings) -> Pattern:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import weakref
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -30,6 +31,11 @@ from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
+
+CAR_HEIGHT = 1.5
+"""Height of a car [m]."""
+LEAST_HEIGHT = 8
+"""Minimum height of the objects with which the networks are trained [px]."""
 
 
 class ImageDetector(Detector):
@@ -133,6 +139,13 @@ class ImageDetector(Detector):
             self._patterns,
         )
         return type(self), network.identity, self._roads, digest
+
+    def range_of(self, sensor: SensorSettings) -> float:
+        """Return the distance at which the image of a car has the minimum height of objects in training [m]."""
+        if not isinstance(sensor, CameraSettings):
+            return super().range_of(sensor)
+        focal_length = sensor.width / (2.0 * math.tan(math.radians(sensor.fov) / 2.0))
+        return focal_length * CAR_HEIGHT / LEAST_HEIGHT
 
     def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the cameras can show."""

@@ -12,12 +12,13 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.detector import Detector, DetectorContext, without_duplicates
-from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
+from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.lidar.objects import UNLIKELY, FittedObject, objects
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.perception.lidar.station import StationLidars
 from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 
 HALF_SURE = 5.0
 """Number of points at which the score is half of its maximum."""
@@ -83,6 +84,13 @@ class LidarDetector(Detector):
             ),
         )
         return detections if len(readings.lidars) < 2 else without_duplicates(detections)
+
+    def range_of(self, sensor: SensorSettings) -> float:
+        """Return the distance at which the front of a car has `min_points` points on average [m]."""
+        nominal = super().range_of(sensor)
+        if not isinstance(sensor, LidarSettings):
+            return nominal
+        return min(nominal, pattern_from_settings(sensor).range_of_car(self.settings.min_points))
 
     def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show."""

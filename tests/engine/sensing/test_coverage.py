@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.driving.agent_factory import build_detector
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.sensing.sensor import view_sectors
-from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, SensorSettings, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 
 CAR = ActorSpec("Ego", "vehicle", "car", size=(4.9, 1.8, 1.5), offset=(1.4, 0.0, 0.75), wheelbase=2.9)
@@ -58,3 +60,22 @@ def test_sectors_are_those_of_the_settings() -> None:
     assert (camera.half_angle, camera.range) == (math.radians(40.0), math.inf)
     assert (lidar.half_angle, lidar.range) == (math.pi, 60.0)
     assert truth == ViewSector(1.0, -0.5, 1.0, math.pi / 2, math.radians(60.0), 50.0)
+
+
+@pytest.mark.parametrize(
+    ("detector", "sensor", "expected"),
+    [
+        ("oracle", TruthSettings(range=70.0), 70.0),
+        # Columns at 1 and rings at 2 degrees: at 20 m 1.8 m x 0.8 m have 5.16 x 1.15 points, and 3 at 28.1 m.
+        ("lidar", LidarSettings(channels=11, lower_fov=-10.0, points_per_second=79200), 28.1),
+        ("lidar", LidarSettings(channels=11, lower_fov=-10.0, points_per_second=79200, range=25.0), 25.0),
+        ("pillars", LidarSettings(points_per_second=10_000_000, range=200.0), 51.2),
+        # A focal length of 400 px: 1.5 m are 8 px high at 75 m.
+        ("yolov5", CameraSettings(width=800, height=600, fov=90.0), 75.0),
+        ("ssd", CameraSettings(width=400, height=300, fov=90.0), 37.5),
+    ],
+)
+def test_range_of_a_detector_follows_from_the_resolution(
+    detector: str, sensor: SensorSettings, expected: float
+) -> None:
+    assert build_detector(AgentSettings(detector=detector)).range_of(sensor) == pytest.approx(expected, abs=0.05)

@@ -230,7 +230,7 @@ class HiddenTraffic:
         for region in regions:
             shown = np.zeros(len(way.points), dtype=bool)
             for sector in region.sectors:
-                eye = sector if sector.range < self._range else msgspec.structs.replace(sector, range=self._range)
+                eye = sector if math.isfinite(sector.range) else msgspec.structs.replace(sector, range=self._range)
                 inside = eye.contains(way.points[:, 0], way.points[:, 1])
                 for group in occluders:
                     inside &= ~group.block(eye, way.points, ground)

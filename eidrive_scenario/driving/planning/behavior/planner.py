@@ -48,7 +48,7 @@ STEEPEST = 0.5
 SAME_LINE = 0.3
 """Maximum difference of the offsets from two lines at which one is the extension of the other [m]."""
 VIEW = 80.0
-"""Assumed range of sensors without a limit, such as cameras [m]."""
+"""Assumed range of sensors without a limit [m]."""
 MARGIN_AHEAD = 40.0
 """Length of the line that is considered beyond the horizon and behind the vehicle [m]."""
 
@@ -96,10 +96,10 @@ class BehaviorPlanner(RoutePlanner):
 
     @cached_property
     def _range(self) -> float:
-        """Distance up to which the sensors detect objects ahead [m]; it is known after the constructor."""
+        """Distance up to which the sensors show a car ahead [m]; it is known after the constructor."""
         ahead = [sector for sector in self.view or () if abs(sector.yaw) <= sector.half_angle]
         farthest = max((sector.x + sector.range for sector in ahead), default=math.inf)
-        return farthest if math.isfinite(farthest) else self.settings.range or VIEW
+        return farthest if math.isfinite(farthest) else VIEW
 
     @cached_property
     def _decider(self) -> Decider:

@@ -15,7 +15,7 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.detector import Detector, DetectorContext, without_duplicates
-from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
+from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.learned.network_loading import SHIPPED
 from eidrive_scenario.perception.learned.pillars.codec import FeatureCodec
@@ -144,6 +144,13 @@ class PillarDetector(Detector):
             grid.age,
         )
         return self._objects(network, maps, self.feature_map, readings.time)
+
+    def range_of(self, sensor: SensorSettings) -> float:
+        """Return the distance at which the front of a car has one point on average, within the grid [m]."""
+        nominal = super().range_of(sensor)
+        if not isinstance(sensor, LidarSettings):
+            return nominal
+        return min(nominal, pattern_from_settings(sensor).range_of_car(1), CELLS * CELL / 2.0)
 
     def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show; 0 outside of the grid."""
