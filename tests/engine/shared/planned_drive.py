@@ -10,6 +10,7 @@ from opendrive_xml import map_xml, road_xml
 from signal_street import CAR
 
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import footprint_distance
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.behavior.planner import BehaviorPlanner
@@ -121,6 +122,15 @@ class PlannedDrive:
     def speeds(self) -> list[float]:
         """Speeds at all ticks [m/s]."""
         return [speed for _, _, speed in self.path]
+
+    def least_distance(self, standing: KnownBox) -> float:
+        """Return the least distance between the bodies of the car and of a standing object in plan view [m]."""
+        x, y, _ = np.array(self.path).T
+        yaw = np.arctan2(np.gradient(y), np.gradient(x))
+        center = CAR.offset[0]
+        poses = zip(x + center * np.cos(yaw), y + center * np.sin(yaw), yaw, strict=True)
+        body = (standing.x, standing.y, 0.0, *standing.size, 1.0, standing.yaw)
+        return min(footprint_distance((*pose[:2], 0.0, *CAR.size, pose[2]), body) for pose in poses)
 
     @property
     def hardest_braking(self) -> float:

@@ -41,7 +41,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
+from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Course, Roller
 from eidrive_scenario.driving.planning.behavior.scoring import URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
@@ -431,7 +431,8 @@ class Decider:
         viewpoint = (s, profile.offset_at(s))
         if verdict is Verdict.WAIT:
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
-            better = with_view(profile, start, self._settings, sufficient)
+            onward_speed = situation.speed_at(profile.places[-3], max(self._settings.acceleration, BRISK))
+            better = with_view(profile, start, self._settings, sufficient, onward_speed)
             if better is not None:
                 profile, waits_at = better, self._oncoming.waiting_place(better, situation.s)
             elif math.isinf(profile.waits_at):

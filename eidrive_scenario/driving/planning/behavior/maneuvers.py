@@ -17,6 +17,7 @@ from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObje
 from eidrive_scenario.driving.planning.behavior.merging import has_gap_now
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    HASTY,
     ONCOMING_SPEED,
     SIMILAR_SPEED,
     Body,
@@ -115,6 +116,12 @@ class Situation(msgspec.Struct, frozen=True):
             speed = min(speed + acceleration * step, wanted, limit)
             s = min(s + speed * step, end)
         return s - self.s
+
+    def speed_at(self, place: float, acceleration: float) -> float:
+        """Return the speed that the vehicle has at a distance along the line without objects [m/s]."""
+        gain = 2.0 * MEAN_SHARE * acceleration * max(place - self.s, 0.0)
+        limit = float(np.interp(place, self.line.along, self.limits))
+        return max(min(math.sqrt(self.speed**2 + gain), self.wanted, limit), self.speed)
 
     def lanes_at(self, s: float) -> int:
         """Return the index of the point of the line at a distance along it."""
@@ -256,7 +263,8 @@ def extended(
     outer, every = _sides(obstacle, side)
     if outer + _clearance(situation, settings, obstacle) > value - body.half_width or value + body.half_width > every:
         return profile
-    places = (*profile.places[:-2], obstacle.end, obstacle.end + profile.places[-1] - end)
+    back = _length_at(situation, settings, obstacle.end, value, is_hasty=value > profile.border)
+    places = (*profile.places[:-2], obstacle.end, obstacle.end + back)
     return msgspec.structs.replace(profile, places=places)
 
 
@@ -336,10 +344,21 @@ def _behind_neighbor(
         return None
     last = max(beside, key=attrgetter("front"))
     end = max(last.front + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
-    back = change_length(d, max(situation.speed, 2.0), settings.lateral_acceleration)
     name = f"pass {situation.kind_of(last.owner)} on the {'left' if side > 0 else 'right'}"
     border = _border(situation.line.lanes_beside(situation.lanes_at(end)), side, body)
+    back = _length_at(situation, settings, end, abs(d), is_hasty=abs(d) > border)
     return LateralProfile(name, (s, end, end + back), (d, d, 0.0), slope, side, border)
+
+
+def _length_at(
+    situation: Situation, settings: BehaviorSettings, place: float, change: float, *, is_hasty: bool = False
+) -> float:
+    """Return the length of a lateral motion by `change` [m] at the speed that the vehicle has at a place.
+
+    is_hasty  whether it leaves a lane of the opposite direction
+    """
+    speed = max(situation.speed_at(place, settings.acceleration), 2.0)
+    return change_length(change, speed, settings.lateral_acceleration * (HASTY if is_hasty else 1.0))
 
 
 def _border(lanes: LanesBeside, side: int, body: Body) -> float:
@@ -474,6 +493,7 @@ def _around(
     beside = (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
     beside = clearance + SPARE if room >= clearance + SPARE else beside
     value = max(outer + beside + body.half_width, 0.0)
+    border = min(_border(lanes, side, body) for lanes in obstacle.beside)
     stands = all(situation.objects[hypothesis.owner].still_since is not None for hypothesis in obstacle.objects)
     profile = passing(
         f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
@@ -482,11 +502,14 @@ def _around(
         Start(*situation.steered, max(situation.speed, 2.0)),
         settings.lateral_acceleration,
         side,
+        lengths=(
+            _length_at(situation, settings, obstacle.begin, side * value - situation.steered[1]),
+            _length_at(situation, settings, obstacle.end, value, is_hasty=value > border),
+        ),
         stands=stands,
     )
     if profile is None:
         return None
-    border = min(_border(lanes, side, body) for lanes in obstacle.beside)
     return msgspec.structs.replace(profile, border=border, overtakes=0.0 if stands else max(obstacle.fastest, 0.0))
 
 

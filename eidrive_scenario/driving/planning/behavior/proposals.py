@@ -17,6 +17,11 @@ ROUTE = "route"
 """Name of the maneuver without a lateral deviation."""
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 """Peak of the second derivative of the quintic blend from 0 to 1 in unit time: 5.774."""
+PEAK_LEAVING = 3.94
+"""Peak of the second derivative of the quintic that leaves 0 with derivative 1 and returns to it, in unit time."""
+HASTY = 2.0
+"""Share of the lateral acceleration with which the vehicle leaves a lane of the opposite direction, and ends a motion
+away from its aim: 4 m/s² by default, below nuPlan's limit of comfort, 4.89 m/s²."""
 SHORTEST = 11.0
 """Minimum length of a lateral motion by a lane [m]; a car steers about that tightly at walking speed."""
 USUAL_WIDTH = 3.5
@@ -25,9 +30,8 @@ TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
 """Share of the length of a lateral motion in which most of it must be possible."""
-ONWARD = (7.0, 2.0)
-"""Speeds for which the lateral motion from the edge of the lane is made [m/s]: the usual one in an oncoming lane, or
-walking pace if there is no space for that."""
+WALKING = 2.0
+"""Walking pace, for which the lateral motion from the edge of the lane is made without space for another [m/s]."""
 AT_OFFSET = 0.1
 """Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
 
@@ -148,8 +152,7 @@ def towards(name: str, value: float, start: Start, lateral_acceleration: float, 
     """Return the motion to a constant offset."""
     s, offset, slope, speed = start
     length = change_length(value - offset, speed, lateral_acceleration)
-    if abs(slope) * length > abs(value - offset) + 0.5:
-        length = max(length, 1.5 * speed)
+    length = max(length, PEAK_LEAVING * abs(slope) * speed**2 / (HASTY * lateral_acceleration))
     return LateralProfile(name, (s, s + length), (offset, value), slope, side)
 
 
@@ -171,16 +174,19 @@ def passing(
     lateral_acceleration: float,
     side: int,
     *,
+    lengths: tuple[float, float],
     stands: bool = False,
 ) -> LateralProfile | None:
     """Return the motion to an offset before `obstacle` (start and end along the line) and back to 0 behind it.
 
     The result is None if the obstacle is too near for it. A vehicle at the offset, or farther aside, may be beside an
     obstacle that `stands`: it needs no motion before it.
+
+    lengths  of the motions to the offset, if there is space for it, and back [m]
     """
     begin, end = obstacle
     s, offset, slope, speed = start
-    length = change_length(value - offset, speed, lateral_acceleration)
+    length, back = lengths
     if stands and side * (value - offset) <= AT_OFFSET:
         begin = max(begin, s + length)
     first = max(begin - length, s)
@@ -190,7 +196,6 @@ def passing(
     if first > s + 0.5 and abs(offset) < 0.3:
         places.append(first)
         values.append(offset)
-    back = change_length(value, speed, lateral_acceleration)
     places += [max(begin, places[-1] + 1.0)]
     places += [max(end, places[-1] + 0.5)]
     places += [places[-1] + back]
@@ -204,7 +209,7 @@ def at_edge(profile: LateralProfile, start: Start, settings: BehaviorSettings) -
 
 
 def with_view(
-    profile: LateralProfile, start: Start, settings: BehaviorSettings, viewpoint: float
+    profile: LateralProfile, start: Start, settings: BehaviorSettings, viewpoint: float, onward_speed: float
 ) -> LateralProfile | None:
     """Return a profile past an obstacle in two lateral motions, with a way at the edge of the lane between them, where
     the vehicle has a view into the oncoming lane.
@@ -212,13 +217,19 @@ def with_view(
     The result is None if there is not enough space, or if the profile has such a way already.
 
     viewpoint  distance along the line from which the view is sufficient [m]
+    onward_speed  speed beside the obstacle if the vehicle does not wait [m/s]
     """
     s, offset, slope, speed = start
     edge = profile.side * (profile.border - AT_OFFSET)
     begin, end, back = profile.places[-3:]
     value = profile.values[-2]
-    length = change_length(edge - offset, max(speed, ONWARD[-1]), settings.lateral_acceleration)
-    starts = [begin - change_length(value - edge, faster, settings.lateral_acceleration) for faster in ONWARD]
+    acceleration = settings.lateral_acceleration
+    length = change_length(edge - offset, max(speed, WALKING), acceleration)
+    lengths = (
+        change_length(value - edge, onward_speed, HASTY * acceleration),
+        change_length(value - edge, WALKING, acceleration),
+    )
+    starts = [begin - onward for onward in lengths]
     onward = next((start for start in starts if s + length <= start), None)
     if math.isfinite(profile.waits_at) or onward is None:
         return None

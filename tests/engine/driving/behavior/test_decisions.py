@@ -107,9 +107,8 @@ def test_doubled_covariance_increases_the_clearance_of_a_passed_car(roads: RoadN
     clearance = []
     for deviation in (0.2, 0.2 * math.sqrt(2.0)):
         run = drive(roads, lambda now, d=deviation: [parked._replace(deviation=d)], 14.0)  # type: ignore[misc]
-        beside = [y for x, y, _ in run.path if 96.0 < x + 1.4 < 104.0]
-        assert beside, "the car passes"
-        clearance.append(min(beside) - 0.5 * 1.837 - (parked.y + 0.9))
+        assert run.front > 110.0, "the car passes"
+        clearance.append(run.least_distance(parked))
     assert clearance[0] > DEFAULTS.lateral_margin
     growth = DEFAULTS.uncertainty * 0.2 * (math.sqrt(2.0) - 1.0)
     assert clearance[1] - clearance[0] == pytest.approx(growth, abs=0.05)

@@ -43,16 +43,16 @@ def test_slow_change_is_not_shorter_than_a_car_can_steer() -> None:
 
 
 def test_passing_has_its_offset_along_the_obstacle_and_returns() -> None:
-    profile = passing("pass", 2.0, (100.0, 120.0), Start(50.0, 0.0, 0.0, 10.0), 2.0, 1)
+    profile = passing("pass", 2.0, (100.0, 120.0), Start(50.0, 0.0, 0.0, 10.0), 2.0, 1, lengths=(20.0, 30.0))
     assert profile is not None
     np.testing.assert_allclose(profile.offset(np.linspace(100.0, 120.0, 21)), 2.0)
     assert profile.offset_at(50.0) == 0.0
-    assert profile.offset_at(160.0) == 0.0
+    assert profile.offset_at(150.0) == 0.0
     assert (np.diff(profile.places) > 0.0).all()
 
 
 @pytest.mark.parametrize(("start", "possible"), [(90.0, False), (50.0, True), (79.0, True)])
 def test_obstacle_that_is_too_near_is_not_passed(start: float, possible: bool) -> None:
     # 2 m to the side at 10 m/s and 1.5 · 2 m/s² take √(5.774 · 2 / 3) s, 19.6 m; 60 % of it have to be left
-    profile = passing("pass", 2.0, (100.0, 120.0), Start(start, 0.0, 0.0, 10.0), 2.0, 1)
+    profile = passing("pass", 2.0, (100.0, 120.0), Start(start, 0.0, 0.0, 10.0), 2.0, 1, lengths=(20.0, 20.0))
     assert (profile is not None) == possible

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 from opendrive_xml import map_xml, road_xml
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
@@ -85,17 +86,36 @@ def test_standing_motorbike_is_passed() -> None:
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("start", "speed"), [(2.0, 0.0), (2.0, 10.0), (2.05, 10.0), (3.0, 5.0)])
 def test_vehicle_at_the_offset_beside_a_standing_obstacle_continues(side: int, start: float, speed: float) -> None:
-    profile = passing("pass", side * 2.0, (80.0, 120.0), Start(100.0, side * start, 0.0, speed), 2.0, side, stands=True)
+    out = change_length(2.0 - start, speed, 2.0)
+    vehicle = Start(100.0, side * start, 0.0, speed)
+    profile = passing("pass", side * 2.0, (80.0, 120.0), vehicle, 2.0, side, lengths=(out, 20.0), stands=True)
     assert profile is not None
     assert side * profile.offset_at(100.0) == pytest.approx(start)
-    inside = min(100.0 + change_length(2.0 - start, speed, 2.0), 120.0)
+    inside = min(100.0 + out, 120.0)
     assert side * profile.offset_at(inside) == pytest.approx(2.0)
     assert side * profile.offset_at(120.0) == pytest.approx(2.0)
     assert profile.offset_at(profile.places[-1]) == 0.0
 
 
 def test_vehicle_not_aside_of_a_near_obstacle_does_not_pass_it() -> None:
-    assert passing("pass", 2.0, (80.0, 120.0), Start(100.0, 1.5, 0.0, 5.0), 2.0, 1, stands=True) is None
+    vehicle = Start(100.0, 1.5, 0.0, 5.0)
+    assert passing("pass", 2.0, (80.0, 120.0), vehicle, 2.0, 1, lengths=(11.0, 11.0), stands=True) is None
+
+
+@pytest.mark.parametrize(("place", "number", "speed"), [(45.0, 1, 0.0), (60.0, 3, 0.0), (200.0, 1, 3.0)])
+def test_lateral_motion_suits_the_speed_that_the_vehicle_has_then(place: float, number: int, speed: float) -> None:
+    """It accelerates before and beside the cars; 4.89 m/s² is nuPlan's limit of comfort for lateral acceleration."""
+    cars = [KnownBox(place + 8.0 * index) for index in range(number)]
+    roads = two_lane_road(600.0)
+    run = PlannedDrive(behavior(roads, 14.0), roads, speed=speed)
+    run.run(45.0, lambda now: cars)
+    run.world.close()
+    x, y, speeds = np.array(run.path).T
+    turn = np.diff(np.unwrap(np.arctan2(np.diff(y), np.diff(x))), append=0.0) / 0.05
+    lateral = np.convolve(turn * speeds[1:], np.ones(6) / 6.0, mode="valid")[speeds[4:-2] > 1.0]
+    assert np.abs(lateral).max() < 4.89
+    assert y.max() > LANE + 2.0
+    assert y[x > place + 8.0 * number].min() > LANE - 0.3
 
 
 def test_slow_bicycle_is_overtaken_on_an_empty_road() -> None:
