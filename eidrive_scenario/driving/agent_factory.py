@@ -10,7 +10,7 @@ from eidrive_scenario.driving.communication.report_store import SensorDataSharin
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.route_planner import Planner
-from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.settings import SELECTED, AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_own_settings
@@ -34,31 +34,37 @@ def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig
 
 def station_sensors(settings: AgentSettings) -> dict[str, SensorSettings]:
     """Return the sensors of a station by name. Raise SettingError as `build_rig`."""
-    kind: type[Detector] = _detector_class(settings.detector)
+    kind: type[Detector] = registry("detectors").load(settings.detector, Detector)
+    _check_needs(settings.detector, kind)
     return settings.rig_sensors(kind.needs, kind.default_sensors)
 
 
-def _detector_class(name: str) -> type[Detector]:
-    """Return the class of a detector. Raise RegistryError if its declarations are invalid."""
-    kind: type[Detector] = registry("detectors").load(name, Detector)
+def _check_needs(name: str, kind: type[Detector]) -> None:
+    """Raise RegistryError unless a detector declares needs that are kinds of sensors."""
     sensors = frozenset(registry("sensors"))
     if not isinstance(kind.needs, frozenset | set) or not kind.needs <= sensors:
         described = registry("detectors").describe(name)
         raise RegistryError(f"{described}: needs is {kind.needs!r} (expected a frozenset out of {sorted(sensors)})")
-    return kind
 
 
-def _construct(extension: type, *arguments: Any, own: Settings | None) -> Any:
-    """Return an instance of an extension, whose last argument are its own settings if it has any."""
-    return construct(extension, *arguments, *(() if own is None else (own,)))
+def selected_extension(
+    settings: AgentSettings, part: str, base: type, *, source: str = "", line: int | None = None
+) -> tuple[Any, tuple[Settings, ...]]:
+    """Return the class that a property such as `detector` selects, and its own settings, an empty tuple without any.
+
+    Raise SettingError with this location if they are invalid.
+    """
+    group, name, setting = SELECTED[part], getattr(settings, part), f"{part}_settings"
+    kind, given = registry(group).load(name, base), getattr(settings, setting)
+    own = parse_own_settings(group, name, kind, given, setting=setting, source=source, line=line)
+    return kind, () if own is None else (own,)
 
 
 def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
     """Build the detector of a station. Raise SettingError with this location if its settings are invalid."""
-    name, given = settings.detector, settings.detector_settings
-    kind = _detector_class(name)
-    own = parse_own_settings("detectors", name, kind, given, setting="detector_settings", source=source, line=line)
-    return _construct(kind, own=own)  # type: ignore[no-any-return]
+    kind, own = selected_extension(settings, "detector", Detector, source=source, line=line)
+    _check_needs(settings.detector, kind)
+    return construct(kind, *own)  # type: ignore[no-any-return]
 
 
 def build_fusion(
@@ -69,31 +75,17 @@ def build_fusion(
     Raise SettingError with this location if its settings are invalid, or if it shares sensor data that the detector
     does not have.
     """
-    name, given = settings.fusion, settings.fusion_settings
-    kind: type[FusionMethod] = registry("fusion").load(name, FusionMethod)
-    own = parse_own_settings("fusion", name, kind, given, setting="fusion_settings", source=source, line=line)
+    kind, own = selected_extension(settings, "fusion", FusionMethod, source=source, line=line)
     lacking = {
         "points": ("lidar" not in detector.needs, "does not read", "reads lidars, such as 'lidar'"),
         "features": (not detector.provides_features, "does not compute", "computes features, such as 'pillars'"),
     }
     is_lacking, lacks, suitable = lacking.get(kind.shares or "", (False, "", ""))
     if is_lacking:
-        message = f"fusion method {name!r} shares {kind.shares}, which detector {settings.detector!r} {lacks}"
+        method = f"fusion method {settings.fusion!r}"
+        message = f"{method} shares {kind.shares}, which detector {settings.detector!r} {lacks}"
         raise SettingError(Diagnostic(message, f"select a detector that {suitable}", source, line))
-    return _construct(kind, own=own)  # type: ignore[no-any-return]
-
-
-def vehicle_controller_settings(
-    settings: AgentSettings, *, source: str = "", line: int | None = None
-) -> Settings | None:
-    """Return the own settings of the vehicle controller; None if it has none.
-
-    Raise SettingError with this location if they are invalid.
-    """
-    name, given = settings.vehicle_controller, settings.vehicle_controller_settings
-    kind: type[VehicleController] = registry("vehicle_controllers").load(name, VehicleController)
-    setting = "vehicle_controller_settings"
-    return parse_own_settings("vehicle_controllers", name, kind, given, setting=setting, source=source, line=line)
+    return construct(kind, *own)  # type: ignore[no-any-return]
 
 
 def build_agent(
@@ -133,8 +125,8 @@ def build_agent(
         driver.view = view or None
     controller: VehicleController | None = None
     if spec.has_wheels:
-        kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
-        controller = _construct(kind, spec, dt, own=vehicle_controller_settings(settings))
+        kind, own = selected_extension(settings, "vehicle_controller", VehicleController)
+        controller = construct(kind, spec, dt, *own)
     noise, localizer = settings.pose_noise, None
     if settings.localization == "ekf":
         imu = next(sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings))

@@ -7,14 +7,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
+from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, selected_extension
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import SELECTED, AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.extensions.registry import distributions, registry
-from eidrive_scenario.extensions.settings import optional_settings_type
+from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.model import Controller
@@ -133,7 +134,7 @@ def declared_detectors(
             source, line = _origin(controller, station, "fusion", selected)
             subject.call(build_fusion, station, detectors[name], source=source, line=line)
             source, line = controller.source, _line(controller, "vehicle_controller_settings", "vehicle_controller")
-            vehicle_controller_settings(station, source=source, line=line)
+            selected_extension(station, "vehicle_controller", VehicleController, source=source, line=line)
         except SettingError as error:
             diagnostics += error.at(source, line).diagnostics
     if diagnostics:
@@ -201,8 +202,8 @@ def _unknown_senders(
     ]
 
 
-_WITH_SETTINGS = ("detector", "fusion", "vehicle_controller")
-"""Properties that name the extensions whose settings are in a property `NAME_settings`."""
+_WITH_SETTINGS = {"detector": Detector, "fusion": FusionMethod, "vehicle_controller": VehicleController}
+"""Properties that name extensions with settings in a property `NAME_settings`, and base classes of the extensions."""
 
 
 def resolved_stations(
@@ -221,11 +222,8 @@ def resolved_stations(
     stations = {}
     for name, station in sorted(settings.items()):
         written = stations[name] = station.model_dump(mode="json")
-        for part in _WITH_SETTINGS:
-            kind, name_of_part = SELECTED[part], written[part]
-            model = optional_settings_type(kind, name_of_part, registry(kind).load(name_of_part))
-            if model is not None:
-                own = model.model_validate(written[f"{part}_settings"])
+        for part, base in _WITH_SETTINGS.items():
+            for own in selected_extension(station, part, base)[1]:
                 written[f"{part}_settings"] = own.model_dump(mode="json")
     return StackSettings(
         channel=channel,

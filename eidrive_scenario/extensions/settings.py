@@ -247,13 +247,6 @@ def settings_type_of(kind: str, name: str, extension: object, base: type[E]) -> 
     raise RegistryError(f"{described}: settings_type is {declared!r} (expected a class derived from {base.__name__})")
 
 
-def optional_settings_type(kind: str, name: str, extension: object) -> type[Settings] | None:
-    """Return the `settings_type` of an extension, or None if it has no settings. Raise RegistryError as above."""
-    if getattr(extension, "settings_type", None) is None:
-        return None
-    return settings_type_of(kind, name, extension, Settings)
-
-
 def parse_own_settings(
     kind: str,
     name: str,
@@ -268,8 +261,8 @@ def parse_own_settings(
 
     Raise SettingError with this location if they are invalid, or are given to an extension without settings.
     """
-    model = optional_settings_type(kind, name, extension)
-    if model is not None:
+    if getattr(extension, "settings_type", None) is not None:
+        model = settings_type_of(kind, name, extension, Settings)
         return parse_settings(model, given, source=source, line=line)
     if given:
         message = f"{singular(kind)} {name!r} has no settings"

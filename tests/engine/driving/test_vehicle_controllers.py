@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.agent_factory import build_agent, vehicle_controller_settings
+from eidrive_scenario.driving.agent_factory import build_agent, selected_extension
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.settings import parse_station_settings
 from eidrive_scenario.driving.step import Plan
@@ -80,4 +80,4 @@ def test_invalid_settings_of_a_vehicle_controller_are_reported_before_the_run(
     properties: dict[str, object], message: str
 ) -> None:
     with pytest.raises(SettingError, match=message):
-        vehicle_controller_settings(parse_station_settings(properties))
+        selected_extension(parse_station_settings(properties), "vehicle_controller", VehicleController)
