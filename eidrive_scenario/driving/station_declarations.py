@@ -58,7 +58,7 @@ def declared_settings(
         diagnostics.extend(_unknown_senders(name, declared[name], selections, controllers))
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
-            line = _line(controllers[name], "planner")
+            line = property_line(controllers[name], "planner")
             diagnostics.append(Diagnostic(message, "remove the property 'planner'", controllers[name].source, line))
     cooperate = _without_selections(cooperate, selections, controllers)
     for sender in cooperate or ():
@@ -122,18 +122,21 @@ def declared_detectors(
     detectors: dict[str, Detector] = {}
     for name, station in settings.items():
         subject = ErrorSubject(f"station {name!r}")
-        controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
+        controller = station_controller(scenario, name)
         source, line = _origin(controller, station, "detector", selected)
         try:
             detectors[name] = subject.call(build_detector, station, source=source, line=line)
             weights = detectors[name].load_weights if load_weights else detectors[name].check_weights
             subject.call(weights, allow_torchscript=allow_torchscript)
-            source, line = controller.source, _line(controller, "sensors")
+            source, line = controller.source, property_line(controller, "sensors")
             for sensor in station.rig_sensors(detectors[name].needs, detectors[name].default_sensors).values():
                 sensor_class(sensor.kind).check_settings(sensor)
             source, line = _origin(controller, station, "fusion", selected)
             subject.call(build_fusion, station, detectors[name], source=source, line=line)
-            source, line = controller.source, _line(controller, "vehicle_controller_settings", "vehicle_controller")
+            source, line = (
+                controller.source,
+                property_line(controller, "vehicle_controller_settings", "vehicle_controller"),
+            )
             selected_extension(station, "vehicle_controller", VehicleController, source=source, line=line)
         except SettingError as error:
             diagnostics += error.at(source, line).diagnostics
@@ -148,9 +151,9 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
     folder = Path(scenario.path).parent if scenario.path is not None else Path()
     for name, station in settings.items():
         if station.asn1_files:
-            controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
+            controller = station_controller(scenario, name)
             files = [folder / file for file in station.asn1_files]
-            line = _line(controller, "asn1_files")
+            line = property_line(controller, "asn1_files")
             category = actor_spec(name, scenario.entities[name]).category
             encoders[name] = Asn1Encoder(files, station.messages, station=category, source=controller.source, line=line)
     return encoders
@@ -162,10 +165,15 @@ def _origin(
     """Return file and line of a detector or fusion method, or its option if this and no property determines it."""
     if part in selected and not getattr(station, f"{part}_settings"):
         return f"--{part}", None
-    return controller.source, _line(controller, f"{part}_settings", part)
+    return controller.source, property_line(controller, f"{part}_settings", part)
 
 
-def _line(controller: Controller, *properties: str) -> int:
+def station_controller(scenario: Scenario, name: str) -> Controller:
+    """Return the controller of a station, the last one if it has several."""
+    return list(filter(is_agent_controller, scenario.controllers[name]))[-1]
+
+
+def property_line(controller: Controller, *properties: str) -> int:
     """Return the line of the first of these properties that a controller has; else that of the controller."""
     lines = {entry.name: entry.line for entry in property_entries(controller)}
     return next((lines[name] for name in properties if name in lines), controller.line)
@@ -187,7 +195,7 @@ def _without_selections(
 def _unknown_senders(
     name: str, settings: AgentSettings, selections: EntitySelections, controllers: Mapping[str, Controller]
 ) -> list[Diagnostic]:
-    line = _line(controllers[name], "cooperates_with")
+    line = property_line(controllers[name], "cooperates_with")
     others = [other for other in (*controllers, *selections.declared) if other != name]
     return [
         Diagnostic(

@@ -12,9 +12,9 @@ from eidrive_scenario.base.geometry import point_in_polygon
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planner_settings import Polygon
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.station_declarations import property_line, station_controller
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.conventions import is_agent_controller, property_entries
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
@@ -41,12 +41,12 @@ def areas_off_road(
             if gap > MARGIN:
                 what = setting.replace("_", " ")
                 which = f"the {what}" if len(planner.areas) == 1 else f"{what} {number}"
-                source, line = _source_and_line(scenario, name, setting)
+                controller = station_controller(scenario, name)
                 yield Diagnostic(
                     f"{which} of {name!r} never holds a vehicle on a road: it lies {gap:.0f} m off the nearest one",
                     "give world coordinates [m] in the frame of the road network: [x0, x1, y0, y1]",
-                    source,
-                    line,
+                    controller.source,
+                    property_line(controller, setting, "planner_settings"),
                 )
 
 
@@ -62,16 +62,6 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
     x, y = np.array(points, dtype=float).T
     nearest = float(roads.locate(x, y, reach=np.inf).outside.min())
     return max(0.0, nearest - reach)
-
-
-def _source_and_line(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
-    """Return file and line of the property with the areas of a station."""
-    for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
-        for entry in property_entries(controller):
-            if entry.name in (setting, "planner_settings"):
-                return controller.source, entry.line
-        return controller.source, controller.line
-    return "", 0
 
 
 def short_channel_delay(
