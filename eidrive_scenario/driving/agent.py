@@ -152,7 +152,7 @@ class Agent:
             change = self.perception.pose_change(own.time)
             self._reports.add(Report(self.name, own, now, own_state, pose_change=change))
             if self._regions is not None:
-                self._regions.add(self.name, own.time, self._own_body.reference_pose(own.time), self._view)
+                self._regions.add(self.name, own.time, self._own_body.at(own.time).reference, self._view)
         obeys = self.planner is not None and self.settings.obey_signals
         return StationPerception(
             now,

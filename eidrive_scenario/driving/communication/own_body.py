@@ -27,17 +27,17 @@ REPEATED = 1.0
 between two reports of an object (ETSI TS 103 324, T_GenCpmMax)."""
 
 
-class _Place(NamedTuple):
-    """Place of the body at one time [s].
+class BodyPose(NamedTuple):
+    """Pose of the body at one time [s].
 
-    pose      center of the body and height of its reference point [m], heading [rad]
-    body      outline of the body
-    trailers  outlines of the trailers
-    driven    length of the path of the center since the first place [m]
+    reference  position of the reference point [m], heading [rad]
+    body       outline of the body
+    trailers   outlines of the trailers
+    driven     length of the path of the center since the first pose [m]
     """
 
     time: float
-    pose: tuple[float, float, float, float]
+    reference: tuple[float, float, float, float]
     body: Outline
     trailers: Sequence[Outline]
     driven: float
@@ -47,17 +47,17 @@ class OwnBody:
     """Ego body in the recent past, and the objects of other stations that are this body."""
 
     def __init__(self, spec: ActorSpec, *, duration: float, dt: float) -> None:
-        """Store the places of the last `duration` seconds.
+        """Store the poses of the last `duration` seconds.
 
-        dt  time between two places [s]
+        dt  time between two poses [s]
         """
         self._spec = spec
         length, width, _ = spec.size
         self._half_size = length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN
         self._half_diagonal = 1.001 * math.hypot(*self._half_size)
-        self._places: deque[_Place] = deque(maxlen=math.ceil(duration / dt) + 2)
+        self._poses: deque[BodyPose] = deque(maxlen=math.ceil(duration / dt) + 2)
         self._has_trailers = False
-        """Whether a stored place may have trailers."""
+        """Whether a stored pose may have trailers."""
         self._vicinity = 0.0, 0.0, math.inf
         """Last center of the body, and the distance from it within which all stored outlines are [m]."""
         self._tracks: dict[str, int] = {}
@@ -66,45 +66,36 @@ class OwnBody:
         """Time of the last report of each station that contains the ego body [s]."""
 
     def record(self, ego: EgoState, attached: Array = NOTHING_ATTACHED) -> None:
-        """Store the place of the body, and the boxes (K, 7) of its trailers."""
+        """Store the pose of the body, and the boxes (K, 7) of its trailers."""
         x, y, z = ego.position.tolist()
+        reference = x, y, z, ego.yaw
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         ahead, aside, _ = self._spec.offset
         x, y = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
         body = Outline(x, y, cos, sin, *self._half_size)
         trailers = outlines(attached) if len(attached) else ()
         driven = 0.0
-        if self._places:
-            last = self._places[-1]
-            driven = last.driven + math.hypot(x - last.pose[0], y - last.pose[1])
-        self._places.append(_Place(ego.time, (x, y, z, ego.yaw), body, trailers, driven))
+        if self._poses:
+            last = self._poses[-1]
+            driven = last.driven + math.hypot(x - last.body.x, y - last.body.y)
+        self._poses.append(BodyPose(ego.time, reference, body, trailers, driven))
         if trailers:
             self._has_trailers = True
-        reach = driven - self._places[0].driven + self._half_diagonal
+        reach = driven - self._poses[0].driven + self._half_diagonal
         self._vicinity = x, y, math.inf if self._has_trailers else reach
 
-    def pose(self, time: float) -> tuple[float, float, float, float]:
-        """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
-        return self._at(time).pose
-
-    def _at(self, time: float) -> _Place:
-        for held in reversed(self._places):
-            if held.time <= time + TIME_TOLERANCE:
-                return held
-        return self._places[0]
-
-    def reference_pose(self, time: float) -> tuple[float, float, float, float]:
-        """Return position [m] and heading [rad] of the reference point at that time."""
-        x, y, z, yaw = self.pose(time)
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        ahead, aside, _ = self._spec.offset
-        return x - cos * ahead + sin * aside, y - sin * ahead - cos * aside, z, yaw
+    def at(self, time: float) -> BodyPose:
+        """Return the last pose up to `time` [s], or the first one."""
+        for stored in reversed(self._poses):
+            if stored.time <= time + TIME_TOLERANCE:
+                return stored
+        return self._poses[0]
 
     def box(self, time: float) -> Array:
         """Return the box (7,) of the outline at that time, with a margin that covers objects on the body."""
-        x, y, z, yaw = self.pose(time)
+        _, (_, _, z, yaw), body, *_ = self.at(time)
         length, width, height = self._spec.size
-        return np.array([x, y, z, length + BODY_MARGIN, width + BODY_MARGIN, 4.0 * height, yaw])
+        return np.array([body.x, body.y, z, length + BODY_MARGIN, width + BODY_MARGIN, 4.0 * height, yaw])
 
     def without(self, detections: Detections) -> Detections:
         """Return received detections without those on the ego body and its trailers, for which it must not brake.
@@ -114,8 +105,8 @@ class OwnBody:
         center_x, center_y, reach = self._vicinity
         boxes = detections.boxes
         if len(boxes) == 1 and math.hypot(boxes.item(0) - center_x, boxes.item(1) - center_y) > reach:
-            return detections  # a single object that is far from all stored places
-        stored = self._at(detections.time)
+            return detections  # a single object that is far from all stored poses
+        stored = self.at(detections.time)
         detections = _without_bodies(detections, stored.trailers)
         return _without_bodies(detections, [stored.body])
 
@@ -138,7 +129,7 @@ class OwnBody:
         own              newest own detections
         pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
         """
-        stored = self._at(detections.time)
+        stored = self.at(detections.time)
         detections = _without_bodies(detections, stored.trailers)
         inside = rows_on_bodies(detections, [stored.body])
         if not inside:
@@ -172,7 +163,7 @@ class OwnBody:
             if not math.isfinite(covariance[0, 0]):
                 continue
             if body is None:
-                body = np.array(self.pose(detections.time)[:2])
+                body = np.array(self.at(detections.time).body[:2])
             if state is not None and state.pose_covariance is not None:
                 point = detections.boxes[row : row + 1, :2]
                 covariance = covariance + pose_part(point, state.x, state.y, state.pose_covariance)[0]
