@@ -25,9 +25,6 @@ from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
 
-REGION_LIFETIME = 1.0
-"""Time for which a perception region counts as perceived [s]."""
-
 NOTHING_FUSED = Detections(0.0)
 """Objects before fusion."""
 
@@ -68,7 +65,7 @@ class Agent:
         self._detections = Detections(0.0)
         self._regions: PerceptionRegionStore | None = None
         if planner is not None and planner.observes_regions:
-            self._regions = PerceptionRegionStore(REGION_LIFETIME)
+            self._regions = PerceptionRegionStore()
             everywhere = ViewSector(*spec.offset, 0.0, math.pi, math.inf)
             self._view = (everywhere,) if planner.view is None else planner.view
         self._own_body = OwnBody(spec, duration=settings.report_lifetime, dt=dt)

@@ -49,7 +49,7 @@ class PartialReportAssembler:
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
-        self._rows: dict[int, tuple[float, Detections]] = {}
+        self._objects: dict[int, Detections] = {}
 
     def update(self, message: Message) -> Detections:
         """Add a message; return all known objects predicted to the time of the newest measurement.
@@ -58,44 +58,45 @@ class PartialReportAssembler:
         """
         detections = message.detections
         for row, number in enumerate(message.objects or ()):
-            held = self._rows.get(number)
-            if held is None or held[0] <= detections.time:
-                self._rows[number] = (detections.time, detections.subset([row]))
-        newest = max([detections.time, *(time for time, _ in self._rows.values())])
-        self._rows = {number: held for number, held in self._rows.items() if newest - held[0] <= self._timeout}
-        return self._predicted_objects(newest)
-
-    def _predicted_objects(self, time: float) -> Detections:
-        if not self._rows:
+            held = self._objects.get(number)
+            if held is None or held.time <= detections.time:
+                self._objects[number] = detections.subset([row])
+        time = max([detections.time, *(known_object.time for known_object in self._objects.values())])
+        self._objects = {
+            number: known_object
+            for number, known_object in sorted(self._objects.items())
+            if time - known_object.time <= self._timeout
+        }
+        if not self._objects:
             return Detections(time)
-        numbers = sorted(self._rows)
-        detections = [self._rows[number][1] for number in numbers]
-        boxes = np.concatenate([detection.boxes for detection in detections])
-        velocity = np.concatenate([detection.velocity for detection in detections])
-        for row, (detection, (vx, vy)) in enumerate(zip(detections, velocity.tolist(), strict=True)):
-            if not math.isnan(vx + vy):
-                boxes[row, 0] += vx * (time - detection.time)
-                boxes[row, 1] += vy * (time - detection.time)
+        objects = [*self._objects.values()]
+        boxes = np.concatenate([known_object.boxes for known_object in objects])
+        velocity = np.concatenate([known_object.velocity for known_object in objects])
+        age = time - np.array([known_object.time for known_object in objects])
+        boxes[:, :2] += np.nan_to_num(velocity) * age[:, None]
         return Detections(
             time,
             boxes,
-            np.concatenate([detection.scores for detection in detections]),
-            tuple(detection.classes[0] for detection in detections),
+            np.concatenate([known_object.scores for known_object in objects]),
+            tuple(known_object.classes[0] for known_object in objects),
             velocity,
-            np.concatenate([detection.covariance for detection in detections]),
-            tuple(numbers),
-            np.concatenate([detection.confidence for detection in detections]),
+            np.concatenate([known_object.covariance for known_object in objects]),
+            tuple(self._objects),
+            np.concatenate([known_object.confidence for known_object in objects]),
         )
 
 
+REGION_LIFETIME = 1.0
+"""Time for which a perception region counts as perceived [s]."""
+
+
 class PerceptionRegionStore:
-    """Newest perception region of each station, kept for a lifetime [s].
+    """Newest perception region of each station, kept for REGION_LIFETIME.
 
     CPMs list the sensors of the sender once per second only (ETSI TS 103 324); the others apply them at a new pose.
     """
 
-    def __init__(self, lifetime: float) -> None:
-        self._lifetime = lifetime
+    def __init__(self) -> None:
         self._sensors: dict[str, tuple[ViewSector, ...]] = {}
         self._regions: dict[str, PerceptionRegion] = {}
 
@@ -131,7 +132,7 @@ class PerceptionRegionStore:
     def newest(self, now: float) -> tuple[PerceptionRegion, ...]:
         """Return the regions that do not exceed the lifetime at `now` [s], one for each station."""
         for station, region in list(self._regions.items()):
-            if region.time < now - self._lifetime - TIME_TOLERANCE:
+            if region.time < now - REGION_LIFETIME - TIME_TOLERANCE:
                 del self._regions[station]
         return tuple(self._regions.values())
 
@@ -163,10 +164,6 @@ class SensorDataSharing:
     def accepts(self, payload: Payload) -> bool:
         """Return whether the station merges sensor data of this type."""
         return isinstance(payload, PointCloud if self._fusion.shares == "points" else FeatureFrame)
-
-    def add(self, sender: str, payload: Payload, body: Array) -> None:
-        """Store received sensor data without those on the ego body (7,) at the time of measurement."""
-        self._fusion.add_payload(sender, payload, body)
 
     def perceive(self, readings: Readings, alone: Detections | None, pose: PoseUncertainty | None) -> Detections | None:
         """Return newly available objects in merged sensor data, or None.
@@ -267,12 +264,12 @@ class ReportStore:
                 longest = self._fusion.max_payload_age
                 # Data of the far future would replace all later ones of their sender.
                 if abs(payload.time - now) <= longest + TIME_TOLERANCE:
-                    sharing.add(sender, payload, self._own_body.box(payload.time))
+                    self._fusion.add_payload(sender, payload, self._own_body.box(payload.time))
                 elif message.kind == "features" and payload.time < now:
                     expired.append(row)
             if message.kind == "features":
                 continue
-            if self._is_expired(message.detections.time, self._lifetime, now):
+            if message.detections.time + self._lifetime < now - TIME_TOLERANCE:
                 expired.append(row)
                 continue
             detections = message.detections
@@ -313,27 +310,17 @@ class ReportStore:
         if held is None or report.detections.time >= held.detections.time:
             self._reports[station] = report
 
-    @staticmethod
-    def _is_expired(time: float, lifetime: float, now: float) -> bool:
-        """Return whether a measurement at `time` [s] exceeds its lifetime [s]."""
-        return time + lifetime < now - TIME_TOLERANCE
-
     def _end_of_life(self, report: Report) -> float:
         """Return the time up to which a report is stored [s], also if the clock of its sender is fast."""
         return min(report.detections.time, report.arrived) + self._lifetime
 
     def _delete_old(self, now: float) -> None:
         """Delete reports that exceed their lifetime."""
-        oldest, expired = math.inf, []
-        for station, held in self._reports.items():
-            end = self._end_of_life(held)
+        ends = {station: self._end_of_life(held) for station, held in self._reports.items()}
+        for station, end in ends.items():
             if end < now - TIME_TOLERANCE:
-                expired.append(station)
-            elif end < oldest:
-                oldest = end
-        for station in expired:
-            del self._reports[station]
-        self._next_deletion = oldest
+                del self._reports[station]
+        self._next_deletion = min((ends[station] for station in self._reports), default=math.inf)
 
     def _without_own_body(self, message: Message, detections: Detections, pose_covariance: Array | None) -> Detections:
         """Return detections of a message without the ego body."""

@@ -49,7 +49,7 @@ def sent(agent: Agent, seconds: float) -> list[Message]:
 
 
 def test_region_is_placed_at_the_pose_of_the_sender() -> None:
-    store = PerceptionRegionStore(1.0)
+    store = PerceptionRegionStore()
     store.add_message(cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0))
     (region,) = store.newest(2.3)
     (sector,) = region.sectors
@@ -60,7 +60,7 @@ def test_region_is_placed_at_the_pose_of_the_sender() -> None:
 
 
 def test_sensor_information_applies_to_later_messages_at_their_pose() -> None:
-    store = PerceptionRegionStore(1.0)
+    store = PerceptionRegionStore()
     store.add_message(cpm(1.0, sensors=None))
     assert store.newest(1.0) == (), "a sender without sensor information has no region"
     store.add_message(cpm(1.1, sensors=(AHEAD,)))
@@ -70,7 +70,7 @@ def test_sensor_information_applies_to_later_messages_at_their_pose() -> None:
 
 
 def test_region_expires_and_is_not_replaced_by_an_older_one() -> None:
-    store = PerceptionRegionStore(1.0)
+    store = PerceptionRegionStore()
     store.add_message(cpm(2.0, sensors=(AHEAD,)))
     store.add_message(cpm(1.5, sensors=(AHEAD,), x=90.0))
     assert [region.sectors[0].x for region in store.newest(3.0)] == [12.0]
@@ -79,7 +79,7 @@ def test_region_expires_and_is_not_replaced_by_an_older_one() -> None:
 
 def test_region_is_where_the_sender_was_at_its_measurement() -> None:
     """At 20 m/s along y it was 10 m back 0.5 s before."""
-    store, message = PerceptionRegionStore(1.0), cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0)
+    store, message = PerceptionRegionStore(), cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0)
     store.add_message(replace(message, state=replace(message.state, speed=20.0), detections=Detections(1.5)))
     (region,) = store.newest(2.0)
     assert region.time == 1.5
@@ -87,14 +87,14 @@ def test_region_is_where_the_sender_was_at_its_measurement() -> None:
 
 
 def test_cam_has_no_region() -> None:
-    store = PerceptionRegionStore(1.0)
+    store = PerceptionRegionStore()
     state = StationState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     store.add_message(Message("Helper", 0, 1.0, state, Detections(1.0), 100, "cam", sensors=(AHEAD,)))
     assert store.newest(1.0) == ()
 
 
 def test_station_without_sensors_covers_nothing() -> None:
-    store = PerceptionRegionStore(1.0)
+    store = PerceptionRegionStore()
     store.add_message(cpm(1.0, sensors=()))
     assert store.newest(1.0) == ()
 
