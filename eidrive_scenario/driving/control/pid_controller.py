@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
-from eidrive_scenario.driving.planning.path import LEADS_AWAY
+from eidrive_scenario.driving.planning.path import nearest_segment
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
@@ -165,30 +166,17 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
 
     The heading is interpolated between the midpoints of segments, so that the steering is continuous.
     """
-    best, nearest, nearest_share, leads_away = 0, math.inf, 0.0, math.inf
-    x0, y0 = points[0]
-    for index, (x1, y1) in enumerate(points[1:]):
-        dx, dy = x1 - x0, y1 - y0
-        ax, ay = x - x0, y - y0
-        share = (ax * dx + ay * dy) / (dx * dx + dy * dy)
-        held = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
-        ax, ay = ax - held * dx, ay - held * dy
-        gap = ax * ax + ay * ay
-        if gap < nearest:
-            root = math.sqrt(gap)
-            best, nearest, nearest_share, leads_away = index, gap - 2e-9 * root, held, (root + LEADS_AWAY) ** 2
-        elif gap > leads_away:
-            break
-        x0, y0 = x1, y1
-    heading = _heading(points, best)
-    (x0, y0), (x1, y1) = points[best], points[best + 1]
-    left = ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) / math.hypot(x1 - x0, y1 - y0)
-    neighbor = best + 1 if nearest_share > 0.5 else best - 1
-    if 0 <= neighbor < len(points) - 1:
-        heading += abs(nearest_share - 0.5) * wrap_angle(_heading(points, neighbor) - heading)
+    segments = [
+        (x0, y0, dx, dy, dx * dx + dy * dy)
+        for (x0, y0), (x1, y1) in pairwise(points)
+        for dx, dy in [(x1 - x0, y1 - y0)]
+    ]
+    nearest, share = nearest_segment(segments, x, y)
+    x0, y0, dx, dy, _ = segments[nearest]
+    heading = math.atan2(dy, dx)
+    left = (dx * (y - y0) - dy * (x - x0)) / math.hypot(dx, dy)
+    neighbor = nearest + 1 if share > 0.5 else nearest - 1
+    if 0 <= neighbor < len(segments):
+        _, _, dx, dy, _ = segments[neighbor]
+        heading += abs(share - 0.5) * wrap_angle(math.atan2(dy, dx) - heading)
     return heading, left
-
-
-def _heading(points: list[list[float]], index: int) -> float:
-    (x0, y0), (x1, y1) = points[index], points[index + 1]
-    return math.atan2(y1 - y0, x1 - x0)

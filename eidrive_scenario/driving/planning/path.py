@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -24,6 +25,8 @@ APPROACH_DECELERATION = 3.0
 SMOOTHING_PASSES = 4
 """Number of smoothing passes. Each pass averages a point with its neighbors (1 2 1)/4; four passes remove kinks of a
 polyline and move a curve of radius R inwards by at most 1/R m²."""
+REACH = 30
+"""Number of segments among which the nearest one is searched."""
 LEADS_AWAY = 5.0
 """Increase of the distance to a point that ends the search for its nearest segment [m]: a later approach of the path is
 another curve or lap."""
@@ -57,69 +60,73 @@ class PlannedPath:
             points[1:-1] = (points[:-2] + 2.0 * points[1:-1] + points[2:]) / 4.0
         self.points = _apart(points)
         self.ends = ends
-        self.limits = self._speed_limits()
         self.heights: Array | None = None
-        """Heights of the road at the points (M,) [m], see `levels.path_heights`; None until they are computed."""
-        self._x: list[float] = self.points[:, 0].tolist()
-        self._y: list[float] = self.points[:, 1].tolist()
+        """Heights of the road at the points (M,) [m], see `path_heights`; None until they are computed."""
         step = np.diff(self.points, axis=0)
+        self.limits = _speed_limits(step, ends=ends)
         square = np.einsum("mi,mi->m", step, step)
         self._segments: list[list[float]] = np.column_stack([self.points[:-1], step, square]).tolist()
         """Start, vector and squared length of each segment."""
-        self._along: list[float] = []
-        """Distance of each point from the first one [m]; empty until it is computed."""
+
+    @cached_property
+    def _along(self) -> list[float]:
+        """Distance of each point from the first one [m]."""
+        return [*accumulate((math.sqrt(segment[4]) for segment in self._segments), initial=0.0)]
 
     def __len__(self) -> int:
-        return len(self._x)
+        return len(self.points)
 
     def part(self, start: int, count: int) -> PathPart:
         """Return the part of `count` points from the point `start` on, fewer at the end, but at least one segment."""
-        if not self._along:
-            lengths = [math.sqrt(segment[4]) for segment in self._segments]
-            self._along = [*accumulate(lengths, initial=0.0)]
         start = min(start, len(self._segments) - 1)
         end = start + max(count, 2)
         return PathPart(self.points[start:end], self._segments[start : end - 1], self._along[start:end])
 
-    def project(self, x: float, y: float, start: int = 0, reach: int = 30) -> int:
-        """Return the index of the nearest segment among `reach` segments from `start` on.
-
-        The search ends where the distance has increased by LEADS_AWAY.
-        """
-        best, nearest, leads_away = start, math.inf, math.inf
-        end = min(start + reach, len(self._x) - 1)
-        for index, (x0, y0, dx, dy, square) in enumerate(self._segments[start:end], start):
-            ax, ay = x - x0, y - y0
-            along = ax * dx + ay * dy
-            if along > 0.0:
-                share = along / square if along < square else 1.0
-                ax, ay = ax - share * dx, ay - share * dy
-            gap = ax * ax + ay * ay
-            if gap < nearest:
-                root = math.sqrt(gap)
-                best, nearest, leads_away = index, gap - 2e-9 * root, (root + LEADS_AWAY) ** 2
-            elif gap > leads_away:
-                break
-        return best
+    def project(self, x: float, y: float, start: int = 0) -> int:
+        """Return the index of the nearest segment among the next REACH segments from `start` on."""
+        return start + nearest_segment(self._segments[start : start + REACH], x, y)[0]
 
     def distance(self, x: float, y: float, index: int) -> float:
-        """Return the distance of a point from the segment at an index [m]; from the last one for larger indices."""
-        index = min(index, len(self._x) - 2)
-        return segment_distance(x, y, self._x[index], self._y[index], self._x[index + 1], self._y[index + 1])
+        """Return the distance of a point from the segment at an index [m]."""
+        x0, y0, dx, dy, _ = self._segments[index]
+        return segment_distance(x, y, x0, y0, x0 + dx, y0 + dy)
 
-    def _speed_limits(self) -> Array:
-        step = np.diff(self.points, axis=0)
-        length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-6)
-        heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
-        curvature = np.zeros(len(self.points))
-        curvature[1:-1] = np.abs(np.diff(heading)) / ((length[1:] + length[:-1]) / 2.0)
-        limits: list[float] = np.sqrt(LATERAL_ACCELERATION / np.maximum(curvature, 1e-6)).tolist()
-        if self.ends:
-            limits[-1] = 0.0
-        gains: list[float] = (2.0 * APPROACH_DECELERATION * length).tolist()
-        for index in range(len(limits) - 2, -1, -1):
-            limits[index] = min(limits[index], math.sqrt(limits[index + 1] ** 2 + gains[index]))
-        return np.array(limits)
+
+def nearest_segment(segments: Sequence[Sequence[float]], x: float, y: float) -> tuple[int, float]:
+    """Return the index of the segment that is nearest to a point, and the share of it before its nearest place.
+
+    The search ends where the distance has increased by LEADS_AWAY.
+
+    segments  start, vector and squared length of each [m]. Raise ZeroDivisionError if one of them has no length
+    """
+    best, best_share, nearest, leads_away = 0, 0.0, math.inf, math.inf
+    for index, (x0, y0, dx, dy, square) in enumerate(segments):
+        ax, ay = x - x0, y - y0
+        share = (ax * dx + ay * dy) / square
+        share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+        ax, ay = ax - share * dx, ay - share * dy
+        gap = ax * ax + ay * ay
+        if gap < nearest:
+            root = math.sqrt(gap)
+            best, best_share, nearest, leads_away = index, share, gap - 2e-9 * root, (root + LEADS_AWAY) ** 2
+        elif gap > leads_away:
+            break
+    return best, best_share
+
+
+def _speed_limits(step: Array, *, ends: bool) -> Array:
+    """Return the speed limits (M,) [m/s] of a path with these steps between its points (M - 1, 2) [m]."""
+    length = np.hypot(step[:, 0], step[:, 1])
+    heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+    curvature = np.zeros(len(step) + 1)
+    curvature[1:-1] = np.abs(np.diff(heading)) / ((length[1:] + length[:-1]) / 2.0)
+    limits: list[float] = np.sqrt(LATERAL_ACCELERATION / np.maximum(curvature, 1e-6)).tolist()
+    if ends:
+        limits[-1] = 0.0
+    gains: list[float] = (2.0 * APPROACH_DECELERATION * length).tolist()
+    for index in range(len(limits) - 2, -1, -1):
+        limits[index] = min(limits[index], math.sqrt(limits[index + 1] ** 2 + gains[index]))
+    return np.array(limits)
 
 
 def _resample(line: Array) -> Array:

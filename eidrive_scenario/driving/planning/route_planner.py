@@ -155,8 +155,8 @@ class RoutePlanner(Planner):
         """Return whether a vehicle has left the end of its lane straight ahead, where it has to stop."""
         if not path.ends or self._progress < len(path) - 2:
             return False
-        (x0, y0), (x1, y1) = path.points[-2].tolist(), path.points[-1].tolist()
-        length = math.hypot(x1 - x0, y1 - y0) or 1.0
+        (x0, y0), (x1, y1) = path.points[-2:].tolist()
+        length = math.hypot(x1 - x0, y1 - y0)
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         ahead, aside = (x - x1) * ux + (y - y1) * uy, (y - y1) * ux - (x - x1) * uy
         return bool(0.0 <= ahead <= BEYOND and abs(aside) <= self.max_lateral_offset)
@@ -168,7 +168,7 @@ class RoutePlanner(Planner):
         if self._path_of_stops is not path:
             self._path_of_stops = path
             self._stops.follow(path.points, path_heights(path, self.roads, float(ego.position[2])))
-        return self._stops.next(self._stops.place_of(self._progress, path.points, x, y), ego.speed, now)
+        return self._stops.next(self._stops.along(self._progress, x, y), ego.speed, now)
 
     def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
         if goal is not None and goal.speed is not None:

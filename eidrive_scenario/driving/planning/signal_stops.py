@@ -56,11 +56,13 @@ class SignalStops:
         self._served: set[str] = set()
         self._distances: dict[str, float] = {}
         """Last distance of the next stop line of each signal [m]."""
-        self._along = np.zeros(1)
+        self._path: Array = np.zeros((1, 2))
+        self._along: Array = np.zeros(1)
 
     def follow(self, path: Array, heights: Array | None = None) -> None:
         """Set the path (M, 2) of the vehicle and the heights of the road along it (M,) [m]; None: roads are level."""
         self.signals.follow(path, heights)
+        self._path = path
         self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
     def next(self, along: float, speed: float, now: float) -> StopPoint | None:
@@ -93,13 +95,12 @@ class SignalStops:
         """Return the maximum speeds at points of the path with which the vehicle stops there [m/s]."""
         return np.sqrt(2.0 * APPROACH_DECELERATION * np.maximum(stop.along - self._along[part], 0.0))
 
-    def place_of(self, index: int, path: Array, x: float, y: float) -> float:
+    def along(self, index: int, x: float, y: float) -> float:
         """Return the distance of a point along the path [m]; its nearest segment begins at `index`."""
-        index = min(index, len(path) - 2)
-        (x0, y0), (x1, y1) = path[index].tolist(), path[index + 1].tolist()
+        (x0, y0), (x1, y1) = self._path[index : index + 2].tolist()
         length = math.hypot(x1 - x0, y1 - y0)
-        share = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length if length > 0.0 else 0.0
-        return float(self._along[index]) + min(max(share, 0.0), length)
+        ahead: float = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
+        return float(self._along[index]) + min(max(ahead, 0.0), length)
 
     def _light_holds(self, light: SignalAhead, left: float, speed: float, now: float) -> bool:
         """Return whether a light holds the vehicle. It decides when a phase begins, and keeps this decision."""
