@@ -97,9 +97,9 @@ class ConflictAreaPlanner(RoutePlanner):
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         plan = super().plan(ego, objects, goal, now)
         braking = self.planner_settings.conflict_deceleration
-        path = self._path
-        heights = None if path is None else path_heights(path, self.roads, float(ego.position[2]))
-        inside_area = self._in_areas(objects, heights) if len(objects) else ()
+        assert self._path is not None
+        heights = path_heights(self._path, self.roads, float(ego.position[2]))
+        inside_area = self._in_areas(objects, self._path.points, heights)
         if inside_area:
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
@@ -108,22 +108,20 @@ class ConflictAreaPlanner(RoutePlanner):
             return replace(plan, reason="an object was in the conflict area", braking=braking)
         return plan
 
-    def _in_areas(self, objects: Detections, heights: Array | None) -> tuple[int, ...]:
+    def _in_areas(self, objects: Detections, path: Array, heights: Array | None) -> tuple[int, ...]:
         """Return the rows of the objects in an area whose existence probability reaches `min_existence`.
 
-        heights  of the path [m]; objects on another level, such as below a bridge, are in no area
+        path, heights  (M, 2) and (M,) [m]; objects on another level, such as below a bridge, are in no area
         """
+        settings = self.planner_settings
         inside = [
             index
             for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())
-            if any([point_in_polygon(x, y, area) for area in self.planner_settings.conflict_area])
+            if any([point_in_polygon(x, y, area) for area in settings.conflict_area])
+            and objects.confidence[index] >= settings.min_existence
         ]
-        path = self._path
-        if inside and path is not None and heights is not None:
+        if inside and heights is not None:
             bottom = objects.boxes[:, 2] - objects.boxes[:, 5] / 2.0
             points = np.column_stack([objects.boxes[:, :2], bottom])
-            inside = [index for index in inside if is_on_level(points[index], path.points, heights)]
-        if not inside:
-            return ()
-        existence = objects.confidence.tolist()
-        return tuple([index for index in inside if existence[index] >= self.planner_settings.min_existence])
+            inside = [index for index in inside if is_on_level(points[index], path, heights)]
+        return tuple(inside)

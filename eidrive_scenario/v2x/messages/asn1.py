@@ -126,12 +126,12 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
     state = message.state
     station = message.detections.classes[0]
     basic = {"stationType": _STATION_TYPES[station], "referencePosition": _position(state)}
+    parameters: dict[str, Any] = {"basicContainer": basic}
     if station == ROADSIDE:
-        return _cam(message, {"basicContainer": basic, "highFrequencyContainer": ("rsuContainerHighFrequency", {})})
-    *_, length, width, _, _ = message.detections.boxes[0].tolist()
-    parameters: dict[str, Any] = {
-        "basicContainer": basic,
-        "highFrequencyContainer": (
+        parameters["highFrequencyContainer"] = ("rsuContainerHighFrequency", {})
+    else:
+        *_, length, width, _, _ = message.detections.boxes[0].tolist()
+        parameters["highFrequencyContainer"] = (
             "basicVehicleContainerHighFrequency",
             {
                 **_motion(state),
@@ -148,20 +148,15 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
                 "curvatureCalculationMode": "unavailable",
                 "yawRate": {"yawRateValue": 32767, "yawRateConfidence": "unavailable"},
             },
-        ),
-    }
-    if low_frequency:
-        parameters["lowFrequencyContainer"] = (
-            "basicVehicleContainerLowFrequency",
-            {"vehicleRole": "default", "exteriorLights": (b"\x00", 8), "pathHistory": []},
         )
-    return _cam(message, parameters)
-
-
-def _cam(message: Message, parameters: dict[str, Any]) -> dict[str, Any]:
+        if low_frequency:
+            parameters["lowFrequencyContainer"] = (
+                "basicVehicleContainerLowFrequency",
+                {"vehicleRole": "default", "exteriorLights": (b"\x00", 8), "pathHistory": []},
+            )
     return {
         "header": _header(2, message.sender),
-        "cam": {"generationDeltaTime": _milliseconds(message.state.time), "camParameters": parameters},
+        "cam": {"generationDeltaTime": _milliseconds(state.time), "camParameters": parameters},
     }
 
 

@@ -20,8 +20,8 @@ SHORTEST, LONGEST = 0.1, 1.0
 """T_GenCamMin and T_GenCamMax (ETSI EN 302 637-2), T_GenCpmMin and T_GenCpmMax (ETSI TS 103 324) [s]."""
 REPEATS = 3
 """N_GenCam: number of messages that keep the interval of the last trigger."""
-HEADING, DISTANCE, SPEED = math.radians(4.0), 4.0, 0.5
-"""Maximum change without a new CAM, or of an object without inclusion in the next CPM [rad, m, m/s]."""
+DISTANCE, SPEED, HEADING = LIMITS = 4.0, 0.5, math.radians(4.0)
+"""Maximum changes without a new CAM, or of an object without inclusion in the next CPM [m, m/s, rad]."""
 LOW_FREQUENCY = 0.5
 """Minimum time between two low-frequency containers [s]."""
 
@@ -60,11 +60,7 @@ class CamGenerationRules:
         if passed < shortest - EQUAL:
             return False
         last = self._last
-        if last is None or (
-            abs(wrap_angle(state.yaw - last.yaw)) > HEADING + EQUAL
-            or math.hypot(state.x - last.x, state.y - last.y) > DISTANCE + EQUAL
-            or abs(state.speed - last.speed) > SPEED + EQUAL
-        ):
+        if last is None or _has_changed(last, state):
             self._interval = min(max(passed, SHORTEST), LONGEST)
             self._repeats = 0
         elif passed >= self._interval - EQUAL:
@@ -114,15 +110,6 @@ class CpmContents:
     sensors: bool
 
 
-@dataclass(frozen=True)
-class _ReportedObject:
-    time: float
-    x: float
-    y: float
-    speed: float
-    direction: float
-
-
 class CpmGenerationRules:
     """CPM generation rules of one station, with the last report of each object.
 
@@ -133,7 +120,7 @@ class CpmGenerationRules:
     def __init__(self) -> None:
         self._sent = -math.inf
         self._sensors = -math.inf
-        self._reported: dict[int, _ReportedObject] = {}
+        self._reported: dict[int, StationState] = {}
 
     def contents(
         self, detections: Detections, numbers: Sequence[int], now: float, shortest: float = SHORTEST
@@ -164,17 +151,11 @@ class CpmGenerationRules:
         self._sensors = now if sensors else self._sensors
         return CpmContents(tuple(chosen), sensors)
 
-    def _vehicle_due(self, number: int, present: _ReportedObject) -> bool:
+    def _vehicle_due(self, number: int, present: StationState) -> bool:
         last = self._reported.get(number)
-        return (
-            last is None
-            or math.hypot(present.x - last.x, present.y - last.y) > DISTANCE + EQUAL
-            or abs(present.speed - last.speed) > SPEED + EQUAL
-            or abs(wrap_angle(present.direction - last.direction)) > HEADING + EQUAL
-            or present.time - last.time >= LONGEST - EQUAL
-        )
+        return last is None or _has_changed(last, present) or present.time - last.time >= LONGEST - EQUAL
 
-    def _utility(self, number: int, present: _ReportedObject, score: float) -> float:
+    def _utility(self, number: int, present: StationState, score: float) -> float:
         """Return the utility of an object. New objects come first, then those of higher quality or larger change.
 
         Terms as in the CpService of Artery: quality, changes of position, speed and direction, age; at most 1 each.
@@ -182,15 +163,21 @@ class CpmGenerationRules:
         last = self._reported.get(number)
         if last is None:
             return 10.0 + score
-        moved = math.hypot(present.x - last.x, present.y - last.y)
-        turned = abs(wrap_angle(present.direction - last.direction))
-        terms = (
-            moved / (2.0 * DISTANCE),
-            abs(present.speed - last.speed) / (2.0 * SPEED),
-            turned / (2.0 * HEADING),
-            (present.time - last.time - SHORTEST) / (LONGEST - SHORTEST),
-        )
-        return score + sum(min(1.0, max(0.0, term)) for term in terms)
+        terms = [change / (2.0 * limit) for change, limit in zip(_changes(last, present), LIMITS, strict=True)]
+        terms.append((present.time - last.time - SHORTEST) / (LONGEST - SHORTEST))
+        return score + sum([min(1.0, max(0.0, term)) for term in terms])
+
+
+def _changes(before: StationState, after: StationState) -> tuple[float, float, float]:
+    """Return the changes of position, speed and direction, in the order of LIMITS."""
+    moved = math.hypot(after.x - before.x, after.y - before.y)
+    return moved, abs(after.speed - before.speed), abs(wrap_angle(after.yaw - before.yaw))
+
+
+def _has_changed(before: StationState, after: StationState) -> bool:
+    """Return whether a change exceeds its limit."""
+    moved, accelerated, turned = _changes(before, after)
+    return moved > DISTANCE + EQUAL or accelerated > SPEED + EQUAL or turned > HEADING + EQUAL
 
 
 def quality(score: float) -> int:
@@ -198,12 +185,13 @@ def quality(score: float) -> int:
     return math.floor(15.0 * score + 0.5)
 
 
-def _report(detections: Detections, row: int, now: float) -> _ReportedObject:
-    x, y, *_, yaw = detections.boxes[row].tolist()
+def _report(detections: Detections, row: int, now: float) -> StationState:
+    """Return the state of an object as it is reported, with the direction of its motion as yaw."""
+    x, y, z, *_, yaw = detections.boxes[row].tolist()
     vx, vy = detections.velocity[row].tolist()
     speed = math.hypot(vx, vy)
     direction = math.atan2(vy, vx) if speed > MOVING else yaw  # an unknown speed (NaN) compares as False
-    return _ReportedObject(now, x, y, 0.0 if math.isnan(speed) else speed, direction)
+    return StationState(now, x, y, z, direction, 0.0 if math.isnan(speed) else speed)
 
 
 GATE = 3.0
