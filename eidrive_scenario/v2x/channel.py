@@ -141,15 +141,18 @@ class LinkChannel(QueuedChannel):
         """Return the delay of a message on one link [s], at least 0, or the reason for its loss."""
 
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
-        events = []
-        for receiver in receivers:
-            outcome = self.transmission_outcome(message, receiver, now)
-            distance = self.surroundings.distance(message.sender, receiver)
-            if isinstance(outcome, str):
-                events.append(self._links.record_loss(message, receiver, now, outcome, distance))
-            else:
-                events.append(self._links.enqueue_delivery(message, receiver, now, outcome, distance))
-        return tuple(events)
+        return tuple(
+            [
+                self._links.send(
+                    message,
+                    receiver,
+                    now,
+                    self.transmission_outcome(message, receiver, now),
+                    self.surroundings.distance(message.sender, receiver),
+                )
+                for receiver in receivers
+            ]
+        )
 
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         return [*self.drain_events(), *super().transmit(outbox, now)]

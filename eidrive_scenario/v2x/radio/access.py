@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,19 +177,11 @@ class MediumAccess(ABC):
         self._waiting = [deque() if old is None else self._waiting[old] for old in rows]
         self._head = [None if old is None else self._head[old] for old in rows]
         self.contending = sum(head is not None for head in self._head)
-        for field, fresh in (
-            ("ready", math.inf),
-            ("_last_start", -math.inf),
-            ("_last_use", 0.0),
-            ("_busy_time", 0.0),
-            ("_period_busy", 0.0),
-        ):
-            setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
+        reorder_fields(
+            self, rows, ready=math.inf, _last_start=-math.inf, _last_use=0.0, _busy_time=0.0, _period_busy=0.0
+        )
         for transmission in self.active:
-            if transmission.gain is not None:
-                transmission.gain = reorder_rows(transmission.gain, rows, 0.0)
-            if transmission.busy is not None:
-                transmission.busy = reorder_rows(transmission.busy, rows, False)
+            reorder_fields(transmission, rows, gain=0.0, busy=False)
         self.gate = self.gate.reorder(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
@@ -256,15 +248,20 @@ class MediumAccess(ABC):
         return self._period_busy / period
 
 
-Scalar = TypeVar("Scalar", bound=np.generic)
+def reorder_fields(owner: object, rows: Sequence[int | None], **fresh: float) -> None:
+    """Reorder the stations in the last axis of arrays, attributes of an object that may be None.
 
-
-def reorder_rows(values: NDArray[Scalar], rows: Sequence[int | None], fresh: float) -> NDArray[Scalar]:
-    """Return an array whose last axis are reordered stations: the value of the former row, `fresh` for new ones."""
-    reordered = np.full((*values.shape[:-1], len(rows)), fresh, dtype=values.dtype)
+    rows   former row of each station, None for new ones
+    fresh  value for new stations, by attribute
+    """
     kept = [new for new, old in enumerate(rows) if old is not None]
-    reordered[..., kept] = values[..., [old for old in rows if old is not None]]
-    return reordered
+    former = [old for old in rows if old is not None]
+    for field, value in fresh.items():
+        values = getattr(owner, field)
+        if values is not None:
+            reordered = np.full((*values.shape[:-1], len(rows)), value, dtype=values.dtype)
+            reordered[..., kept] = values[..., former]
+            setattr(owner, field, reordered)
 
 
 def _is_outdated(transmission: Transmission, *, by: Transmission) -> bool:

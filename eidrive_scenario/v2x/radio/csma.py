@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
-from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
+from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_fields
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.standards import SLOT
 
@@ -117,7 +117,5 @@ class Csma(MediumAccess):
             self._locked_until = locked_until
 
     def reorder(self, rows: Sequence[int | None]) -> None:
-        self._slots, self._fixed = reorder_rows(self._slots, rows, math.nan), reorder_rows(self._fixed, rows, math.nan)
-        for field in ("_free_from", "_locked_until"):
-            setattr(self, field, reorder_rows(getattr(self, field), rows, -math.inf))
+        reorder_fields(self, rows, _slots=math.nan, _fixed=math.nan, _free_from=-math.inf, _locked_until=-math.inf)
         self._keys = np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)

@@ -145,46 +145,40 @@ class Links:
         """Return the counters of a link; create them if the link is new."""
         return self._counters[receiver][sender]
 
-    def enqueue_delivery(
-        self, message: Message, receiver: str, now: float, delay: float, distance: float | None = None
+    def send(
+        self, message: Message, receiver: str, now: float, outcome: float | str, distance: float | None = None
     ) -> LinkEvent:
-        """Send a message that arrives `delay` [s] after `now`, over this distance between antennas [m].
+        """Send a message at `now` [s] that arrives after a delay [s], or is lost for a reason, by `outcome`.
 
-        Raise ValueError unless the delay is a finite number of at least 0 s.
+        distance  between the antennas [m]; None: the message is not counted in a distance class
+
+        Raise ValueError unless a delay is a finite number of at least 0 s.
         """
         # A truth value, of a model that returns whether a message arrives, would be a delay of 0 or 1 s
-        given: object = delay
-        if isinstance(given, bool) or not isinstance(given, Real) or not 0.0 <= float(given) < math.inf:
+        given: object = outcome
+        is_lost = isinstance(outcome, str)
+        if not is_lost and (
+            isinstance(given, bool) or not isinstance(given, Real) or not 0.0 <= float(given) < math.inf
+        ):
             raise ValueError(
-                f"delay of a message to {receiver!r} is invalid (got {delay}; expected at least 0 s, finite)"
+                f"delay of a message to {receiver!r} is invalid (got {outcome}; expected at least 0 s, finite)"
             )
-        arrives = now + delay
+        counters = self.counters(message.sender, receiver)
+        counters.sent += 1
+        counters.bytes_sent += message.size
+        if distance is not None:
+            counters.count_outcome(distance, not is_lost)
+        if isinstance(outcome, str):
+            counters.count_loss(outcome)
+            return LinkEvent(message.sender, receiver, message.number, now, "lost", None, outcome, message.size)
+        arrives = now + outcome
         self.enqueue(queue_entry(message, now, arrives), receiver)
-        counters = self._count_sent(message, receiver)
-        if distance is not None:
-            counters.count_outcome(distance, True)
         return LinkEvent(message.sender, receiver, message.number, now, "delivered", arrives, "", message.size)
-
-    def record_loss(
-        self, message: Message, receiver: str, now: float, reason: str, distance: float | None = None
-    ) -> LinkEvent:
-        """Send a message that is lost for this reason."""
-        counters = self._count_sent(message, receiver)
-        counters.count_loss(reason)
-        if distance is not None:
-            counters.count_outcome(distance, False)
-        return LinkEvent(message.sender, receiver, message.number, now, "lost", None, reason, message.size)
 
     def enqueue(self, entry: Entry, *receivers: str) -> None:
         """Add a message in flight that is already counted as sent."""
         for receiver in receivers:
             self._queues[receiver].append(entry)
-
-    def _count_sent(self, message: Message, receiver: str) -> LinkCounters:
-        counters = self.counters(message.sender, receiver)
-        counters.sent += 1
-        counters.bytes_sent += message.size
-        return counters
 
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         """Return messages that have arrived by `now`, each once, by time of arrival, sender and number."""

@@ -112,9 +112,9 @@ def test_delay_of_the_paper_applies_from_the_first_message() -> None:
 
 def test_links_deliver_messages_of_one_tick_in_order_of_arrival() -> None:
     links = Links()
-    links.enqueue_delivery(message("B", 0, 0.0), "Ego", 0.0, 0.09)
-    links.enqueue_delivery(message("A", 0, 0.0), "Ego", 0.0, 0.07)
-    links.enqueue_delivery(message("C", 0, 0.0), "Ego", 0.0, 0.07)
+    links.send(message("B", 0, 0.0), "Ego", 0.0, 0.09)
+    links.send(message("A", 0, 0.0), "Ego", 0.0, 0.07)
+    links.send(message("C", 0, 0.0), "Ego", 0.0, 0.07)
     assert [entry.message.sender for entry in links.deliver("Ego", 0.1)] == ["A", "C", "B"]
     assert links.deliver("Ego", 0.1) == ()
 
@@ -122,7 +122,7 @@ def test_links_deliver_messages_of_one_tick_in_order_of_arrival() -> None:
 def test_links_with_negative_or_undefined_delay_raise() -> None:
     for delay in (-0.01, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="expected at least 0 s, finite"):
-            Links().enqueue_delivery(message("A", 0, 0.0), "Ego", 0.0, delay)
+            Links().send(message("A", 0, 0.0), "Ego", 0.0, delay)
 
 
 def test_age_of_information_with_one_loss_equals_hand_calculation() -> None:
@@ -131,9 +131,9 @@ def test_age_of_information_with_one_loss_equals_hand_calculation() -> None:
     for second in range(4):
         sent = message("RSU", second, float(second))
         if second == 2:
-            links.record_loss(sent, "Ego", float(second), "loss")
+            links.send(sent, "Ego", float(second), "loss")
         else:
-            links.enqueue_delivery(sent, "Ego", float(second), 0.5)
+            links.send(sent, "Ego", float(second), 0.5)
     for now in (1.0, 2.0, 3.0, 3.5):
         links.deliver("Ego", now)
     link = links.statistics(4.0)["RSU", "Ego"]
@@ -195,7 +195,7 @@ def test_age_of_information_is_not_counted_while_the_receiver_is_absent() -> Non
     links = Links()
     for begin in (0.0, 60.0):
         for number, second in enumerate((0.0, 1.0)):
-            links.enqueue_delivery(message("RSU", number, begin + second), "Ego", begin + second, 0.5)
+            links.send(message("RSU", number, begin + second), "Ego", begin + second, 0.5)
         for now in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0):
             links.deliver("Ego", begin + now)
         if begin == 0.0:

@@ -15,7 +15,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
-from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
+from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_fields
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.profile import SidelinkSettings
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION
@@ -130,15 +130,12 @@ class Sidelink(MediumAccess):
         former = {old: row for row, old in enumerate(rows) if old is not None}
         self._grants = [None if old is None else self._grants[old] for old in rows]
         self._sent = [deque() if old is None else self._sent[old] for old in rows]
-        self._scheduled = reorder_rows(self._scheduled, rows, False)
-        for field, fresh in (("_next_event", math.inf), ("_unmeasured_time", 0.0), ("_period_unmeasured", 0.0)):
-            setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
+        reorder_fields(self, rows, _next_event=math.inf, _scheduled=False, _unmeasured_time=0.0, _period_unmeasured=0.0)
         self._sending = [sending for sending in self._sending if sending.row in former]
         for sending in self._sending:
             sending.row = former[sending.row]
         for transmission in self.active:
-            if transmission.control is not None:
-                transmission.control = reorder_rows(transmission.control, rows, PROPAGATION)
+            reorder_fields(transmission, rows, control=PROPAGATION)
         self._history.rearrange(rows)
         own = np.array([key(self._seed, "sci", name) for name in self.names], dtype=np.uint64)
         self._keys = combine_keys(own[:, None], own[None, :])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
-from eidrive_scenario.v2x.radio.access import Transmission, reorder_rows
+from eidrive_scenario.v2x.radio.access import Transmission, reorder_fields
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
 from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATION, Codes
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Sensed
@@ -119,7 +119,7 @@ class Reservations:
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
-        self.rsrp = reorder_rows(self.rsrp, rows, NOT_DECODED)
+        reorder_fields(self, rows, rsrp=NOT_DECODED)
         self.stations = len(rows)
 
     def _forget(self, now: int) -> None:
@@ -201,6 +201,5 @@ class SensingHistory:
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
-        self.rssi = reorder_rows(self.rssi, rows, 0.0)
-        self.monitored = reorder_rows(self.monitored, rows, False)
+        reorder_fields(self, rows, rssi=0.0, monitored=False)
         self.reservations.rearrange(rows)
