@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -52,20 +51,19 @@ class AverageFusion(FusionMethod):
 
     def _labels(self, reports: Sequence[Detections]) -> list[int]:
         """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""
-        objects = [_Object(*center) for center in reports[0].boxes[:, :3].tolist()]
-        labels = list(range(len(objects)))
+        means, counts = reports[0].boxes[:, :3].copy(), np.ones(len(reports[0]))
+        labels = list(range(len(means)))
         for report in reports[1:]:
             centers = report.boxes[:, :3]
-            means = np.array([(entry.x, entry.y, entry.z) for entry in objects])
-            pairs = {column: row for row, column in associate(means, centers, self.gate)}
-            for column, (x, y, z) in enumerate(centers.tolist()):
-                label = pairs.get(column)
-                if label is None:
-                    label = len(objects)
-                    objects.append(_Object(x, y, z))
-                else:
-                    objects[label].add(x, y, z)
-                labels.append(label)
+            label = np.full(len(centers), -1)
+            for known_object, box in associate(means, centers, self.gate):
+                label[box] = known_object
+                counts[known_object] += 1.0
+                means[known_object] += (centers[box] - means[known_object]) / counts[known_object]
+            fresh = np.flatnonzero(label < 0)
+            label[fresh] = len(means) + np.arange(len(fresh))
+            means, counts = np.concatenate([means, centers[fresh]]), np.append(counts, np.ones(len(fresh)))
+            labels += label.tolist()
         return labels
 
 
@@ -78,22 +76,6 @@ def joint_existence(reports: Sequence[Detections], labels: Sequence[int]) -> Arr
     absence = np.ones(max(labels) + 1)
     np.multiply.at(absence, np.array(labels, dtype=np.intp), 1.0 - np.concatenate([r.confidence for r in reports]))
     return np.asarray(1.0 - absence)
-
-
-@dataclass
-class _Object:
-    """Running mean of the centers of one object."""
-
-    x: float
-    y: float
-    z: float
-    count: int = 1
-
-    def add(self, x: float, y: float, z: float) -> None:
-        self.count += 1
-        self.x += (x - self.x) / self.count
-        self.y += (y - self.y) / self.count
-        self.z += (z - self.z) / self.count
 
 
 def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: float) -> Detections:

@@ -34,6 +34,7 @@ from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import LEVEL_TOLERANCE, UNASSIGNED_GATE, AssociationGate, Table
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, initiate_tracks, predict_tracks
+from eidrive_scenario.perception.tracking.association import squared_mahalanobis
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_covariance_at, pose_jacobian
 from eidrive_scenario.v2x.messages.message import StationState
 
@@ -256,7 +257,7 @@ class _Candidates(NamedTuple):
         apart = np.abs(body[..., 0] - own_body[:, 0]) > 0.5 * (body[..., 3] + own_body[:, 3]) + LEVEL_TOLERANCE
         group, own_group = (_VULNERABLE[np.argmax(table["votes"], axis=1)] for table in (other, own))
         rows, columns = np.nonzero(
-            (_squared(offset, whole)[0] <= UNASSIGNED_GATE) & ~apart & (group[:, None] == own_group)
+            (squared_mahalanobis(offset, whole)[0] <= UNASSIGNED_GATE) & ~apart & (group[:, None] == own_group)
         )
         turn = other["heading"][rows, 0] - own["heading"][columns, 0]
         return cls(
@@ -368,7 +369,7 @@ def _refine(candidates: _Candidates, error: Array, covariance: Array) -> _Hypoth
     while len(pairs) > 2:
         offset, jacobian = _moved(candidates, pairs, error)
         rest = candidates.covariance[pairs] - jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
-        distance = _squared(offset, rest)[0]
+        distance = squared_mahalanobis(offset, rest)[0]
         count = np.count_nonzero(distance > _GATE)
         if not count:
             break
@@ -417,16 +418,8 @@ _CONSTANT = -math.log(2.0 * math.pi * OBJECT_DENSITY)
 
 def _log_odds(offset: Array, covariance: Array) -> Array:
     """Return the logarithms (K,) of the densities of offsets (K, 2) over that of other objects."""
-    distance, determinant = _squared(offset, covariance)
+    distance, determinant = squared_mahalanobis(offset, covariance)
     return np.asarray(_CONSTANT - 0.5 * (distance + np.log(determinant)))
-
-
-def _squared(offset: Array, covariance: Array) -> tuple[Array, Array]:
-    """Return squared Mahalanobis distances (...) of offsets (..., 2), and the determinants of their covariances."""
-    x, y = offset[..., 0], offset[..., 1]
-    xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
-    determinant = xx * yy - xy * xy
-    return (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant, determinant
 
 
 def _moved(candidates: _Candidates, pairs: Integers, error: Array) -> tuple[Array, Array]:
@@ -441,7 +434,7 @@ def _fits(candidates: _Candidates, pairs: Integers, error: Array, covariance: Ar
     """Return whether each pair is within the gate for this error (3,) with its covariance (3, 3)."""
     offset, jacobian = _moved(candidates, pairs, error)
     spread = candidates.covariance[pairs] + jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
-    return np.asarray(_squared(offset, spread)[0] <= _GATE)
+    return np.asarray(squared_mahalanobis(offset, spread)[0] <= _GATE)
 
 
 def _are_same(first: _Hypothesis, second: _Hypothesis) -> bool:

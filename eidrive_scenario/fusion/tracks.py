@@ -19,7 +19,13 @@ from eidrive_scenario.fusion.prediction import (
     significant_turn_rate,
     update_heading,
 )
-from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, make_plausible, survived
+from eidrive_scenario.perception.tracking.association import (
+    detected,
+    likelihood_ratio,
+    make_plausible,
+    squared_mahalanobis,
+    survived,
+)
 from eidrive_scenario.perception.tracking.association import missed as after_miss
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
@@ -248,9 +254,7 @@ def _existence_after(old: Table, new: Table) -> Array:
     """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.association`."""
     spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
     offset = new["mean"][:, :2] - old["mean"][:, :2]
-    x, y, a, b, d = offset[:, 0], offset[:, 1], spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
-    determinant = a * d - b * b
-    squared = (d * x * x - 2.0 * b * x * y + a * y * y) / determinant
+    squared, determinant = squared_mahalanobis(offset, spread)
     return detected(old["existence"], likelihood_ratio(squared, determinant, new["score"]))
 
 

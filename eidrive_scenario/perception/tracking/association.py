@@ -43,11 +43,7 @@ def associate(
         return [], []
     offset = boxes[None, :, :2] - tracks.state[:, None, :2]
     spread = tracks.covariance[:, None, :2, :2] + noise[None]
-    # Squared Mahalanobis distances by the closed inverse of 2 x 2 matrices: a solver would iterate over the pairs.
-    a, b, d = spread[..., 0, 0], spread[..., 0, 1], spread[..., 1, 1]
-    x, y = offset[..., 0], offset[..., 1]
-    size = a * d - b * b
-    distance = (d * x * x - 2.0 * b * x * y + a * y * y) / size
+    distance, size = squared_mahalanobis(offset, spread)
     # Minus twice the log-likelihood: its normalization prevents that an uncertain track wins by its wide gate.
     cost, inside = distance + np.log(size), distance <= gate
     rows: list[int] = []
@@ -58,6 +54,18 @@ def associate(
             rows.append(int(group[row]))
             columns.append(int(free[column]))
     return rows, columns
+
+
+def squared_mahalanobis(offset: Array, covariance: Array) -> tuple[Array, Array]:
+    """Return the squared Mahalanobis distances (...) of offsets (..., 2), and the determinants (...) of their
+    covariances (..., 2, 2).
+
+    The closed inverse of 2 x 2 matrices is used, because a solver would iterate over them.
+    """
+    x, y = offset[..., 0], offset[..., 1]
+    xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
+    determinant = xx * yy - xy * xy
+    return (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant, determinant
 
 
 def make_plausible(covariance: Array) -> Bools:
