@@ -61,7 +61,7 @@ class Agent:
         self.receives_messages = receives_messages
         """Whether the station receives messages; a station that does not drive may only transmit."""
         self.sharing = sharing
-        self._message_generator = message_generator
+        self.message_generator = message_generator
         self._detections = Detections(0.0)
         self._regions: PerceptionRegionStore | None = None
         if planner is not None and planner.observes_regions:
@@ -72,11 +72,6 @@ class Agent:
         self._reports = ReportStore(
             self.name, settings, fusion=fusion, own_body=self._own_body, regions=self._regions, sharing=sharing
         )
-
-    @property
-    def next_message_number(self) -> int:
-        """Sequence number of the next message of the station."""
-        return self._message_generator.number
 
     @property
     def error_subject(self) -> str:
@@ -200,7 +195,7 @@ class Agent:
             fused=perceived.fused,
             plan=plan,
             control=self._control(ego, plan) if action.control is None else action.control,
-            outbox=self._message_generator.generate(
+            outbox=self.message_generator.generate(
                 perceived.state,
                 action.shared(detections),
                 now,

@@ -131,7 +131,6 @@ class Stations(DrivingStack):
         self._perceived: Mapping[str, StationPerception] = {}
         self._min_existence: dict[str, float] = {}
         self._agents: dict[str, Agent] = {}
-        self._drivers: frozenset[str] = frozenset()
         self._next_numbers: dict[str, int] = {}
         """Sequence number of the next message of each removed station."""
         self._receivers: dict[str, tuple[str, ...]] = {}
@@ -167,7 +166,7 @@ class Stations(DrivingStack):
 
     @property
     def drivers(self) -> frozenset[str]:
-        return self._drivers
+        return frozenset(self._overrides)
 
     @cached_property
     def possible_drivers(self) -> Collection[str]:
@@ -239,15 +238,13 @@ class Stations(DrivingStack):
             self._signal_sensors[spec.name] = SignalSensor(spec, context.roads, unread)
         if agent.controller is not None:
             self._overrides[spec.name] = ControlOverrides(spec, context.dt)
-            self._drivers |= {spec.name}
 
     def remove(self, name: str) -> None:
         self._receivers.clear()
         if name in self._agents:
-            self._next_numbers[name] = self._agents[name].next_message_number
+            self._next_numbers[name] = self._agents[name].message_generator.number
         for held in (self._agents, self._min_existence, self._rigs, self._signal_sensors, self._overrides):
             held.pop(name, None)
-        self._drivers -= {name}
 
     def request_channel(
         self, profile: str, *, source: str, line: int, scope: Scope | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -42,20 +43,32 @@ class StopPoint(NamedTuple):
     reason: str
 
 
+@dataclass
+class _Decision:
+    """State of the decision about one signal ahead.
+
+    distance        of its next stop line in the last tick [m]
+    stops           whether the vehicle stops for the light; None: not decided
+    yellow_since    time at which the light was first seen in yellow [s]; None in another state
+    standing_since  time at which the vehicle stopped at the sign [s]; None before
+    is_served       whether the vehicle has waited at the sign
+    """
+
+    distance: float
+    stops: bool | None = None
+    yellow_since: float | None = None
+    standing_since: float | None = None
+    is_served: bool = False
+
+
 class SignalStops:
     """Stops for traffic lights and stop signs. At a stop sign the vehicle waits and continues, regardless of others."""
 
     def __init__(self, roads: RoadNetwork | None, spec: ActorSpec) -> None:
         self.signals = SignalsAhead(roads)
         self._front = spec.offset[0] + spec.size[0] / 2.0
-        self._stopping: set[str] = set()
-        self._too_late: set[str] = set()
-        self._yellow_since: dict[str, float] = {}
-        """Time at which each light was first seen in yellow [s], until another state."""
-        self._standing_since: dict[str, float] = {}
-        self._served: set[str] = set()
-        self._distances: dict[str, float] = {}
-        """Last distance of the next stop line of each signal [m]."""
+        self._decisions: dict[str, _Decision] = {}
+        """By the id of the signal; a signal whose stop line has been passed has none."""
         self._path: Array = np.zeros((1, 2))
         self._along: Array = np.zeros(1)
 
@@ -71,25 +84,20 @@ class SignalStops:
         ahead: dict[str, SignalAhead] = {}
         for signal in self.signals.ahead(along):
             ahead.setdefault(signal.signal, signal)
-        for name, before in self._distances.items():
-            if name not in ahead or ahead[name].distance > before + ANOTHER:
-                self._forget(name)
-        self._distances = {name: signal.distance for name, signal in ahead.items()}
-        for signal in ahead.values():
+        self._decisions = {
+            name: decision
+            for name, decision in self._decisions.items()
+            if name in ahead and ahead[name].distance <= decision.distance + ANOTHER
+        }
+        for name, signal in ahead.items():
+            decision = self._decisions.setdefault(name, _Decision(signal.distance))
+            decision.distance = signal.distance
             left = signal.distance - self._front - BEFORE_LINE
-            holds = self._light_holds if signal.kind == "light" else self._sign_holds
-            if holds(signal, left, speed, now) and stop is None:
+            holds = _light_holds if signal.kind == "light" else _sign_holds
+            if holds(signal, decision, left, speed, now) and stop is None:
                 what = "traffic light" if signal.kind == "light" else "stop sign"
-                stop = StopPoint(along + max(left, 0.0), f"stop at {what} {signal.signal}")
+                stop = StopPoint(along + max(left, 0.0), f"stop at {what} {name}")
         return stop
-
-    def _forget(self, name: str) -> None:
-        """Delete the state of a signal that the vehicle has passed."""
-        self._stopping.discard(name)
-        self._too_late.discard(name)
-        self._yellow_since.pop(name, None)
-        self._served.discard(name)
-        self._standing_since.pop(name, None)
 
     def limits(self, stop: StopPoint, part: slice) -> Array:
         """Return the maximum speeds at points of the path with which the vehicle stops there [m/s]."""
@@ -102,37 +110,35 @@ class SignalStops:
         ahead: float = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
         return float(self._along[index]) + min(max(ahead, 0.0), length)
 
-    def _light_holds(self, light: SignalAhead, left: float, speed: float, now: float) -> bool:
-        """Return whether a light holds the vehicle. It decides when a phase begins, and keeps this decision."""
-        name = light.signal
-        if not light.is_yellow and self._yellow_since.pop(name, None) is not None:
-            self._too_late.discard(name)  # a vehicle that meant to pass at yellow may still be able to stop at red
-        if not light.must_stop:
-            self._stopping.discard(name)
-            self._too_late.discard(name)
-            return False
-        if name not in self._stopping and name not in self._too_late:
-            remaining = 0.0
-            if light.is_yellow:
-                remaining = yellow_time(speed) - (now - self._yellow_since.setdefault(name, now))
-            can_stop = can_stop_for_light(left, speed, passes_in_time=left + BEFORE_LINE <= speed * remaining)
-            if can_stop or speed < STANDING:
-                self._stopping.add(name)
-            else:
-                self._too_late.add(name)
-        return name in self._stopping
 
-    def _sign_holds(self, sign: SignalAhead, left: float, speed: float, now: float) -> bool:
-        name = sign.signal
-        if not sign.must_stop or name in self._served:
-            return False
-        if speed < STANDING and left < AT_LINE:
-            since = self._standing_since.setdefault(name, now)
-            if now - since >= WAIT - TIME_TOLERANCE:
-                del self._standing_since[name]
-                self._served.add(name)
-                return False
-        return True
+def _light_holds(light: SignalAhead, decision: _Decision, left: float, speed: float, now: float) -> bool:
+    """Return whether a light holds the vehicle. It decides when a phase begins, and keeps this decision."""
+    if not light.is_yellow and decision.yellow_since is not None:
+        decision.yellow_since = None
+        # A vehicle that meant to pass at yellow may still be able to stop at red.
+        decision.stops = decision.stops or None
+    if not light.must_stop:
+        decision.stops = None
+        return False
+    if decision.stops is None:
+        remaining = 0.0
+        if light.is_yellow:
+            if decision.yellow_since is None:
+                decision.yellow_since = now
+            remaining = yellow_time(speed) - (now - decision.yellow_since)
+        can_stop = can_stop_for_light(left, speed, passes_in_time=left + BEFORE_LINE <= speed * remaining)
+        decision.stops = can_stop or speed < STANDING
+    return decision.stops
+
+
+def _sign_holds(sign: SignalAhead, decision: _Decision, left: float, speed: float, now: float) -> bool:
+    if not sign.must_stop or decision.is_served:
+        return False
+    if speed < STANDING and left < AT_LINE:
+        if decision.standing_since is None:
+            decision.standing_since = now
+        decision.is_served = now - decision.standing_since >= WAIT - TIME_TOLERANCE
+    return not decision.is_served
 
 
 def yellow_time(speed: float) -> float:

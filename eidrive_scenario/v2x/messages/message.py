@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -18,7 +18,6 @@ from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 Payload = PointCloud | FeatureFrame
 """Sensor data of the sender in a message."""
-_Payload = TypeVar("_Payload", PointCloud, FeatureFrame)
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
 """State of a line of sight: free, blocked by vehicles only, or by a building or the ground (3GPP TR 37.885, 6.2.1)."""
@@ -128,14 +127,14 @@ def shift_timestamps(message: Message, error: float) -> Message:
     """
     if error == 0.0:
         return message
+    points, features = (
+        None if payload is None else dataclasses.replace(payload, time=payload.time + error)
+        for payload in (message.points, message.features)
+    )
     return replace(
         message,
         detections=replace(message.detections, time=message.detections.time + error),
         state=replace(message.state, time=message.state.time + error),
-        points=_shift_payload(message.points, error),
-        features=_shift_payload(message.features, error),
+        points=points,
+        features=features,
     )
-
-
-def _shift_payload(payload: _Payload | None, error: float) -> _Payload | None:
-    return None if payload is None else dataclasses.replace(payload, time=payload.time + error)

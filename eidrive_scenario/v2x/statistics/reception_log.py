@@ -42,12 +42,7 @@ class AgeOfInformation:
 
     def resize(self, links: int) -> None:
         """Extend the state to this number of links."""
-        more = links - len(self._floor)
-        self._floor = np.concatenate([self._floor, np.full(more, np.nan)])
-        self._time, self._area, self._peaks = (
-            np.concatenate([values, np.zeros(more)]) for values in (self._time, self._area, self._peaks)
-        )
-        self._updates = np.concatenate([self._updates, np.zeros(more, dtype=np.int64)])
+        _extend_fields(self, links, _floor=np.nan, _time=0.0, _area=0.0, _peaks=0.0, _updates=0)
 
     def record_updates(self, links: Integers, floors: Array, peaks: Array) -> None:
         """Add updates (K,), sorted by link and then by time.
@@ -235,22 +230,14 @@ class ReceptionLog:
         arrived = np.array([entry[0] for entry in received], dtype=float)
         delay = arrived - np.array([entry[3] for entry in received], dtype=float)
         self._pending, self._number = [], 0
-        self._resize()
+        _extend_fields(
+            self, self._count, _received=0, _delay_sum=0.0, _delay_max=0.0, _newest=-np.inf, _newest_present=-np.inf
+        )
+        self._ages.resize(self._count)
         np.add.at(self._received, codes, 1)
         np.add.at(self._delay_sum, codes, delay)
         np.maximum.at(self._delay_max, codes, delay)
         self._record_ages(codes, generated, arrived)
-
-    def _resize(self) -> None:
-        more = self._count - len(self._received)
-        self._received = np.concatenate([self._received, np.zeros(more, dtype=np.int64)])
-        self._delay_sum, self._delay_max = (
-            np.concatenate([a, np.zeros(more)]) for a in (self._delay_sum, self._delay_max)
-        )
-        self._newest, self._newest_present = (
-            np.concatenate([a, np.full(more, -np.inf)]) for a in (self._newest, self._newest_present)
-        )
-        self._ages.resize(self._count)
 
     def _record_ages(self, codes: Integers, generated: Array, arrived: Array) -> None:
         """Update the age of information with messages that are newer than all earlier ones of their link."""
@@ -261,6 +248,13 @@ class ReceptionLog:
         self._ages.record_updates(codes[fresh], (arrived - generated)[fresh], (arrived - before)[fresh])
         np.maximum.at(self._newest, codes, generated)
         np.maximum.at(self._newest_present, codes, generated)
+
+
+def _extend_fields(owner: object, count: int, **fresh: float) -> None:
+    """Extend arrays of an object to this length, given by attribute with the value of the new entries."""
+    for field, value in fresh.items():
+        values = getattr(owner, field)
+        setattr(owner, field, np.concatenate([values, np.full(count - len(values), value, values.dtype)]))
 
 
 def _largest_before(groups: Integers, values: Array) -> Array:
