@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from msgspec.structs import replace
@@ -115,24 +114,23 @@ class MessageGenerator:
             if etsi and interval > 0.0 and now - max(self._last_generated.values()) < interval - EQUAL:
                 break
             shortest = max(interval, SHORTEST)
-            messages = []
-            if kind == "cam":
-                if not etsi or self._cam_rules.is_due(state, now, shortest):
-                    low = self._cam_rules.low_frequency(now)
-                    own = own_body(self._spec, state)
-                    messages = [self._message(state, own, now, cam_size(low), low_frequency=low, kind="cam")]
-            elif etsi:
-                messages = self._triggered_cpms(state, detections, now, shortest)
-            else:  # an empty CPM states that no object is in sight
-                size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
-                messages = [self._message(state, detections, now, size, listed=self._sensors, sensors=self._view)]
-            if messages and kind == "cpm":
+            messages: list[Message] = []
+            if kind == "cpm":
+                if etsi:
+                    messages = self._triggered_cpms(state, detections, now, shortest)
+                else:  # an empty CPM states that no object is in sight
+                    messages = [self._message(state, detections, now, lists_sensors=True)]
+            elif not etsi or self._cam_rules.is_due(state, now, shortest):
+                low = self._cam_rules.low_frequency(now)
+                messages = [self._message(state, own_body(self._spec, state), now, "cam", low_frequency=low)]
+            if not messages:
+                continue
+            if kind == "cpm":
                 messages += self._feature_messages(state, now, payloads)
                 for points in payloads:
                     if isinstance(points, PointCloud):
                         messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
-            if messages:
-                self._last_generated[kind] = now
+            self._last_generated[kind] = now
             generated += messages
         if self._offset > 0.0:
             generated = [replace(message, offset=self._offset) for message in generated]
@@ -176,24 +174,17 @@ class MessageGenerator:
         contents = self._cpm_rules.contents(detections, numbers, now, shortest)
         if contents is None:
             return []
-        security, mtu = self._settings.security_bytes, self._settings.mtu
-        sensors = self._sensors if contents.sensors else 0
-        rows = list(contents.rows)
+        lists_sensors, rows = contents.sensors and self._sensors > 0, list(contents.rows)
         generated: list[Message] = []
         while rows or not generated:
-            room = objects_that_fit(mtu, sensors, security)
+            sensors = self._sensors if lists_sensors else 0
+            room = objects_that_fit(self._settings.mtu, sensors, self._settings.security_bytes)
             part, rows = rows[:room], rows[room:]
-            message = self._message(
-                state,
-                detections.subset(part),
-                now,
-                cpm_size(len(part), sensors, security),
-                listed=sensors,
-                objects=tuple(numbers[row] for row in part),
-                sensors=self._view if sensors else None,
+            objects = tuple(numbers[row] for row in part)
+            generated.append(
+                self._message(state, detections.subset(part), now, objects=objects, lists_sensors=lists_sensors)
             )
-            generated.append(message)
-            sensors = 0
+            lists_sensors = False
         return generated
 
     def _message(
@@ -201,36 +192,35 @@ class MessageGenerator:
         state: StationState,
         detections: Detections,
         now: float,
-        size: int,
+        kind: Literal["cpm", "cam"] = "cpm",
         *,
-        listed: int = 0,
+        objects: tuple[int, ...] | None = None,
+        lists_sensors: bool = False,
         low_frequency: bool = False,
-        **fields: Any,
     ) -> Message:
         """Return the next message, with the size of its encoding if there is an encoder.
 
-        listed  number of sensors in it;  low_frequency  whether it has the low-frequency container of CAMs
+        lists_sensors  whether a CPM has sensor information;  low_frequency  whether a CAM has that container
         """
-        message = Message(self._spec.name, self.number, now, state, detections, size, **fields)
+        sensors, security = self._sensors if lists_sensors else 0, self._settings.security_bytes
+        size = cam_size(low_frequency) if kind == "cam" else cpm_size(len(detections), sensors, security)
+        view = self._view if lists_sensors else None
+        message = Message(self._spec.name, self.number, now, state, detections, size, kind, objects, sensors=view)
         self.number += 1
         if self._encoder is None:
             return message
-        encoded = self._encoder.encode(message, sensors=listed, low_frequency=low_frequency)
-        return replace(message, size=len(encoded) + self._settings.security_bytes)
+        encoded = self._encoder.encode(message, sensors=sensors, low_frequency=low_frequency)
+        return replace(message, size=len(encoded) + security)
 
 
 def own_body(spec: ActorSpec, state: StationState) -> Detections:
     """Return the detection of a station at its transmitted state."""
     cos, sin = math.cos(state.yaw), math.sin(state.yaw)
     ahead, aside, up = spec.offset
-    center: Sequence[float] = (
-        state.x + cos * ahead - sin * aside,
-        state.y + sin * ahead + cos * aside,
-        state.z + up,
-    )
+    x, y = state.x + cos * ahead - sin * aside, state.y + sin * ahead + cos * aside
     return Detections(
         state.time,
-        np.array([[*center, *spec.size, state.yaw]]),
+        np.array([[x, y, state.z + up, *spec.size, state.yaw]]),
         np.ones(1),
         (spec.category,),
         np.array([[state.speed * cos, state.speed * sin]]),
