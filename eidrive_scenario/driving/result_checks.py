@@ -36,7 +36,12 @@ def check_plan(planner: Planner, plan: object) -> None:
         shapes = f"points of shape {points.shape} and speeds of shape {speeds.shape}"
         raise InvalidResult(planner, "plan", f"returned {shapes} (expected (M, 2) and (M,), M at least 2)")
     try:
-        if _is_in_range(plan):
+        if (  # each comparison is False for NaN
+            are_within(points, LARGEST)
+            and are_within(speeds, FASTEST)
+            and abs(plan.acceleration) <= FASTEST
+            and (plan.braking is None or abs(plan.braking) <= FASTEST)
+        ):
             return
     except (TypeError, ValueError, AttributeError):
         pass
@@ -78,13 +83,3 @@ def check_control(controller: VehicleController, method: str, control: object) -
         raise InvalidResult(controller, method, f"returned {describe(control)} (expected Control)")
     pedals: dict[str, object] = {"throttle": control.throttle, "brake": control.brake, "steering": control.steering}
     raise_not_finite(controller, method, pedals)
-
-
-def _is_in_range(plan: Plan) -> bool:
-    """Return True if all numbers of a plan are in their ranges; each comparison is False for NaN."""
-    return bool(
-        are_within(plan.points, LARGEST)
-        and are_within(plan.speeds, FASTEST)
-        and abs(plan.acceleration) <= FASTEST
-        and (plan.braking is None or abs(plan.braking) <= FASTEST)
-    )

@@ -30,9 +30,6 @@ class AverageFusion(FusionMethod):
 
     is_finite_by_construction: ClassVar[bool] = True
 
-    def __init__(self, gate: float = GATE) -> None:
-        self.gate = gate
-
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
         ordered = sorted(reports, key=lambda report: report.station) if len(reports) > 1 else reports
         present = [report.detections for report in ordered if len(report.detections)]
@@ -43,28 +40,29 @@ class AverageFusion(FusionMethod):
             if only.time == now:
                 return only
             return replace(only, time=now)
-        labels = self._labels(present)
+        labels = _label_objects(present)
         fused = fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
         return replace(fused, existence=joint_existence(present, labels))
 
-    def _labels(self, reports: Sequence[Detections]) -> list[int]:
-        """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""
-        means, counts = reports[0].boxes[:, :3].copy(), np.ones(len(reports[0]))
-        labels = list(range(len(means)))
-        for report in reports[1:]:
-            centers = report.boxes[:, :3]
-            label = np.full(len(centers), -1)
-            for known_object, box in associate(means, centers, self.gate):
-                label[box] = known_object
-                counts[known_object] += 1.0
-                means[known_object] += (centers[box] - means[known_object]) / counts[known_object]
-            fresh = np.flatnonzero(label < 0)
-            label[fresh] = len(means) + np.arange(len(fresh))
-            means, counts = np.concatenate([means, centers[fresh]]), np.append(counts, np.ones(len(fresh)))
-            labels += label.tolist()
-        return labels
+
+def _label_objects(reports: Sequence[Detections]) -> list[int]:
+    """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""
+    means, counts = reports[0].boxes[:, :3].copy(), np.ones(len(reports[0]))
+    labels = list(range(len(means)))
+    for report in reports[1:]:
+        centers = report.boxes[:, :3]
+        label = np.full(len(centers), -1)
+        for known_object, box in associate(means, centers, GATE):
+            label[box] = known_object
+            counts[known_object] += 1.0
+            means[known_object] += (centers[box] - means[known_object]) / counts[known_object]
+        fresh = np.flatnonzero(label < 0)
+        label[fresh] = len(means) + np.arange(len(fresh))
+        means, counts = np.concatenate([means, centers[fresh]]), np.append(counts, np.ones(len(fresh)))
+        labels += label.tolist()
+    return labels
 
 
 def joint_existence(reports: Sequence[Detections], labels: Sequence[int]) -> Array:

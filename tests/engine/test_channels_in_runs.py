@@ -108,7 +108,7 @@ def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
         load_for_seed(path, 1, {}), seed=1, settings=RunSettings(channel="ideal"), observers=[shared]
     )
     assert isinstance(simulation.stack, Stations)
-    simulation.stack._channel.active = SharedMemory()
+    simulation.stack._channel.active = simulation.stack._channel._last = SharedMemory()
     simulation.run()
     assert shared.motion == collector.motion
     assert shared.known == collector.known
@@ -117,7 +117,7 @@ def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
 def test_channel_that_cannot_continue_another_is_error_with_line() -> None:
     with Simulation(load_for_seed(ONE, 1, {}), seed=1) as simulation:
         assert isinstance(simulation.stack, Stations)
-        simulation.stack._channel.active = SharedMemory()
+        simulation.stack._channel.active = simulation.stack._channel._last = SharedMemory()
         with pytest.raises(SettingError, match=r"a\.xosc:7: ComposedChannel cannot continue .* of SharedMemory"):
             simulation.stack.request_channel("ideal", source="a.xosc", line=7)
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import SettingError
+import numpy as np
+
+from eidrive_scenario.errors import InvalidResult, SettingError
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.v2x.channel import (
-    Channel,
-    OutgoingMessage,
-    check_delivered,
-    check_events,
-    check_interval,
-    check_statistics,
-)
+from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -38,8 +34,8 @@ class RunChannel:
         self.name = NO_COOPERATION
         self.profile: ChannelProfile | None = None
         self._seed = seed
-        self._retired: Channel | None = None
-        """The last channel after cooperation was switched off: its statistics remain part of the result."""
+        self._last: Channel | None = None
+        """The last channel, whose statistics remain part of the result after cooperation is switched off."""
         self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
         """Time and value of the last statistics: those of many links are expensive."""
         self._expired: Counter[tuple[str, str]] = Counter()
@@ -53,12 +49,11 @@ class RunChannel:
         Raise SettingError, with origin and line, if the profile is invalid or cannot continue the channel.
         """
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
-        before = self.active or self._retired
         try:
-            self.active = build_channel(profile, self._seed, previous=before)
+            self.active = build_channel(profile, self._seed, previous=self._last)
         except SettingError as error:
             raise error.at(origin, line) from error
-        self._retired = before if self.active is None else None
+        self._last = self.active or self._last
         self._statistics = None
         self.profile = profile
         self.name = profile.name if profile is not None else NO_COOPERATION
@@ -78,16 +73,25 @@ class RunChannel:
         """Return the minimum time between two messages of a station under congestion control [s]."""
         if self.active is None:
             return 0.0
-        interval = self.active.min_message_interval(sender)
-        check_interval(self.active, interval)
-        return interval
+        interval: object = self.active.min_message_interval(sender)
+        if not isinstance(interval, _NUMBER) or not 0.0 <= interval < math.inf:
+            raise _invalid(self.active, "min_message_interval", interval, "a finite number of at least 0 s")
+        return float(interval)
 
     def deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
         """Return the messages that a station has received since the last call."""
         if self.active is None:
             return ()
-        delivered = self.active.deliver(receiver, now)
-        check_delivered(self.active, delivered, now)
+        delivered: Any = self.active.deliver(receiver, now)
+        if not isinstance(delivered, tuple | list):
+            raise _invalid(self.active, "deliver", delivered, "a tuple of ReceivedMessage")
+        for received in delivered:
+            if not isinstance(received, ReceivedMessage):
+                raise _invalid(self.active, "deliver", received, "a ReceivedMessage")
+            arrived: Any = received.arrived
+            if not isinstance(arrived, _NUMBER) or not -math.inf < arrived <= now + 1e-6:
+                text = f"returned a message that arrived at {arrived!r} (expected a time up to {now:g} s)"
+                raise InvalidResult(self.active, "deliver", text)
         return delivered
 
     def count_expired(self, sender: str, receiver: str) -> None:
@@ -98,33 +102,39 @@ class RunChannel:
         """Transmit messages to their receivers; return the outcomes that are known."""
         if self.active is None:
             return ()
-        events = self.active.transmit(outbox, now)
         self._statistics = None
-        return _checked_events(self.active, events)
+        return _checked_events(self.active, self.active.transmit(outbox, now))
 
     def final_links(self) -> Sequence[LinkEvent]:
         """Return the outcomes that no `transmit` has returned."""
-        channel = self.active or self._retired
-        return () if channel is None else _checked_events(channel, channel.drain_events())
+        return () if self._last is None else _checked_events(self._last, self._last.drain_events())
 
     def metrics(self, now: float) -> dict[str, float]:
         """Return the counts of messages over all links; nothing if there was never a channel."""
-        if self.active is None and self._retired is None:
-            return {}
-        return message_counts(self.link_statistics(now).values())
+        return {} if self._last is None else message_counts(self.link_statistics(now).values())
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         """Return the statistics by sender and receiver."""
-        channel = self.active or self._retired
-        if channel is None:
+        if self._last is None:
             return {}
         if self._statistics is None or self._statistics[0] != now:
-            statistics = channel.statistics(now)
-            check_statistics(channel, statistics)
+            statistics: object = self._last.statistics(now)
+            if not isinstance(statistics, Mapping):
+                raise _invalid(self._last, "statistics", statistics, "a mapping by sender and receiver")
             self._statistics = now, with_expired(statistics, self._expired)
         return self._statistics[1]
 
 
-def _checked_events(channel: Channel, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:
-    check_events(channel, events)
-    return events if isinstance(events, LinkEvents) else tuple(events)
+_NUMBER = int | float | np.integer | np.floating
+
+
+def _invalid(channel: Channel, method: str, result: object, expected: str) -> InvalidResult:
+    return InvalidResult(channel, method, f"returned {result!r} (expected {expected})")
+
+
+def _checked_events(channel: Channel, events: Any) -> Sequence[LinkEvent]:
+    if isinstance(events, LinkEvents):
+        return events
+    if not isinstance(events, Sequence) or not all(isinstance(event, LinkEvent) for event in events):
+        raise _invalid(channel, "transmit", events, "a sequence of LinkEvents")
+    return tuple(events)

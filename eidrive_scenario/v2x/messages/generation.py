@@ -216,16 +216,14 @@ class ObjectIdAssigner:
         now = detections.time
         self._earlier = {number: last for number, last in self._earlier.items() if now - last[0] <= RETENTION}
         positions = detections.boxes[:, :2]
-        assigned: list[int | None] = [None] * len(detections)
+        expected = np.array(
+            [(x + vx * (now - time), y + vy * (now - time)) for time, x, y, vx, vy in self._earlier.values()]
+        )
         ids = list(self._earlier)
-        if ids:
-            expected = np.array(
-                [(x + vx * (now - time), y + vy * (now - time)) for time, x, y, vx, vy in self._earlier.values()]
-            )
-            for row, column in associate(positions, expected, GATE):
-                assigned[row] = ids[column]
+        id_of = {row: ids[column] for row, column in associate(positions, expected, GATE)}
         numbers = []
-        for row, number in enumerate(assigned):
+        for row in range(len(detections)):
+            number = id_of.get(row)
             if number is None:
                 number, self._next = self._next, self._next + 1
             x, y = positions[row].tolist()

@@ -23,7 +23,6 @@ from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import DroppedBlock, LinkCounterTable, ReceptionBlock
-from eidrive_scenario.v2x.radio.jamming import ENERGY_DETECTION_DBM, jamming_power
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
@@ -31,6 +30,9 @@ from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.statistics.link_statistics import ABSENT, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import queue_entry
+
+ENERGY_DETECTION_DBM = -65.0
+"""Power of any signal from which a station senses a busy channel of 10 MHz [dBm] (IEEE 802.11-2012, 18.3.10.6)."""
 
 
 class RadioChannel(QueuedChannel):
@@ -82,14 +84,7 @@ class RadioChannel(QueuedChannel):
         self._budget = None
         if not self.profile.jammers:
             return
-        profile = self.profile
-        self._jamming = jamming_power(
-            profile.jammers,
-            profile.path_loss,
-            surroundings.positions,
-            frequency_ghz=profile.frequency_ghz,
-            gain_dbi=profile.antenna_gain_dbi,
-        )
+        self._jamming = self.profile.jamming_power(surroundings.positions)
         senses = self._jamming >= 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
         self._jammed = frozenset(surroundings.names[row] for row in np.flatnonzero(senses).tolist())
 

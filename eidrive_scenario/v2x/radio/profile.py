@@ -17,7 +17,6 @@ from eidrive_scenario.v2x.link_models.composed import ComposedProfile
 from eidrive_scenario.v2x.propagation import Fading, LinkGeometry, NoFading, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
-from eidrive_scenario.v2x.radio.jamming import Jammer
 from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
 from eidrive_scenario.v2x.standards import (
     ANTENNA_HEIGHT,
@@ -164,6 +163,22 @@ def _one_curve(value: Any) -> Any:
     return {"los": value, "nlosv": value, "nlos": value} if isinstance(value, str) else value
 
 
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class Jammer(Settings):
+    """Continuous noise in the 10 MHz of the channel, from a fixed place. It blocks carrier sensing, too.
+
+    x, y, z    place of its antenna in the world frame [m]
+    power_dbm  radiated power with the gain of its antenna (EIRP) [dBm]
+    """
+
+    x: Coordinate
+    y: Coordinate
+    z: Annotated[float, Field(ge=0.0, le=1000.0)] = 1.5
+    power_dbm: Annotated[float, Field(ge=-30.0, le=80.0)] = 30.0
+
+
 class RadioProfile(ComposedProfile):
     """Settings of a radio channel; `delay` and `loss` apply in addition to the radio model.
 
@@ -277,3 +292,14 @@ class RadioProfile(ComposedProfile):
         between = LinkGeometry.in_sight(table.distance, heights, heights)
         los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(len(heights), 0.5))
         return table, np.maximum.accumulate(los_loss)
+
+    def jamming_power(self, positions: Array) -> Array:
+        """Return the power (N,) [mW] that antennas at `positions` (N, 3) receive from all jammers, in line of sight."""
+        total = np.zeros(len(positions))
+        for jammer in self.jammers:
+            antenna = np.array([jammer.x, jammer.y, jammer.z])
+            heights, distance = positions[:, 2], np.linalg.norm(positions - antenna, axis=1)
+            between = LinkGeometry.in_sight(distance, np.minimum(heights, jammer.z), np.maximum(heights, jammer.z))
+            loss = self.path_loss.loss(between, self.frequency_ghz, np.full(len(positions), 0.5))
+            total += 10.0 ** ((jammer.power_dbm + self.antenna_gain_dbi - loss) / 10.0)
+        return total

@@ -9,28 +9,26 @@ import pytest
 from pydantic import ValidationError
 from radio_traffic import DT, QUIET, exchange, message, radio
 
-from eidrive_scenario.v2x.propagation import LogDistance
-from eidrive_scenario.v2x.radio.jamming import Jammer, jamming_power
+from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 FREE = {"path_loss": {"kind": "log_distance", "exponent": 2.0}, "shadowing_db": 0, "line_of_sight": "clear"}
-LOSS = LogDistance(kind="log_distance", exponent=2.0)
 PLACES = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}
 
 
-def jammer(x: float, power: float) -> dict[str, object]:
+def jammer(x: float, power: float) -> dict[str, list[dict[str, float]]]:
     return {"jammers": [{"x": x, "y": 0.0, "power_dbm": power}]}
 
 
 def test_received_power_is_that_of_friis_and_adds_up() -> None:
     """20 lg(4 pi d f / c) with c = 3e8 m/s: 87.86 dB at 100 m and 5.9 GHz."""
     positions = np.array([[100.0, 0.0, 1.5], [200.0, 0.0, 1.5]])
-    one = jamming_power([Jammer(x=0.0, y=0.0, power_dbm=33.0)], LOSS, positions, frequency_ghz=5.9, gain_dbi=3.0)
+    one = RadioProfile.model_validate({**FREE, **jammer(0.0, 33.0)}).jamming_power(positions)
     loss = 20.0 * math.log10(4.0 * math.pi * 100.0 * 5.9e9 / 3e8)
     assert 10.0 * math.log10(one[0]) == pytest.approx(33.0 + 3.0 - loss)
     assert one[0] / one[1] == pytest.approx(4.0)
-    two = [Jammer(x=0.0, y=0.0, power_dbm=33.0)] * 2
-    assert jamming_power(two, LOSS, positions, frequency_ghz=5.9, gain_dbi=3.0) == pytest.approx(2.0 * one)
+    two = {"jammers": 2 * jammer(0.0, 33.0)["jammers"]}
+    assert RadioProfile.model_validate({**FREE, **two}).jamming_power(positions) == pytest.approx(2.0 * one)
 
 
 @pytest.mark.parametrize("stations", [2, 6])
