@@ -188,6 +188,15 @@ def test_conflict_area_off_the_road_is_reported_by_run_and_check(make: Make, are
     assert all(f"{path}:{line}: " in warning for warning in warnings)
 
 
+def test_conflict_area_beside_other_planner_settings_is_reported_with_its_own_line(make: Make) -> None:
+    others = '<Property name="planner_settings" value="{min_existence: 0.4}"/>\n'
+    area = '<Property name="conflict_area" value="[29.0, 32.0, {}]"/>'
+    path = make((area.format("4.5, 10.5"), others + area.format("204.5, 210.5")))
+    (warning,) = ours(run_file(path, settings=RunSettings(time_limit=0.3)).warnings)
+    line = next(n for n, text in enumerate(path.read_text().splitlines(), 1) if '"conflict_area" value' in text)
+    assert warning.startswith(f"{path}:{line}: ")
+
+
 def test_warnings_are_in_json_and_on_standard_error(make: Make) -> None:
     path = make((BEFORE, f"{maneuver('Never', 90)}{BEFORE}"))
     plain = CliRunner().invoke(app, ["run", str(path)])
