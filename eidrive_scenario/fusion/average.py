@@ -117,12 +117,9 @@ def _mean_entry(entries: Sequence[_Entry]) -> _Entry:
     boxes, scores, classes, velocity, covariance = zip(*entries, strict=True)
     box = _mean(boxes)
     box[6] = _mean_yaw([box[6] for box in boxes])
-    return box, sum(scores) / len(scores), _most_frequent(classes), _mean_of_known(velocity), _mean_of_known(covariance)
-
-
-def _most_frequent(words: Sequence[str]) -> str:
-    """Return the most frequent word, the first one among equals."""
-    return Counter(words).most_common(1)[0][0] if len(words) > 2 else words[0]
+    # The first class among equally frequent ones.
+    name = Counter(classes).most_common(1)[0][0] if len(classes) > 2 else classes[0]
+    return box, sum(scores) / len(scores), name, _mean_of_known(velocity), _mean_of_known(covariance)
 
 
 def _mean_yaw(yaws: Sequence[float]) -> float:

@@ -195,17 +195,13 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         arrived = self._received.get(station)
         if arrived is not None and len(detections) and arrived.time >= report.arrived - self.max_payload_age:
             rows = np.flatnonzero(~self._covered(arrived, detections.boxes[:, :2])).tolist()
-            report = self._aligned(report)
+            # By all of its boxes: those without features are too few, as most are not shared.
+            alignment = self._alignment(report)
+            if alignment is not None and alignment.is_corrected:
+                # Errors of successive corrections are independent at most.
+                report = replace(aligned_report(report, alignment), pose_change=2.0 * alignment.covariance)
             report = replace(report, detections=report.detections.subset(rows))
         super().add_report(report)
-
-    def _aligned(self, report: Report) -> Report:
-        """Return a report aligned by all of its boxes: those without features are too few, as most are not shared."""
-        alignment = self._alignment(report)
-        if alignment is None or not alignment.is_corrected:
-            return report
-        # Errors of successive corrections are independent at most.
-        return replace(aligned_report(report, alignment), pose_change=2.0 * alignment.covariance)
 
     def _alignment(self, report: Report | None) -> PoseAlignment | None:
         """Return the pose of a sender, aligned to the objects in the own features; None if the pose is not aligned."""

@@ -232,8 +232,11 @@ def _update(old: Table, new: Table) -> Table:
     still, measured = ~new["moving"], new["measured"]
     if still.any():
         # The existence probability of a tracking station includes its past; other reports are independent.
-        given = new[still]
-        after["existence"][still] = np.where(given["judged"], given["existence"], _existence_after(old[still], given))
+        given, before = new[still], old[still]
+        spread = before["covariance"][:, :2, :2] + given["covariance"][:, :2, :2]
+        squared, determinant = squared_mahalanobis(given["mean"][:, :2] - before["mean"][:, :2], spread)
+        existence = detected(before["existence"], likelihood_ratio(squared, determinant, given["score"]))
+        after["existence"][still] = np.where(given["judged"], given["existence"], existence)
         after["moving"][still] = True
     for rows, size in ((still, 2), (measured, 4)):
         if rows.any():
@@ -248,14 +251,6 @@ def _update(old: Table, new: Table) -> Table:
     after["weight"] = total
     after["votes"] = old["votes"] + new["votes"]
     return after
-
-
-def _existence_after(old: Table, new: Table) -> Array:
-    """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.association`."""
-    spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
-    offset = new["mean"][:, :2] - old["mean"][:, :2]
-    squared, determinant = squared_mahalanobis(offset, spread)
-    return detected(old["existence"], likelihood_ratio(squared, determinant, new["score"]))
 
 
 def _kalman_update(old: Table, new: Table, size: int) -> tuple[Array, Array]:

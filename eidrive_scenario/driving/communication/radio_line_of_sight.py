@@ -9,7 +9,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World
@@ -91,7 +90,10 @@ def line_of_sight_states(
     if grounds:
         below = np.array([grounds.get(name, 0.0) for name in places])
         begin, end = points[first[lines]], points[second[lines]]
-        share = _share_of_line(begin[:, :2], end[:, :2], view.centers[rows, :2])
+        # Share of the line in plan view at the place nearest to the body.
+        step, offset = end[:, :2] - begin[:, :2], view.centers[rows, :2] - begin[:, :2]
+        length = np.maximum(np.einsum("ni,ni->n", step, step), 1e-9)
+        share = np.clip(np.einsum("ni,ni->n", offset, step) / length, 0.0, 1.0)
         tops -= below[first[lines]] * (1.0 - share) + below[second[lines]] * share
     blocking: dict[int, list[str]] = {}
     for line, row, top in zip(lines.tolist(), rows.tolist(), tops.tolist(), strict=True):
@@ -103,11 +105,3 @@ def line_of_sight_states(
     states[[*blocking]] = NLOSV
     states[crossed.scenery < 1.0] = NLOS
     return LineOfSightStates(states, heights, {line: tuple(names) for line, names in blocking.items()})
-
-
-def _share_of_line(begin: Array, end: Array, points: Array) -> Array:
-    """Return the share of the lines (M, 2) to (M, 2) at the places nearest to points (M, 2)."""
-    along = end - begin
-    length = np.maximum(np.einsum("ni,ni->n", along, along), 1e-9)
-    share: Array = np.clip(np.einsum("ni,ni->n", points - begin, along) / length, 0.0, 1.0)
-    return share

@@ -292,7 +292,11 @@ class ReportStore:
                 completed = self._without_own_body(message, self._partial[sender].update(message), pose_covariance)
             self.add(Report(station, detections, received.arrived, state, complete, pose_change), completed)
         if now > self._next_deletion:
-            self._delete_old(now)
+            ends = {station: self._end_of_life(held) for station, held in self._reports.items()}
+            for station, end in ends.items():
+                if end < now - TIME_TOLERANCE:
+                    del self._reports[station]
+            self._next_deletion = min((ends[station] for station in self._reports), default=math.inf)
         return tuple(expired)
 
     def add(self, report: Report, completed: Detections | None = None) -> None:
@@ -313,14 +317,6 @@ class ReportStore:
     def _end_of_life(self, report: Report) -> float:
         """Return the time up to which a report is stored [s], also if the clock of its sender is fast."""
         return min(report.detections.time, report.arrived) + self._lifetime
-
-    def _delete_old(self, now: float) -> None:
-        """Delete reports that exceed their lifetime."""
-        ends = {station: self._end_of_life(held) for station, held in self._reports.items()}
-        for station, end in ends.items():
-            if end < now - TIME_TOLERANCE:
-                del self._reports[station]
-        self._next_deletion = min((ends[station] for station in self._reports), default=math.inf)
 
     def _without_own_body(self, message: Message, detections: Detections, pose_covariance: Array | None) -> Detections:
         """Return detections of a message without the ego body."""

@@ -171,12 +171,19 @@ class RoutePlanner(Planner):
         return self._stops.next(self._stops.along(self._progress, x, y), ego.speed, now)
 
     def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
+        """Return the target speed [m/s]: that of the goal, of the settings, the speed limit of the lane, or the initial
+        speed."""
         if goal is not None and goal.speed is not None:
             return goal.speed
         if self.settings.target_speed is not None:
             return self.settings.target_speed
-        if self._follows_speed_limits(goal) and self.roads is not None:
-            return self._speed_limit(ego, self.roads)
+        if self.settings.follow_speed_limit and self.roads is not None:
+            x, y, _ = ego.position.tolist()
+            before = self._location
+            here = lane_below(self.roads, ego) if before is None else self.roads.locate_at(x, y, before)
+            limit = None if here is None else self.roads.speed_limit(here.road, here.s, here.lane)
+            self._location = here
+            return min(assumed_speed(limit), self.spec.max_speed)
         if self._first_speed is None:
             self._first_speed = max(ego.speed, 0.0)
         return self._first_speed
@@ -185,15 +192,6 @@ class RoutePlanner(Planner):
         """Return whether the speed limits of the road determine the target speed."""
         is_given = self.settings.target_speed is not None or (goal is not None and goal.speed is not None)
         return self.settings.follow_speed_limit and not is_given
-
-    def _speed_limit(self, ego: EgoState, roads: RoadNetwork) -> float:
-        """Return the speed limit of the lane at the vehicle [m/s], within the limit of the vehicle."""
-        x, y, _ = ego.position.tolist()
-        before = self._location
-        self._location = lane_below(roads, ego) if before is None else roads.locate_at(x, y, before)
-        here = self._location
-        limit = None if here is None else roads.speed_limit(here.road, here.s, here.lane)
-        return min(assumed_speed(limit), self.spec.max_speed)
 
     def _current_path(self, ego: EgoState, goal: Goal | None) -> PlannedPath:
         if self._path is not None and goal is self._goal:

@@ -20,12 +20,6 @@ UNITS = {"s": 1.0, "ms": 1e-3}
 """Factor from each unit to seconds."""
 
 
-def _seconds_or_file(schema: dict[str, Any]) -> None:
-    """State in the JSON schema that either of both is required."""
-    schema["required"] = ["kind"]
-    schema["anyOf"] = [{"required": ["seconds"]}, {"required": ["file"]}]
-
-
 class TraceDelay(Settings):
     """Measured delays.
 
@@ -37,7 +31,9 @@ class TraceDelay(Settings):
              trace repeats
     """
 
-    model_config = ConfigDict(json_schema_extra=_seconds_or_file)
+    model_config = ConfigDict(
+        json_schema_extra={"required": ["kind"], "anyOf": [{"required": ["seconds"]}, {"required": ["file"]}]}
+    )
 
     kind: Literal["trace"]
     seconds: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1, repr=False)]
