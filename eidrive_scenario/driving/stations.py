@@ -258,12 +258,9 @@ class Stations(DrivingStack):
 
     def perceive(self, world: World, view: WorldView, inputs: StackInputs) -> Mapping[str, StationPerception]:
         """Read all sensors, deliver messages, and let every agent perceive: once for each view."""
-        if view is not self._perceived_view:
-            self._perceived_view, self._perceived = view, self._perceive(world, view, inputs)
-        return self._perceived
-
-    def _perceive(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, StationPerception]:
-        self._readings = {}
+        if view is self._perceived_view:
+            return self._perceived
+        self._readings, self._perceived = {}, {}
         if not self._agents:
             return {}
         if self._channel.active is not None:
@@ -287,7 +284,8 @@ class Stations(DrivingStack):
         for name, perceived in sensed.items():
             for row in perceived.expired:
                 channel.count_expired(perceived.inbox[row].message.sender, name)
-        return fuse_reports(self._agents, sensed, now)
+        self._perceived_view, self._perceived = view, fuse_reports(self._agents, sensed, now)
+        return self._perceived
 
     def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
         """Let every agent act on what it perceives, with the actions from outside."""
@@ -314,11 +312,7 @@ class Stations(DrivingStack):
         """
         if self._channel.active is None:
             return ()
-        outbox = []
-        for sender, step in steps.items():
-            if step.outbox:
-                receivers = self._receivers_of(sender)
-                outbox += [(message, receivers) for message in step.outbox]
+        outbox = [(message, self._receivers_of(sender)) for sender, step in steps.items() for message in step.outbox]
         return self._channel.transmit(outbox, now)
 
     def _receivers_of(self, sender: str) -> tuple[str, ...]:

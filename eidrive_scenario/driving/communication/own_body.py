@@ -107,8 +107,7 @@ class OwnBody:
         if len(boxes) == 1 and math.hypot(boxes.item(0) - center_x, boxes.item(1) - center_y) > reach:
             return detections  # a single object that is far from all stored poses
         stored = self.at(detections.time)
-        detections = _without_bodies(detections, stored.trailers)
-        return _without_bodies(detections, [stored.body])
+        return without_rows(detections, rows_on_bodies(detections, [stored.body, *stored.trailers]))
 
     def without_perceived(
         self,
@@ -130,7 +129,8 @@ class OwnBody:
         pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
         """
         stored = self.at(detections.time)
-        detections = _without_bodies(detections, stored.trailers)
+        if stored.trailers:
+            detections = without_rows(detections, rows_on_bodies(detections, stored.trailers))
         inside = rows_on_bodies(detections, [stored.body])
         if not inside:
             row = self._likeliest_row(detections, station, state, own, pose_covariance)
@@ -176,10 +176,6 @@ class OwnBody:
             if not _explained(position, covariance, detections.time, cost, own):
                 best = cost, row
         return None if best is None else best[1]
-
-
-def _without_bodies(detections: Detections, bodies: Sequence[Outline]) -> Detections:
-    return without_rows(detections, rows_on_bodies(detections, bodies)) if bodies else detections
 
 
 def _explained(position: Array, covariance: Array, time: float, cost: float, own: Detections | None) -> bool:

@@ -188,7 +188,7 @@ class RadioChannel(QueuedChannel):
             self._fading.rearrange(names)
         for transmission in [*lost, *gone]:
             for receiver in transmission.receivers:
-                self._record_loss(transmission, receiver, ABSENT)
+                self._dropped.append(self._links.lose(transmission.message, receiver, transmission.sent, ABSENT))
 
     def _advance(self, now: float) -> None:
         """Simulate the medium up to `now`. Repeated calls at the same time have no effect."""
@@ -277,33 +277,20 @@ class RadioChannel(QueuedChannel):
     ) -> Integers:
         """Apply the additional loss model; return the rows of receivers without an additional loss."""
         remaining = []
-        sender = self._rows[transmission.message.sender]
+        message, sent = transmission.message, transmission.sent
         for row in rows.tolist():
-            distance = float(budget.distance[sender, row])
+            name, distance = budget.names[row], float(budget.distance[self._rows[message.sender], row])
             reason = None
             if causes[row] == DELIVERED:
-                reason = self._losses.reason(transmission.message, budget.names[row], transmission.sent, distance)
+                reason = self._losses.reason(message, name, sent, distance)
             if reason is None:
                 remaining.append(row)
             else:
-                self._record_loss(transmission, budget.names[row], reason, distance)
+                self._dropped.append(self._links.lose(message, name, sent, reason, distance))
         return np.array(remaining, dtype=np.int64)
 
     def _record_absent(self, transmission: Transmission, present: Integers) -> None:
         if len(present) < len(transmission.receivers):
             for name in transmission.receivers:
                 if name not in self._rows:
-                    self._record_loss(transmission, name, ABSENT)
-
-    def _record_loss(
-        self, transmission: Transmission, receiver: str, reason: str, distance: float | None = None
-    ) -> None:
-        """Record the loss of a sent message for a reason outside the reception model."""
-        message = transmission.message
-        counters = self._links.counters(message.sender, receiver)
-        counters.count_loss(reason)
-        if distance is not None:
-            counters.count_outcome(distance, False)
-        self._dropped.append(
-            LinkEvent(message.sender, receiver, message.number, transmission.sent, "lost", None, reason, message.size)
-        )
+                    self._dropped.append(self._links.lose(transmission.message, name, transmission.sent, ABSENT))

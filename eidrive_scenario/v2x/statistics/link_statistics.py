@@ -156,8 +156,7 @@ class Links:
         """
         # A truth value, of a model that returns whether a message arrives, would be a delay of 0 or 1 s
         given: object = outcome
-        is_lost = isinstance(outcome, str)
-        if not is_lost and (
+        if not isinstance(outcome, str) and (
             isinstance(given, bool) or not isinstance(given, Real) or not 0.0 <= float(given) < math.inf
         ):
             raise ValueError(
@@ -166,14 +165,23 @@ class Links:
         counters = self.counters(message.sender, receiver)
         counters.sent += 1
         counters.bytes_sent += message.size
-        if distance is not None:
-            counters.count_outcome(distance, not is_lost)
         if isinstance(outcome, str):
-            counters.count_loss(outcome)
-            return LinkEvent(message.sender, receiver, message.number, now, "lost", None, outcome, message.size)
+            return self.lose(message, receiver, now, outcome, distance)
+        if distance is not None:
+            counters.count_outcome(distance, True)
         arrives = now + outcome
         self.enqueue(queue_entry(message, now, arrives), receiver)
         return LinkEvent(message.sender, receiver, message.number, now, "delivered", arrives, "", message.size)
+
+    def lose(
+        self, message: Message, receiver: str, sent: float, reason: str, distance: float | None = None
+    ) -> LinkEvent:
+        """Count the loss of a message that is counted as sent already."""
+        counters = self.counters(message.sender, receiver)
+        counters.count_loss(reason)
+        if distance is not None:
+            counters.count_outcome(distance, False)
+        return LinkEvent(message.sender, receiver, message.number, sent, "lost", None, reason, message.size)
 
     def enqueue(self, entry: Entry, *receivers: str) -> None:
         """Add a message in flight that is already counted as sent."""
