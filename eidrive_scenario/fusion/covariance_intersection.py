@@ -80,17 +80,17 @@ class CovarianceIntersectionFusion(FusionMethod):
         if cls.fuse is not CovarianceIntersectionFusion.fuse:
             return super().fuse_batch(methods, reports, now)
         batches: dict[tuple[float, ...], list[int]] = {}
-        for place, method in enumerate(methods):
+        for index, method in enumerate(methods):
             settings = method.settings
             key = settings.gate, settings.gate_distance, settings.max_age, settings.existence, settings.align_poses
-            batches.setdefault(key, []).append(place)
+            batches.setdefault(key, []).append(index)
         fused: dict[int, Detections] = {}
-        for places in batches.values():
-            for start in range(0, len(places), _BATCH):
-                part = places[start : start + _BATCH]
+        for indices in batches.values():
+            for start in range(0, len(indices), _BATCH):
+                part = indices[start : start + _BATCH]
                 results = _fuse_batch([methods[index] for index in part], [reports[index] for index in part], now)
                 fused.update(zip(part, results, strict=True))
-        return [fused[place] for place in range(len(methods))]
+        return [fused[index] for index in range(len(methods))]
 
     def _select(self, reports: Sequence[Report]) -> tuple[Integers, Integers]:
         """Return the rows of the tracks of the stations of these reports in order of their names, and the ranks of the
@@ -164,8 +164,8 @@ def _fuse_objects(tracks: Table, objects: Objects, now: float, gate: float) -> D
     members = tracks if count == len(rows) else tracks.take(rows)
     existence = 1.0 - np.multiply.reduceat(1.0 - members["existence"], starts)
     mean, covariance = _fuse_states(tracks, objects, gate)
-    known = np.logical_or.reduceat(members["moving"], starts)
-    velocity = np.where(known[:, None], mean[:, 1], np.nan)
+    has_velocity = np.logical_or.reduceat(members["moving"], starts)
+    velocity = np.where(has_velocity[:, None], mean[:, 1], np.nan)
     weights = np.maximum(members["score"], 1e-6)
     shares = weights / np.repeat(np.add.reduceat(weights, starts), np.diff(starts, append=len(rows)))
     body = np.add.reduceat(shares[:, None] * members["body"], starts, axis=0)
@@ -195,17 +195,17 @@ def _fuse_states(tracks: Table, objects: Objects, gate: float) -> tuple[Array, A
     covariance = np.empty((len(tracks), 2, 2, 2))
     covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]
     covariance[:, 1] = tracks["covariance"][:, 2:, 2:]
-    known = estimates(tracks["mean"].reshape(-1, 2, 2), covariance)
+    states = estimates(tracks["mean"].reshape(-1, 2, 2), covariance)
     members, starts = objects
     while len(members) > len(starts):
         counts = np.diff(starts, append=len(members))
-        place = np.arange(len(members)) - np.repeat(starts, counts)
-        first = np.flatnonzero((place % 2 == 0) & (place + 1 < np.repeat(counts, counts)))
-        pair = known.take(members[first], axis=1), known.take(members[first + 1], axis=1)
+        order = np.arange(len(members)) - np.repeat(starts, counts)
+        first = np.flatnonzero((order % 2 == 0) & (order + 1 < np.repeat(counts, counts)))
+        pair = states.take(members[first], axis=1), states.take(members[first + 1], axis=1)
         members = members.copy()
-        members[first] = known.shape[1] + np.arange(len(first))
+        members[first] = states.shape[1] + np.arange(len(first))
         members = np.delete(members, first + 1)
-        known = np.concatenate([known, fuse(*pair, gate)], axis=1)
+        states = np.concatenate([states, fuse(*pair, gate)], axis=1)
         starts = np.cumsum([0, *((counts + 1) // 2)[:-1].tolist()])
-    final = known.take(members, axis=1)
+    final = states.take(members, axis=1)
     return means(final), covariances(final[:, :, 0])

@@ -117,10 +117,10 @@ class ReportHistory:
         of each. They are valid until the next `process`."""
         if self._selection is None or stations != self._order:
             histories = self._histories
-            known = [(rank, histories[station]) for rank, station in enumerate(stations) if station in histories]
-            starts, ends = _ends_of([history for _, history in known])
+            present = [(rank, histories[station]) for rank, station in enumerate(stations) if station in histories]
+            starts, ends = _ends_of([history for _, history in present])
             number, rows = ranges(starts, ends, np.arange(self._used))
-            self._order, self._selection = stations, (rows, np.array([rank for rank, _ in known], np.int64)[number])
+            self._order, self._selection = stations, (rows, np.array([rank for rank, _ in present], np.int64)[number])
         return self._selection
 
     def copy_rows(self, rows: Integers, out: Rows) -> None:
@@ -155,14 +155,14 @@ class ReportHistory:
                     oldest = history.latest
             owner._next_eviction = min(owner._next_eviction, oldest + 2.0 * owner.span)
             owner._updated.clear()
-        place = 0
+        processed = 0
         while reports:
             _advance(histories, receivers, updated, reports)
-            place += 1
-            several = [(receiver, history, due) for receiver, history, due in several if len(due) > place]
+            processed += 1
+            several = [(receiver, history, due) for receiver, history, due in several if len(due) > processed]
             receivers = [receiver for receiver, _, _ in several]
             updated = [history for _, history, _ in several]
-            reports = [due[place] for _, _, due in several]
+            reports = [due[processed] for _, _, due in several]
 
     def _due(self, history: _History) -> Sequence[Report]:
         """Return the unprocessed reports of a station in order, after rollback of its tracks to the first of them."""
@@ -172,10 +172,10 @@ class ReportHistory:
             time = report.detections.time
             if not history.begin < time < math.inf:
                 continue
-            place = bisect_left(reports, time, key=lambda held: held.detections.time)
-            again = place < len(reports) and reports[place].detections.time == time
-            reports[place : place + again] = [report]
-            kept = min(kept, place)
+            index = bisect_left(reports, time, key=lambda held: held.detections.time)
+            again = index < len(reports) and reports[index].detections.time == time
+            reports[index : index + again] = [report]
+            kept = min(kept, index)
         history.new.clear()
         if kept < len(history.entries):
             del history.entries[kept:]
@@ -246,5 +246,5 @@ def _advance(
             if begin < end:
                 owner._rows[rows[first:last]] = after[bounds[begin] : bounds[end]]
             continue
-        for place in range(begin, end):
-            owner._store(histories[place], after[bounds[place] : bounds[place + 1]])
+        for index in range(begin, end):
+            owner._store(histories[index], after[bounds[index] : bounds[index + 1]])

@@ -79,11 +79,11 @@ def initiate_tracks(receivers: Sequence[int], reports: Sequence[Report]) -> Tabl
 
     receivers  index of the receiving station of each report
     """
-    places: dict[tuple[int, int], int] = {}
-    place = [places.setdefault((id(report.detections), id(report.state)), len(places)) for report in reports]
-    if len(places) < len(reports):
-        tracks = _converted(list({number: report for number, report in zip(place, reports, strict=True)}.values()))
-        starts, ends = (np.searchsorted(tracks["station"], place, side) for side in ("left", "right"))
+    contents: dict[tuple[int, int], int] = {}
+    content = [contents.setdefault((id(report.detections), id(report.state)), len(contents)) for report in reports]
+    if len(contents) < len(reports):
+        tracks = _converted(list(dict(zip(content, reports, strict=True)).values()))
+        starts, ends = (np.searchsorted(tracks["station"], content, side) for side in ("left", "right"))
         number, rows = ranges(starts, ends, np.arange(len(tracks)))
         tracks = tracks.take(rows)
         tracks["station"] = number

@@ -196,7 +196,7 @@ def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
     if location is None:
         return None
     is_level = _is_level(roads, location, z)
-    if is_level and _angle(roads, location, ego.yaw) <= ALIGNED:
+    if is_level and angle_to_lane(roads, location, ego.yaw) <= ALIGNED:
         return location
     height = None if roads.is_level else np.array([z])
     lanes, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
@@ -207,8 +207,8 @@ def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
         if roads.tables.lane_drivable[lane]
     ]
     candidates = [candidate for candidate in candidates if _is_level(roads, candidate, z)]
-    best = min(candidates, key=lambda candidate: _angle(roads, candidate, ego.yaw), default=location)
-    return best if not is_level or _angle(roads, best, ego.yaw) <= ALIGNED else location
+    best = min(candidates, key=lambda candidate: angle_to_lane(roads, candidate, ego.yaw), default=location)
+    return best if not is_level or angle_to_lane(roads, best, ego.yaw) <= ALIGNED else location
 
 
 def _is_level(roads: RoadNetwork, location: LaneLocation, z: float) -> bool:
@@ -216,7 +216,7 @@ def _is_level(roads: RoadNetwork, location: LaneLocation, z: float) -> bool:
     return roads.is_level or abs(roads.road_pose_at(location.road, location.s, location.t).z - z) <= OTHER_LEVEL
 
 
-def _angle(roads: RoadNetwork, location: LaneLocation, yaw: float) -> float:
+def angle_to_lane(roads: RoadNetwork, location: LaneLocation, yaw: float) -> float:
     """Return the angle between a heading and the driving direction of a lane [rad]."""
     heading = roads.lane_pose_at(location.road, location.lane, location.s).h
     if roads.driving_direction(location.road, location.lane) < 0:

@@ -14,7 +14,14 @@ from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.requests import LONGEST_WAY, Goal
 from eidrive_scenario.driving.planner_settings import PlannerSettings
-from eidrive_scenario.driving.planning.path import SPACING, PathPart, PlannedPath, lane_below, path_heights
+from eidrive_scenario.driving.planning.path import (
+    SPACING,
+    PathPart,
+    PlannedPath,
+    angle_to_lane,
+    lane_below,
+    path_heights,
+)
 from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
@@ -240,7 +247,7 @@ class RoutePlanner(Planner):
     def _lane_ahead(self, ego: EgoState) -> PlannedPath:
         """Return a path along the lane and its successors, extended from the last call; straight without a lane."""
         if self.roads is not None:
-            self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(ego)
+            self._lane = self._lane[max(0, self._progress - BEHIND) :] or _lane_at(self.roads, ego)
             onward = True
             while onward and self._lane and len(self._lane) < LOOK_AHEAD:
                 more = _further(self.roads, self._lane[-1])
@@ -252,16 +259,13 @@ class RoutePlanner(Planner):
         yaw = ego.yaw
         return PlannedPath(ego.position[:2] + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
-    def _lane_here(self, ego: EgoState) -> list[LaneLocation]:
-        """Return the lane at the vehicle if its driving direction is that of the vehicle."""
-        if self.roads is None:
-            return []
-        location = lane_below(self.roads, ego)
-        if location is None:
-            return []
-        heading = self.roads.lane_pose_at(location.road, location.lane, location.s, 0.0).h
-        direction = self.roads.driving_direction(location.road, location.lane)
-        return [location] if direction * math.cos(ego.yaw - heading) > 0.0 else []
+
+def _lane_at(roads: RoadNetwork, ego: EgoState) -> list[LaneLocation]:
+    """Return the lane at the vehicle if its driving direction is that of the vehicle."""
+    location = lane_below(roads, ego)
+    if location is None or angle_to_lane(roads, location, ego.yaw) >= math.pi / 2.0:
+        return []
+    return [location]
 
 
 def _further(roads: RoadNetwork, location: LaneLocation) -> list[LaneLocation]:
