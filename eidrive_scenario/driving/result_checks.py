@@ -9,19 +9,16 @@ import numpy as np
 
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.route_planner import Planner
-from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.driving.step import MAX_TARGET_SPEED, Plan
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.result_checks import LARGEST, are_within, describe, raise_not_finite, raise_outside
 from eidrive_scenario.world.actor import Control
-
-FASTEST = 1e4
-"""Maximum magnitude of a planned speed [m/s], as of `target_speed`, and of an acceleration [m/s²]."""
 
 
 def check_plan(planner: Planner, plan: object) -> None:
     """Raise InvalidResult unless `plan` is a Plan of at least two points and as many speeds.
 
-    All numbers are finite. No coordinate exceeds LARGEST [m], no speed or acceleration FASTEST.
+    All numbers are finite. No coordinate exceeds LARGEST [m], no speed or acceleration MAX_TARGET_SPEED.
     """
     if not isinstance(plan, Plan):
         raise InvalidResult(planner, "plan", f"returned {describe(plan)} (expected Plan)")
@@ -38,9 +35,9 @@ def check_plan(planner: Planner, plan: object) -> None:
     try:
         if (  # each comparison is False for NaN
             are_within(points, LARGEST)
-            and are_within(speeds, FASTEST)
-            and abs(plan.acceleration) <= FASTEST
-            and (plan.braking is None or abs(plan.braking) <= FASTEST)
+            and are_within(speeds, MAX_TARGET_SPEED)
+            and abs(plan.acceleration) <= MAX_TARGET_SPEED
+            and (plan.braking is None or abs(plan.braking) <= MAX_TARGET_SPEED)
         ):
             return
     except (TypeError, ValueError, AttributeError):
@@ -53,7 +50,7 @@ def check_plan(planner: Planner, plan: object) -> None:
     }
     raise_not_finite(planner, "plan", numbers)
     for name, value in numbers.items():
-        limit = LARGEST if name == "points" else FASTEST
+        limit = LARGEST if name == "points" else MAX_TARGET_SPEED
         raise_outside(planner, "plan", name, np.atleast_1d(value).astype(float), -limit, limit)
 
 

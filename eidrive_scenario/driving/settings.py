@@ -13,6 +13,7 @@ from eidrive_scenario.driving.planner_settings import (
     PlannerSettings,
     split_planner_settings,
 )
+from eidrive_scenario.driving.step import MAX_TARGET_SPEED
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.extensions.settings import Settings, parse_settings
@@ -157,7 +158,7 @@ class AgentSettings(Settings):
     clock_offset: Annotated[float, Field(ge=-MAX_TIME, le=MAX_TIME)] = 0.0
     clock_drift: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
     asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names, _Listed)] = ()
-    target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
+    target_speed: Annotated[float, Field(ge=0.0, le=MAX_TARGET_SPEED)] | None = None
     follow_speed_limit: bool = False
     planner_settings: SerializeAsAny[PlannerSettings] = PlannerSettings()
 

@@ -76,7 +76,7 @@ class AgentStep(msgspec.Struct, frozen=True, gc=False):
 
 
 MAX_TARGET_SPEED = 1e4
-"""Maximum target speed of an action [m/s], as of the property `target_speed`."""
+"""Maximum target speed of settings and actions [m/s], and of a planned speed [m/s] and acceleration [m/s²]."""
 
 
 class StationAction(msgspec.Struct, frozen=True):

@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.assignment import associate
 from eidrive_scenario.base.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -44,7 +43,11 @@ class AverageFusion(FusionMethod):
         fused = fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
-        return replace(fused, existence=joint_existence(present, labels))
+        # An object exists if at least one report is correct: 1 - prod (1 - r). Reports are independent, because
+        # stations report only detections of their sensors. The score replaces a missing existence probability.
+        absence = np.ones(len(fused))
+        np.multiply.at(absence, labels, 1.0 - np.concatenate([report.confidence for report in present]))
+        return replace(fused, existence=1.0 - absence)
 
 
 def _label_objects(reports: Sequence[Detections]) -> list[int]:
@@ -63,17 +66,6 @@ def _label_objects(reports: Sequence[Detections]) -> list[int]:
         means, counts = np.concatenate([means, centers[fresh]]), np.append(counts, np.ones(len(fresh)))
         labels += label.tolist()
     return labels
-
-
-def joint_existence(reports: Sequence[Detections], labels: Sequence[int]) -> Array:
-    """Return the probability that at least one report of each object is correct (G,): 1 - prod (1 - r).
-
-    Reports are independent, because stations report only detections of their sensors. The score replaces a missing
-    existence probability.
-    """
-    absence = np.ones(max(labels) + 1)
-    np.multiply.at(absence, np.array(labels, dtype=np.intp), 1.0 - np.concatenate([r.confidence for r in reports]))
-    return np.asarray(1.0 - absence)
 
 
 def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: float) -> Detections:

@@ -102,7 +102,10 @@ class Receiver:
                 losses.append((COLLISION, lost_with(interference if jamming is None else interference + jamming)))
         if self.background is not None:
             losses += self._background_losses(self.background, budget.mean_loss.take(senders, axis=0), links, numbers)
-        return Receptions(_first_causes(snr.shape, losses), snr, senders)
+        causes = np.zeros(snr.shape, dtype=np.int8)
+        for code, applies in sorted(losses, key=lambda loss: -loss[0]):  # the first cause in the order of CAUSES
+            causes[applies] = code
+        return Receptions(causes, snr, senders)
 
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
         """Return the packet error rates (T, N) at these ratios of signal to noise and interference [dB]."""
@@ -136,17 +139,6 @@ def _is_any_overlap(active: Sequence[Transmission]) -> bool:
             return True
         end = max(end, transmission.end)
     return False
-
-
-def _first_causes(shape: tuple[int, ...], losses: Sequence[tuple[int, Bools]]) -> Codes:
-    """Return the first cause in the order of CAUSES that applies to each reception, DELIVERED if none does.
-
-    losses  code of each cause, and the receptions (T, N) to which it applies
-    """
-    causes = np.zeros(shape, dtype=np.int8)
-    for code, applies in sorted(losses, key=lambda loss: -loss[0]):
-        causes[applies] = code
-    return causes
 
 
 def _interference(
