@@ -54,10 +54,9 @@ class OwnBody:
         self._spec = spec
         length, width, _ = spec.size
         self._half_size = length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN
-        self._half_diagonal = 1.001 * math.hypot(*self._half_size)
+        self._extent = 1.001 * math.hypot(*self._half_size)
+        """Half the diagonal of the body [m]; infinity from the first pose with trailers on."""
         self._poses: deque[BodyPose] = deque(maxlen=math.ceil(duration / dt) + 2)
-        self._has_trailers = False
-        """Whether a stored pose may have trailers."""
         self._vicinity = 0.0, 0.0, math.inf
         """Last center of the body, and the distance from it within which all stored outlines are [m]."""
         self._tracks: dict[str, int] = {}
@@ -80,9 +79,8 @@ class OwnBody:
             driven = last.driven + math.hypot(x - last.body.x, y - last.body.y)
         self._poses.append(BodyPose(ego.time, reference, body, trailers, driven))
         if trailers:
-            self._has_trailers = True
-        reach = driven - self._poses[0].driven + self._half_diagonal
-        self._vicinity = x, y, math.inf if self._has_trailers else reach
+            self._extent = math.inf
+        self._vicinity = x, y, driven - self._poses[0].driven + self._extent
 
     def at(self, time: float) -> BodyPose:
         """Return the last pose up to `time` [s], or the first one."""

@@ -76,6 +76,7 @@ def _column(path: Path, column: object) -> list[float]:
 
     Raise ValueError if the file cannot be read, the column is missing, or a value is not a delay.
     """
+    name = shortened(str(path), 200)
     if not isinstance(column, str | int) or isinstance(column, bool):
         raise ValueError(f"column is invalid (got {quoted(column)}; expected a name or an index from 0)")
     try:
@@ -84,34 +85,30 @@ def _column(path: Path, column: object) -> list[float]:
         rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else reason_of(error)
-        raise ValueError(f"cannot read {_format_path(path)}: {reason}") from error
+        raise ValueError(f"cannot read {name}: {reason}") from error
     if not rows:
-        raise ValueError(f"{_format_path(path)} is empty")
+        raise ValueError(f"{name} is empty")
     header = [cell.strip() for cell in rows[0][1]]
     if isinstance(column, str):
         if column not in header:
-            raise ValueError(f"{_format_path(path)} has no column {quoted(column)} in its first row")
+            raise ValueError(f"{name} has no column {quoted(column)} in its first row")
         index = header.index(column)
     else:
         index = column
     if not 0 <= index < len(header):
-        raise ValueError(f"{_format_path(path)} has no column {quoted(index)} (expected 0 to {len(header) - 1})")
+        raise ValueError(f"{name} has no column {quoted(index)} (expected 0 to {len(header) - 1})")
     body = rows[1:] if isinstance(column, str) or not _is_number(header[index]) else rows
     if not body:
-        raise ValueError(f"{_format_path(path)} has no delays")
+        raise ValueError(f"{name} has no delays")
     values = []
     for number, row in body:
         # The row is not quoted: the path may refer to a file with other, confidential content.
         if index >= len(row) or not _is_number(row[index]):
-            raise ValueError(f"{_format_path(path)}:{number}: column {index} is not a delay")
+            raise ValueError(f"{name}:{number}: column {index} is not a delay")
         if float(row[index]) < 0.0:
-            raise ValueError(f"{_format_path(path)}:{number}: delay is negative")
+            raise ValueError(f"{name}:{number}: delay is negative")
         values.append(float(row[index]))
     return values
-
-
-def _format_path(path: Path) -> str:
-    return shortened(str(path), 200)
 
 
 def _is_number(text: str) -> bool:
