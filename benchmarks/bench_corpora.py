@@ -17,13 +17,15 @@ import os
 import subprocess
 import sys
 import time
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import geometric_mean, median
+from typing import Any
 
 import numpy as np
+from timing import minimum_time
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import EidriveError
@@ -69,41 +71,25 @@ def run_scenario(path: Path, dt: float, limit: float) -> ScenarioRun:
     return ScenarioRun(path.stem, result.simulated_s, loading, result.wall_s, result.end_reason)
 
 
-def esmini_seconds(program: str, path: Path, timeout: float) -> float | None:
+def esmini_seconds(program: str, path: Path) -> float | None:
     """Return the time of esmini's process for a file [s]; None if it fails or does not end."""
-    command = [program, "--osc", str(path), "--headless", "--fixed_timestep", str(ESMINI_STEP), "--disable_stdout"]
-    started = time.perf_counter()
+    options = ["--headless", "--fixed_timestep", str(ESMINI_STEP), "--disable_stdout"]
     try:
-        done = subprocess.run(
-            command,
-            cwd=path.parent,
-            timeout=timeout,
-            check=False,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-    except subprocess.TimeoutExpired:
+        return process_seconds([program, "--osc", str(path), *options], cwd=path.parent, timeout=20.0, check=True)
+    except subprocess.SubprocessError:
         return None
-    return time.perf_counter() - started if done.returncode == 0 else None
 
 
-def process_seconds(path: Path, limit: float) -> float:
-    """Return the time of a process of `eidrive run` for a file, with esmini's step [s]."""
-    command = [sys.executable, "-m", "eidrive_scenario", "run", str(path)]
-    command += ["--dt", str(ESMINI_STEP), "--time-limit", str(limit)]
+def process_seconds(command: Sequence[str], **options: Any) -> float:
+    """Return the time of a process [s]; `options` are those of `subprocess.run`."""
     started = time.perf_counter()
-    subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **{"check": False, **options})
     return time.perf_counter() - started
 
 
-def start_seconds(command: list[str], times: int = 5) -> float:
+def start_seconds(command: Sequence[str]) -> float:
     """Return the median time to start a process [s]."""
-    seconds = []
-    for _ in range(times):
-        started = time.perf_counter()
-        subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        seconds.append(time.perf_counter() - started)
-    return median(seconds)
+    return median(process_seconds(command) for _ in range(5))
 
 
 def roads(maps: Path) -> None:
@@ -121,12 +107,8 @@ def roads(maps: Path) -> None:
     lanes = np.concatenate([network.lane_pose(road.id, lane, s)[:2] for road, lane, s in _along_lanes(network)], axis=1)
     on_lanes = lanes[:, rng.integers(lanes.shape[1], size=POINTS)] + rng.normal(0.0, 1.0, (2, POINTS))
     for area, px, py in (("on its roads", *on_lanes), ("anywhere on the map", x, y)):
-        seconds = []
-        for _ in range(5):
-            started = time.perf_counter()
-            network.locate(px, py)
-            seconds.append(time.perf_counter() - started)
-        print(f"lane lookup of {POINTS:,} points {area}: {min(seconds):.3f} s (aim: below 0.2), best of {len(seconds)}")
+        lookup = minimum_time(partial(network.locate, px, py), 5) / 1e3
+        print(f"lane lookup of {POINTS:,} points {area}: {lookup:.3f} s (aim: below 0.2), best of 5")
 
 
 def _along_lanes(network: RoadNetwork) -> Iterator[tuple[Road, int, np.ndarray]]:
@@ -157,7 +139,7 @@ def main() -> None:
     table: list[dict[str, object]] = []
     runs: dict[float, list[ScenarioRun]] = {dt: [] for dt in options.dt}
     pairs: list[tuple[ScenarioRun, float, float]] = []
-    not_run: Counter[str] = Counter()
+    not_run = 0
     columns = "".join(f"{f'dt {dt:g}: wall s':>15}{'sim/wall':>10}" for dt in options.dt)
     print(f"\n{'scenario':52}{'simulated s':>12}{columns}" + (f"{'esmini s':>10}{'ratio':>8}" if esmini else ""))
     for path in paths:
@@ -165,7 +147,7 @@ def main() -> None:
         try:
             by_step = {dt: run_scenario(path, dt, options.limit) for dt in options.dt}
         except EidriveError as error:
-            not_run[str(error).splitlines()[0].replace(str(corpora), "")] += 1
+            not_run += 1
             print(f"{name:52}  not run: {str(error).splitlines()[0].replace(str(corpora) + '/', '')[:110]}")
             continue
         first = by_step[options.dt[0]]
@@ -176,10 +158,12 @@ def main() -> None:
             line += f"{run.wall:15.3f}{run.rate:10.1f}"
             row |= {f"wall_s_{dt:g}": run.wall, f"loading_s_{dt:g}": run.loading}
         if esmini and ESMINI_STEP in by_step:
-            esmini_total = esmini_seconds(esmini, path, timeout=20.0)
+            esmini_total = esmini_seconds(esmini, path)
             row["esmini_s"] = esmini_total
             if esmini_total is not None and by_step[ESMINI_STEP].end != "time limit":
-                own_process = row["process_s"] = process_seconds(path, options.limit)
+                steps = ["--dt", str(ESMINI_STEP), "--time-limit", str(options.limit)]
+                command = [sys.executable, "-m", "eidrive_scenario", "run", str(path), *steps]
+                own_process = row["process_s"] = process_seconds(command)
                 pairs.append((by_step[ESMINI_STEP], own_process, esmini_total))
                 line += f"{esmini_total:10.3f}{by_step[ESMINI_STEP].wall / esmini_total:8.1f}"
         print(line)
@@ -194,7 +178,7 @@ def main() -> None:
                 f"{simulated / running:.1f} without loading"
             )
     if not_run:
-        print(f"{sum(not_run.values())} of {len(paths)} files were not run")
+        print(f"{not_run} of {len(paths)} files were not run")
     if esmini and pairs:
         compare(esmini, pairs)
     elif not esmini:

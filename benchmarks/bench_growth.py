@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,6 +23,7 @@ from bench_traffic import town_file, traffic_run
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from msgspec.structs import replace
+from timing import minimum_time
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.recording import Recorder, read_recording
@@ -71,7 +71,7 @@ def nurbs_cost(count: int) -> float:
         assert world_position is not None
         return Pose(world_position.x, world_position.y, 0.0, 0.0, 0.0, 0.0)
 
-    return processor_time(lambda: sample_trajectory(trajectory, resolve)) / count
+    return minimum_time(lambda: sample_trajectory(trajectory, resolve), REPEATS) / count
 
 
 def recording_cost(count: int) -> float:
@@ -86,17 +86,7 @@ def recording_cost(count: int) -> float:
             frame = frames[tick % len(frames)]
             recorder.observe(replace(frame, view=replace(frame.view, tick=tick, time=0.05 * tick)))
         recorder.close()
-        return processor_time(lambda: sum(1 for _ in read_recording(path).frames())) / count
-
-
-def processor_time(task: Callable[[], object]) -> float:
-    """Return the minimum processor time of a task [ms]."""
-    times = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        task()
-        times.append(time.process_time() - began)
-    return 1e3 * min(times)
+        return minimum_time(lambda: sum(1 for _ in read_recording(path).frames()), REPEATS) / count
 
 
 INPUTS: dict[str, tuple[tuple[int, ...], Cost]] = {

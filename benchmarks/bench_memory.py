@@ -16,6 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from cars import VEHICLE, start
+
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, run_file
@@ -27,20 +29,9 @@ ROAD = """<OpenDRIVE><header revMajor="1" revMinor="7"/><road id="1" length="400
 POST = '<object id="{0}" type="pole" s="{1}" t="{2}" zOffset="0" hdg="0" radius="0.1" height="1"/>'
 SCENARIO = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>
 <CatalogLocations/><RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork><Entities><ScenarioObject name="Ego">
-<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1.4" y="0" z="0.75"/>
-<Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
-<Performance maxSpeed="60" maxAcceleration="5" maxDeceleration="9"/><Axles>
-<FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
-<RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles><Properties/>
-</Vehicle><ObjectController><Controller name="station"><Properties><Property name="module" value="eidrive"/>
-</Properties></Controller></ObjectController></ScenarioObject></Entities><Storyboard><Init><Actions>
-<Private entityRef="Ego">
-<PrivateAction><TeleportAction><Position><LanePosition roadId="{road_id}" laneId="{lane}" s="200"/></Position>
-</TeleportAction></PrivateAction><PrivateAction><LongitudinalAction><SpeedAction>
-<SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
-<SpeedActionTarget><AbsoluteTargetSpeed value="20"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
-</PrivateAction><PrivateAction><ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/>
-</ControllerAction></PrivateAction></Private></Actions></Init><StopTrigger/></Storyboard></OpenSCENARIO>"""
+{vehicle}<ObjectController><Controller name="station"><Properties><Property name="module" value="eidrive"/>
+</Properties></Controller></ObjectController></ScenarioObject></Entities><Storyboard><Init><Actions>{start}</Actions>
+</Init><StopTrigger/></Storyboard></OpenSCENARIO>"""
 
 
 def write_road(folder: Path, objects: int) -> Path:
@@ -55,7 +46,8 @@ def write_scenario(folder: Path, road: Path, lane: int) -> Path:
     """Write a scenario of one driven car on the first road of a file."""
     road_id = next(iter(RoadNetwork.load(road).roads))
     path = folder / "memory.xosc"
-    path.write_text(SCENARIO.format(road=road.resolve(), road_id=road_id, lane=lane))
+    actions = start("Ego", road_id, lane, "200", "20", active="true")
+    path.write_text(SCENARIO.format(road=road.resolve(), vehicle=VEHICLE, start=actions))
     return path
 
 

@@ -12,21 +12,32 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import wraps
 from statistics import median
+from typing import Any
 
+import cv2
 import numpy as np
-from detector_shares import print_table
+from detector_runs import AS_EI_DRIVE, DEFAULT, SCENARIO, RunTime, run
 from random_scenes import random_scenes
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.perception.detector import DetectorContext
+from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
+from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.lidar.detector import LidarDetector
 from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
+from eidrive_scenario.rendering.scene import SceneImage
+from eidrive_scenario.sensing.camera import Camera, ImageSensor
+from eidrive_scenario.sensing.lidar import Lidar
+from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
@@ -40,13 +51,33 @@ RANDOM_SEED = 20261120
 
 @dataclass
 class LidarResults:
-    """Errors [m] of detectable objects, infinite for misses, number of false detections and frames, and times [s]."""
+    """Errors [m] of detectable objects by kind, infinite for misses, number of hits with the correct class by kind,
+    number of false detections and frames, and times [s]."""
 
     errors: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    correct_class: Counter[str] = field(default_factory=Counter)
     false: int = 0
     frames: int = 0
     sensor: list[float] = field(default_factory=list)
     detector: list[float] = field(default_factory=list)
+
+    def add(
+        self, detections: Detections, cloud: LidarReading, objects: Iterable[tuple[str, np.ndarray]], bodies: np.ndarray
+    ) -> None:
+        """Compare detections with kinds and boxes (7,) of the true objects; a detection at none of all `bodies` (N, 7)
+        is false."""
+        self.frames += 1
+        points = cloud.world_points[cloud.world_points[:, 2] > 0.25]
+        centers = detections.boxes[:, :2]
+        for kind, box in objects:
+            if np.count_nonzero(points_in_box(points, box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0]))) < LEAST_POINTS:
+                continue
+            distances = np.hypot(*(centers - box[:2]).T)
+            is_hit = len(distances) > 0 and distances.min() < FOUND
+            self.errors[kind].append(float(distances.min()) if is_hit else math.inf)
+            self.correct_class[kind] += is_hit and detections.classes[int(distances.argmin())] == kind
+        for center in centers:
+            self.false += bool(np.hypot(*(bodies[:, :2] - center).T).min() > FOUND)
 
 
 def evaluate_scenario(name: str, stations: tuple[str, ...], every: int, seed: int, results: LidarResults) -> None:
@@ -71,59 +102,31 @@ def evaluate_scenario(name: str, stations: tuple[str, ...], every: int, seed: in
                 detections = detector.detect(readings)
                 results.detector.append(time.perf_counter() - read)
                 results.sensor.append(read - start)
-                cloud = readings.lidars["lidar"]
-                points = cloud.world_points
-                compare(
-                    results, detections, points[points[:, 2] > 0.25], view.boxes, view.names, view.categories, station
-                )
+                objects = [
+                    ("incoming car" if name == "Incoming" else category, box)
+                    for name, category, box in zip(view.names, view.categories, view.boxes, strict=True)
+                    if name != station and category != "misc"
+                ]
+                results.add(detections, readings.lidars["lidar"], objects, view.boxes)
             tick += 1
-
-
-def compare(
-    results: LidarResults, detections: Detections, points: np.ndarray, boxes: np.ndarray, names: tuple[str, ...],
-    categories: tuple[str, ...], station: str,
-) -> None:  # fmt: skip
-    """Compare detections with the true objects."""
-    results.frames += 1
-    for name, category, box in zip(names, categories, boxes, strict=True):
-        enlarged = box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0])
-        if name == station or category == "misc" or np.count_nonzero(points_in_box(points, enlarged)) < LEAST_POINTS:
-            continue
-        distances = np.hypot(*(detections.boxes[:, :2] - box[:2]).T)
-        error = float(distances.min()) if len(distances) and distances.min() < FOUND else math.inf
-        results.errors["incoming car" if name == "Incoming" else category].append(error)
-    for center in detections.boxes[:, :2]:
-        results.false += bool(np.hypot(*(boxes[:, :2] - center).T).min() > FOUND)
 
 
 def evaluate_random_scenes(count: int, seed: int) -> None:
     """Print the results on scenes that were not used to choose anything."""
-    errors: dict[str, list[float]] = defaultdict(list)
-    correct_class: dict[str, int] = defaultdict(int)
-    false = 0
-    detector = LidarDetector()
+    results, detector = LidarResults(), LidarDetector()
     for scene in random_scenes(count, seed):
-        detections, cloud = detector.detect(scene.readings), scene.readings.lidars["lidar"]
-        points = cloud.world_points
-        points = points[points[:, 2] > 0.25]
-        for kind, box in zip(scene.kinds, scene.boxes, strict=True):
-            if np.count_nonzero(points_in_box(points, box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0]))) < LEAST_POINTS:
-                continue
-            distances = np.hypot(*(detections.boxes[:, :2] - box[:2]).T)
-            hit = len(distances) > 0 and distances.min() < FOUND
-            errors[kind].append(float(distances.min()) if hit else math.inf)
-            correct_class[kind] += bool(hit and detections.classes[int(distances.argmin())] == kind)
-        for center in detections.boxes[:, :2]:
-            false += bool(np.hypot(*(scene.boxes[:, :2] - center).T).min() > FOUND)
-    for kind, all_of in sorted(errors.items()):
-        hits = [error for error in all_of if math.isfinite(error)]
-        share, correct = 100 * len(hits) / len(all_of), 100 * correct_class[kind] / max(len(hits), 1)
+        detections = detector.detect(scene.readings)
+        objects = zip(scene.kinds, scene.boxes, strict=True)
+        results.add(detections, scene.readings.lidars["lidar"], objects, scene.boxes)
+    for kind, errors in sorted(results.errors.items()):
+        hits = [error for error in errors if math.isfinite(error)]
+        share, correct = 100 * len(hits) / len(errors), 100 * results.correct_class[kind] / max(len(hits), 1)
         median_error, error_90 = median(hits), float(np.percentile(hits, 90))
         print(
-            f"{kind:11} {share:5.1f} % of {len(all_of):4}   {median_error:.2f} m, "
+            f"{kind:11} {share:5.1f} % of {len(errors):4}   {median_error:.2f} m, "
             f"90 % within {error_90:.2f} m   class {correct:.0f} %"
         )
-    print(f"false detections per point cloud {false / count:.2f}")
+    print(f"false detections per point cloud {results.false / count:.2f}")
 
 
 def tracker_milliseconds(kind: str, count: int = 10, ticks: int = 200) -> float:
@@ -140,6 +143,77 @@ def tracker_milliseconds(kind: str, count: int = 10, ticks: int = 200) -> float:
         tracker.update(detections)
         times.append(time.perf_counter() - start)
     return 1e3 * median(times)
+
+
+CASES = (
+    ("yolov5", DEFAULT),
+    ("ssd", DEFAULT),
+    ("lidar", DEFAULT),
+    ("yolov5", AS_EI_DRIVE),
+)
+PARTS: dict[str, tuple[tuple[type, str], ...]] = {
+    "images": ((Camera, "read"), (SceneImage, "draw"), (ImageSensor, "develop")),
+    "network": ((ImageNetwork, "find"),),
+    "detector": ((LearnedDetector, "detect"), (LidarDetector, "detect")),
+    "lidar": ((Lidar, "read"),),
+}
+"""Measured methods by component, each without the measured methods that it calls: a detector draws the images."""
+
+
+@contextmanager
+def measured_parts() -> Iterator[dict[str, float]]:
+    """Measure the processor time of each of PARTS [s]."""
+    times, inner = dict.fromkeys(PARTS, 0.0), [0.0]
+    originals: list[tuple[type, str, Callable[..., Any]]] = []
+    for part, methods in PARTS.items():
+        for kind, name in methods:
+            originals.append((kind, name, getattr(kind, name)))
+            setattr(kind, name, _timed(originals[-1][2], times, part, inner))
+    try:
+        yield times
+    finally:
+        for kind, name, method in originals:
+            setattr(kind, name, method)
+
+
+def _timed(method: Callable[..., Any], times: dict[str, float], part: str, inner: list[float]) -> Callable[..., Any]:
+    """Return a method that adds its time to a part; `inner` has the time of measured calls within each open call."""
+
+    @wraps(method)
+    def wrapped(*arguments: Any, **options: Any) -> Any:
+        start = time.process_time()
+        inner.append(0.0)
+        try:
+            return method(*arguments, **options)
+        finally:
+            elapsed = time.process_time() - start
+            times[part] += elapsed - inner.pop()
+            inner[-1] += elapsed
+
+    return wrapped
+
+
+def print_table(seed: int, repeats: int) -> None:
+    """Run all cases repeatedly, and print the fastest run of each."""
+    cv2.setNumThreads(1)
+    run("yolov5", DEFAULT, seed)
+    runtime = ", ".join(f"{name} {version}" for name, version in YoloDetector().library_versions.items())
+    print(
+        f"{SCENARIO}, complete runs, equal detectors on ego and roadside unit; {runtime}, one thread; "
+        f"OpenCV {cv2.getNumThreads()} thread; simulated time per processor time, and shares by component"
+    )
+    print(f"{'':38}" + "".join(f"{part:>10}" for part in (*PARTS, "rest")))
+    for detector, properties in CASES:
+        runs: list[tuple[RunTime, dict[str, float]]] = []
+        for _ in range(repeats):
+            with measured_parts() as parts:
+                runs.append((run(detector, properties, seed), parts))
+        best, parts = min(runs, key=lambda measured: measured[0].total / measured[0].simulated)
+        shares = [*parts.values(), best.total - sum(parts.values())]
+        name = f"{detector}, {'800 x 600 and lidar at 20 Hz' if properties else 'default sensors'}"
+        cells = "".join(f"{100 * share / best.total:8.0f} %" for share in shares)
+        verdict = "passed" if best.passed else "failed"
+        print(f"{name:38}{cells}   {best.simulated / best.total:.2f} times real time, {verdict}")
 
 
 def main() -> None:

@@ -18,13 +18,13 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from timing import sum_of_minima
+from timing import sum_of_minima, tick_times
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.planner import BehaviorPlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.extensions.library import resolve_scenario
+from eidrive_scenario.extensions.library import library_path, resolve_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
@@ -77,16 +77,11 @@ def timed_plans(roads: RoadNetwork, inputs: list[tuple[EgoState, Detections]]) -
     return times
 
 
-def timed_ticks(simulation: Simulation) -> list[float]:
-    """Return the time of each tick of a run [s]."""
-    times: list[float] = []
-    end = None
-    with simulation:
-        while end is None:
-            begin = time.thread_time()
-            _, end = simulation.tick()
-            times.append(time.thread_time() - begin)
-    return times
+def timed_run(planner: str, seed: int) -> list[float]:
+    """Return the time of each tick of a run of the scenario with a planner [s]."""
+    settings = RunSettings(planner=planner, detector="oracle")
+    scenario = load_for_seed(resolve_scenario(SCENARIO), seed, settings.parameters)
+    return tick_times(Simulation(scenario, seed=seed, settings=settings), time.thread_time)
 
 
 def main() -> None:
@@ -95,8 +90,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=9)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    path = resolve_scenario(SCENARIO)
-    roads = RoadNetwork.load(path.parents[1] / ROAD)
+    roads = RoadNetwork.load(library_path() / ROAD)
     inputs = list(drive())
     planners = ("behavior", "conflict_area")
     plans: list[list[float]] = []
@@ -104,9 +98,7 @@ def main() -> None:
     for _ in range(arguments.runs):
         plans.append(timed_plans(roads, inputs))
         for planner in planners:
-            settings = RunSettings(planner=planner, detector="oracle")
-            scenario = load_for_seed(path, arguments.seed, settings.parameters)
-            ticks[planner].append(timed_ticks(Simulation(scenario, seed=arguments.seed, settings=settings)))
+            ticks[planner].append(timed_run(planner, arguments.seed))
     print(f"planner behavior with ten tracks, {TICKS} ticks, {arguments.runs} runs")
     print(f"  time per tick              {1e3 * sum_of_minima(plans) / TICKS:8.3f} ms   (aim: at most 1)")
     print(f"{SCENARIO} with 30 cars of background traffic, oracle, seed {arguments.seed}, {arguments.runs} runs")

@@ -44,6 +44,7 @@ SIZE = 300
 SPEED = 25.0
 LENGTH = 2000.0
 NOTHING = Detections(0.0)
+TECHNOLOGIES = ("80211p", "cv2x_mode4")
 
 
 def antenna_position(row: int, stations: int, now: float) -> tuple[float, float, float]:
@@ -152,12 +153,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stations", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=3.0)
-    parser.add_argument("--technology", choices=["80211p", "cv2x_mode4"], default=None)
+    parser.add_argument("--technology", choices=TECHNOLOGIES)
     parser.add_argument("--profile", action="store_true", help="print the functions that take the most time")
     parser.add_argument("--repetitions", type=int, default=3)
     options = parser.parse_args()
     print(f"{options.stations} stations at {RATE:g} Hz, {SIZE} bytes, {options.seconds:g} s, one core")
-    for technology in (options.technology,) if options.technology else ("80211p", "cv2x_mode4"):
+    for technology in (options.technology,) if options.technology else TECHNOLOGIES:
         for create_events in (False, True):
             minimum = min(
                 run(options.stations, options.seconds, technology, create_events)[0] for _ in range(options.repetitions)

@@ -23,7 +23,6 @@ each tick over all runs counts. The three variants are run in turn.
 from __future__ import annotations
 
 import argparse
-import cProfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,7 +31,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from timing import print_shares, sum_of_minima, timed
+from timing import profiled, sum_of_minima, tick_times
 
 from eidrive_scenario.base.geometry import quaternion
 from eidrive_scenario.extensions.library import resolve_scenario
@@ -124,18 +123,6 @@ def without_shortcuts() -> Iterator[None]:
         yield
     finally:
         World.is_free, scenery.MAX_BOXES = is_free, most  # type: ignore[method-assign]
-
-
-def timed_run(simulation: Simulation) -> list[float]:
-    """Return the time of each tick of a run [s]."""
-    times: list[float] = []
-    end = None
-    with simulation:
-        while end is None:
-            started = time.perf_counter()
-            _, end = simulation.tick()
-            times.append(time.perf_counter() - started)
-    return times
 
 
 def repeated_calls(trace: Trace) -> list[float]:
@@ -263,8 +250,10 @@ def measure(runs: int, seed: int, channel: str) -> Measured:
     bare_loop(trace, dt)
     complete, loading, bare, repeated = [], [], [], []
     for _ in range(runs):
-        loading.append(timed(lambda: build(seed, channel).close()))
-        complete.append(timed_run(build(seed, channel)))
+        started = time.perf_counter()
+        simulation = build(seed, channel)
+        loading.append(time.perf_counter() - started)
+        complete.append(tick_times(simulation, time.perf_counter))
         bare.append(bare_loop(trace, dt))
         repeated.append(repeated_calls(own_trace))
     run_time, bare_time, calls_time = (sum_of_minima(part) for part in (complete, bare, repeated))
@@ -293,12 +282,7 @@ def main() -> None:
     print(f"  bare pybullet loop         {1e3 * bare_time / ticks:8.3f} ms per tick")
     print(f"  ratio to the bare loop     {run_time / bare_time:8.2f}   (aim: below 3)")
     print(f"  pybullet calls of the run  {1e3 * measured.calls_time / ticks:8.3f} ms per tick")
-    profile = cProfile.Profile()
-    simulation = build(arguments.seed, arguments.channel)
-    profile.enable()
-    simulation.run()
-    profile.disable()
-    print_shares(profile)
+    profiled(build(arguments.seed, arguments.channel).run)
 
 
 if __name__ == "__main__":

@@ -8,13 +8,13 @@ products of numpy: `OPENBLAS_NUM_THREADS=1`.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import cv2
 from eidrive_reports.street_view import look_at
 from eidrive_reports.weather_sheet import street
+from timing import minimum_time
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.extensions.library import names
@@ -26,17 +26,6 @@ from eidrive_scenario.world.weather import load_weather
 
 SIZES = ((320, 192), (512, 384), (640, 360), (800, 600))
 REPEATS = 15
-
-
-def minimum_time(task: Callable[[], object]) -> float:
-    """Return the minimum processor time of a task [ms]."""
-    task()
-    times = []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        task()
-        times.append(time.process_time() - start)
-    return 1e3 * min(times)
 
 
 @contextmanager
@@ -67,9 +56,9 @@ def main() -> None:
                 def capture(camera: ImageSensor = camera) -> object:
                     return camera.capture(world, pose, generator(1, "bench"), ignore=("Ego",))
 
-                stationary = minimum_time(capture)
+                stationary = minimum_time(capture, REPEATS)
                 with _without_cache():
-                    row.append(f"{minimum_time(capture):.1f} / {stationary:.1f}")
+                    row.append(f"{minimum_time(capture, REPEATS):.1f} / {stationary:.1f}")
             print(f"{weather:<18}" + "".join(f"{value:<16}" for value in row))
         print("\nlidar, 32 channels, 5760 rays per reading [ms]")
         for weather in ("sunny", "foggy_morning"):
@@ -79,8 +68,7 @@ def main() -> None:
             def read_lidar(settings: LidarSettings = settings) -> object:
                 return Lidar(settings, world.spec("Ego")).read(world, view, 0)
 
-            value = minimum_time(read_lidar)
-            print(f"{weather:<26}{value:.1f}")
+            print(f"{weather:<26}{minimum_time(read_lidar, REPEATS):.1f}")
 
 
 if __name__ == "__main__":

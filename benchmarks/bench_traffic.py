@@ -9,7 +9,6 @@ by triggers, and a TrafficSwarmAction. `EIDRIVE_MAPS` names the folder with the 
 from __future__ import annotations
 
 import argparse
-import cProfile
 import gc
 import os
 import pstats
@@ -20,7 +19,8 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from timing import print_shares
+from cars import VEHICLE, start
+from timing import profiled
 
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.openscenario import load_scenario
@@ -28,20 +28,9 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.traffic import Fleet
 
-VEHICLE = """<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1.4" y="0" z="0.75"/>
-<Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
-<Performance maxSpeed="60" maxDeceleration="9" maxAcceleration="5"/>
-<Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
-<RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles></Vehicle>"""
 SWARM = """<GlobalAction><TrafficAction trafficName="swarm"><TrafficSwarmAction innerRadius="10" semiMajorAxis="{reach}"
 semiMinorAxis="{reach}" numberOfVehicles="{count}" offset="0"><CentralObject entityRef="car0"/>
 </TrafficSwarmAction></TrafficAction></GlobalAction>"""
-PLACED = """<Private entityRef="car{n}"><PrivateAction><TeleportAction><Position>
-<LanePosition roadId="{road}" laneId="{lane}" s="{s:.2f}"/></Position></TeleportAction></PrivateAction>
-<PrivateAction><LongitudinalAction><SpeedAction>
-<SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
-<SpeedActionTarget><AbsoluteTargetSpeed value="{speed:.2f}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
-</PrivateAction></Private>"""
 GROUP = """<ManeuverGroup name="g{n}" maximumExecutionCount="1"><Actors selectTriggeringEntities="false">
 <EntityRef entityRef="car{n}"/></Actors><Maneuver name="m{n}"><Event name="e{n}" priority="override">
 <Action name="a{n}"><PrivateAction>{action}</PrivateAction></Action><StartTrigger><ConditionGroup>
@@ -85,7 +74,8 @@ def scenario_text(town: Path, scripted: int, swarm: int, seconds: float) -> str:
     for n, (row, progress) in enumerate(occupied):
         key = lanes.keys[row]
         s = float(lanes.s(np.array([row]), np.array([progress]))[0])
-        placed.append(PLACED.format(n=n, road=key.road, lane=key.lane, s=s, speed=rng.uniform(5.0, 14.0)))
+        speed = rng.uniform(5.0, 14.0)
+        placed.append(start(f"car{n}", key.road, key.lane, f"{s:.2f}", f"{speed:.2f}"))
         if n % 5 == 0:
             groups.append(GROUP.format(n=n, action=ACTIONS[n // 5 % 2], distance=rng.uniform(10.0, 150.0)))
     return FILE.format(
@@ -148,11 +138,6 @@ def main() -> None:
         cpu.append(time.process_time() - started)
         running.append(result.wall_s)
         hashes.add(result.trace_hash)
-    profile = cProfile.Profile()
-    simulation = build(*traffic)
-    profile.enable()
-    simulation.run()
-    profile.disable()
     ticks = round(result.simulated_s / 0.05)
     swarm = len(simulation.storyboard.context.traffic_names)
     print(f"{options.town}: {options.scripted} scripted cars, a swarm of {options.swarm} ({swarm} at the end)")
@@ -162,7 +147,7 @@ def main() -> None:
     print(f"  simulated s per s of CPU   {result.simulated_s / median(cpu):8.2f}")
     print(f"  per tick                   {1e3 * median(running) / ticks:8.3f} ms")
     print(f"  loading                    {median(loading):8.3f} s")
-    print_shares(profile)
+    profile = profiled(build(*traffic).run)
     if options.profile:
         pstats.Stats(profile).sort_stats("tottime").print_stats(40)
 

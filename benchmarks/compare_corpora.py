@@ -19,10 +19,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import closing
 from pathlib import Path
 from statistics import geometric_mean
+from typing import NamedTuple
 
 from compare import checkout
 from figures import COMMAND, SINGLE_THREAD, children_time
@@ -30,9 +30,8 @@ from figures import COMMAND, SINGLE_THREAD, children_time
 STEP = 0.01
 
 
-@dataclass(frozen=True)
-class Times:
-    """Times of one file [s], in the processes that run all files, and in separate processes; None: not measured."""
+class Times(NamedTuple):
+    """Times of one file with both commits [s], in the processes that run all files, and in separate processes."""
 
     name: str
     base: float
@@ -76,17 +75,6 @@ class Runner:
         self._process.wait()
 
 
-@contextmanager
-def runners(base: Path, head: Path) -> Iterator[tuple[Runner, Runner]]:
-    """Yield a runner for each checkout."""
-    pair = Runner(base), Runner(head)
-    try:
-        yield pair
-    finally:
-        for runner in pair:
-            runner.close()
-
-
 def answer_requests() -> None:
     """Run the scenarios of the requests on the standard input, and print their processor times [s]."""
     from eidrive_scenario.errors import EidriveError
@@ -127,19 +115,17 @@ def measured(paths: Sequence[Path], base: Path, head: Path, options: argparse.Na
     if options.processes and paths:
         for side in (base, head):
             process_seconds(paths[0], options.limit, side)  # The first process writes the byte code
-    with runners(base, head) as (of_base, of_head):
+    with closing(Runner(base)) as of_base, closing(Runner(head)) as of_head:
         for path in paths:
-            times: dict[Runner, list[float | None]] = {of_base: [], of_head: []}
-            for _ in range(options.repeats):
-                for runner in times:
-                    times[runner].append(runner.seconds(path, options.limit))
-            completed = [[value for value in values if value is not None] for values in times.values()]
+            turns = [
+                [runner.seconds(path, options.limit) for runner in (of_base, of_head)] for _ in range(options.repeats)
+            ]
+            completed = [[value for value in values if value is not None] for values in zip(*turns, strict=True)]
             if not all(completed):
                 continue
-            processes: tuple[float | None, float | None] = (None, None)
-            if options.processes:
-                processes = process_seconds(path, options.limit, base), process_seconds(path, options.limit, head)
-            yield Times(path.stem, min(completed[0]), min(completed[1]), *processes)
+            sides = (base, head) if options.processes else ()
+            processes = [process_seconds(path, options.limit, side) for side in sides]
+            yield Times(path.stem, *map(min, completed), *processes)
 
 
 def summary(title: str, pairs: Sequence[tuple[float, float]]) -> str:
@@ -188,7 +174,7 @@ def main() -> None:
         with options.csv.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream)
             writer.writerow(["scenario", "base_s", "head_s", "base_process_s", "head_process_s"])
-            writer.writerows([row.name, row.base, row.head, row.base_process, row.head_process] for row in table)
+            writer.writerows(table)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ the figures of traffic are omitted without it.
 from __future__ import annotations
 
 import argparse
-import cProfile
 import json
 import os
 import pstats
@@ -55,41 +54,25 @@ def planner_tick() -> float:
 
 def heavy_traffic() -> float:
     """Return the simulated time of coop/scenario_5 with the planner `behavior` per processor time."""
-    from bench_planner import DT, SCENARIO, timed_ticks
+    from bench_planner import DT, timed_run
     from timing import sum_of_minima
 
-    from eidrive_scenario.extensions.library import resolve_scenario
-    from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
-
-    settings = RunSettings(planner="behavior", detector="oracle")
-    scenario = load_for_seed(resolve_scenario(SCENARIO), 1, settings.parameters)
-    ticks = [timed_ticks(Simulation(scenario, seed=1, settings=settings)) for _ in range(3)]
+    ticks = [timed_run("behavior", 1) for _ in range(3)]
     return DT * len(ticks[0]) / sum_of_minima(ticks)
 
 
-def detector(name: str, properties: Mapping[str, str] | None = None) -> float:
-    """Return the simulated time of scenario 1 with a detector on two stations per processor time."""
+def detector(name: str, properties: str = "DEFAULT") -> float:
+    """Return the simulated time of scenario 1 with a detector on two stations per processor time.
+
+    properties  name of those in `detector_runs`
+    """
     import cv2
-    from detector_runs import run
+    import detector_runs
 
     cv2.setNumThreads(1)
-    run(name, properties or {}, seed=1)
-    measured = run(name, properties or {}, seed=1)
+    for _ in range(2):  # the second run loads no network
+        measured = detector_runs.run(name, getattr(detector_runs, properties), seed=1)
     return measured.simulated / measured.total
-
-
-def integers(name: str) -> float:
-    """Return the figure of a detector whose network computes with 8-bit integers."""
-    from detector_runs import INT8
-
-    return detector(name, INT8)
-
-
-def large_images() -> float:
-    """Return the figure of `yolov5` with images and lidar of EI-Drive."""
-    from detector_runs import AS_EI_DRIVE
-
-    return detector("yolov5", AS_EI_DRIVE)
 
 
 def traffic(scripted: int, swarm: int, seconds: float) -> float:
@@ -168,9 +151,9 @@ FIGURES: Mapping[str, Figure] = {
     "scenario_5": Figure(REAL_TIME, heavy_traffic, 10.0),
     "yolov5": Figure(REAL_TIME, lambda: detector("yolov5"), 3.0, 1.44),
     "ssd": Figure(REAL_TIME, lambda: detector("ssd"), 3.0, 1.37),
-    "yolov5_int8": Figure(REAL_TIME, lambda: integers("yolov5"), 3.5),
-    "ssd_int8": Figure(REAL_TIME, lambda: integers("ssd"), 3.5),
-    "yolov5_800x600": Figure(REAL_TIME, large_images, 1.2, 0.44),
+    "yolov5_int8": Figure(REAL_TIME, lambda: detector("yolov5", "INT8"), 3.5),
+    "ssd_int8": Figure(REAL_TIME, lambda: detector("ssd", "INT8"), 3.5),
+    "yolov5_800x600": Figure(REAL_TIME, lambda: detector("yolov5", "AS_EI_DRIVE"), 1.2, 0.44),
     "lidar": Figure(REAL_TIME, lambda: detector("lidar"), 5.0, 2.48),
     "cars_200": Figure(REAL_TIME, lambda: traffic(200, 100, 30.0), 20.0, 6.7, maps=True),
     "cars_1000": Figure(REAL_TIME, lambda: traffic(1000, 0, 10.0), 5.0, maps=True),
@@ -235,14 +218,14 @@ def line(name: str, value: float | None) -> str:
 
 def print_profile(name: str) -> None:
     """Print where a figure spends its time in this process; other processes are not measured."""
-    from timing import print_shares
+    from timing import profiled
 
     FIGURES[name].measure()  # the second measurement imports no modules
-    profile = cProfile.Profile()
-    value = profile.runcall(FIGURES[name].measure)
-    print(f"{name}, {value:.4g} {FIGURES[name].unit} with the profiler")
-    print_shares(profile)
-    pstats.Stats(profile).strip_dirs().sort_stats("tottime").print_stats(12)
+
+    def measured() -> None:
+        print(f"{name}, {FIGURES[name].measure():.4g} {FIGURES[name].unit} with the profiler")
+
+    pstats.Stats(profiled(measured)).strip_dirs().sort_stats("tottime").print_stats(12)
 
 
 def main() -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from itertools import cycle
 from pathlib import Path
 
+from cars import VEHICLE, start
+
 LENGTH = 2000.0
 """Default length over which the cars are spread at the start [m]."""
 SPEED = 25.0
@@ -18,15 +20,7 @@ _LANE = (
 )
 _CAR = """
 <ScenarioObject name="{name}">
-  <Vehicle name="car" vehicleCategory="car">
-    <BoundingBox><Center x="1.4" y="0" z="0.75"/><Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
-    <Performance maxSpeed="60" maxAcceleration="5" maxDeceleration="9"/>
-    <Axles>
-      <FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
-      <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/>
-    </Axles>
-    <Properties/>
-  </Vehicle>
+  {vehicle}
   <ObjectController><Controller name="{name}Stack"><Properties>
     <Property name="module" value="eidrive"/><Property name="planner" value="none"/>
     <Property name="detector" value="oracle"/><Property name="range" value="1"/>
@@ -34,18 +28,6 @@ _CAR = """
     <Property name="fusion" value="{fusion}"/><Property name="cooperates_with" value="{senders}"/>
   </Properties></Controller></ObjectController>
 </ScenarioObject>"""
-_START = """
-<Private entityRef="{name}">
-  <PrivateAction><TeleportAction><Position>
-    <LanePosition roadId="1" laneId="{lane}" s="{s:g}"/>
-  </Position></TeleportAction></PrivateAction>
-  <PrivateAction><LongitudinalAction><SpeedAction>
-    <SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
-    <SpeedActionTarget><AbsoluteTargetSpeed value="{speed:g}"/></SpeedActionTarget>
-  </SpeedAction></LongitudinalAction></PrivateAction>
-  <PrivateAction><ControllerAction><ActivateControllerAction lateral="false" longitudinal="false"/></ControllerAction>
-  </PrivateAction>
-</Private>"""
 
 
 def write_scenario(
@@ -81,6 +63,7 @@ def write_scenario(
     cars = "".join(
         _CAR.format(
             name=name,
+            vehicle=VEHICLE,
             generation=generation,
             rate=rate_property,
             senders="all" if all_listen or name == EGO else "none",
@@ -89,7 +72,7 @@ def write_scenario(
         for name in names
     )
     starts = "".join(
-        _START.format(name=name, lane=lane, s=1.5 * LENGTH + length * number / stations, speed=SPEED)
+        start(name, "1", lane, f"{1.5 * LENGTH + length * number / stations:g}", f"{SPEED:g}", active="false")
         for number, (name, lane) in enumerate(zip(names, cycle((-2, -1, 1, 2)), strict=False))
     )
     scenario = folder / "stations.xosc"

@@ -7,8 +7,10 @@ import pstats
 import time
 from collections import defaultdict
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from eidrive_scenario.simulation import Simulation
 
 PACKAGE = "eidrive_scenario"
 Function = tuple[str, int, str]
@@ -16,11 +18,27 @@ _DEEPEST = 6
 """Maximum number of functions of libraries between a function and the package that it counts for."""
 
 
-def timed(task: Callable[[], object]) -> float:
-    """Return the time of a task [s]."""
-    started = time.perf_counter()
+def tick_times(simulation: Simulation, clock: Callable[[], float]) -> list[float]:
+    """Return the time of each tick of a run by a clock [s], and close the run."""
+    times: list[float] = []
+    end = None
+    with simulation:
+        while end is None:
+            started = clock()
+            _, end = simulation.tick()
+            times.append(clock() - started)
+    return times
+
+
+def minimum_time(task: Callable[[], object], repeats: int) -> float:
+    """Return the minimum processor time of a task [ms], which is done once before to fill caches."""
     task()
-    return time.perf_counter() - started
+    times = []
+    for _ in range(repeats):
+        started = time.process_time()
+        task()
+        times.append(time.process_time() - started)
+    return 1e3 * min(times)
 
 
 def sum_of_minima(runs: list[list[float]]) -> float:
@@ -29,12 +47,15 @@ def sum_of_minima(runs: list[list[float]]) -> float:
     return total
 
 
-def print_shares(profile: cProfile.Profile) -> None:
-    """Print the shares of time by package, those of at least 0.5 %."""
+def profiled(task: Callable[[], object]) -> cProfile.Profile:
+    """Return the profile of a task, and print its shares of time by package, those of at least 0.5 %."""
+    profile = cProfile.Profile()
+    profile.runcall(task)
     print("time of a run by package (cProfile; libraries count for the package that calls them):")
     for package, share in shares_by_package(profile).items():
         if share >= 0.005:
             print(f"  {package:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
+    return profile
 
 
 def shares_by_package(profile: cProfile.Profile) -> dict[str, float]:
@@ -73,15 +94,9 @@ def _package_of(function: Function) -> str:
     file, _, name = function
     if file == "~" and "pybullet" in name:
         return "pybullet itself"
-    parts = Path(file).parts
     for package in (PACKAGE, "eidrive_behaviors", "eidrive_criteria"):
-        if package in parts:
-            inside = parts[len(parts) - parts[::-1].index(package) :]
-            return (
-                f"{inside[0]}/"
-                if package == PACKAGE and len(inside) > 1
-                else inside[0]
-                if package == PACKAGE
-                else package
-            )
+        _, separator, inside = file.rpartition(f"/{package}/")
+        if separator:
+            folder, is_folder, _ = inside.partition("/")
+            return package if package != PACKAGE else folder + is_folder
     return ""
