@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from pathlib import Path
 
 from rich.console import Console
 
 from eidrive_reports.paper import EGO, HIDDEN, SCENARIOS
-from eidrive_scenario.api.common import write_atomically
+from eidrive_reports.tables import grouped, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, resolve_scenario, run_jobs, wilson
 from eidrive_scenario.api.run import RunSettings, run_file
 
@@ -27,8 +27,8 @@ CHANNELS = ("none", "ideal")
 
 
 @dataclass(frozen=True)
-class Row:
-    """One run. `distance` is between the bodies [m], 0 after a contact; `false_tracks` per simulated minute."""
+class ClosedLoopRun:
+    """Outcome of one run: `distance` between the bodies [m], 0 after a contact; `false_tracks` per simulated minute."""
 
     scenario: str
     detector: str
@@ -51,12 +51,12 @@ def jobs(detectors: Sequence[str], channels: Sequence[str], seed: int) -> list[J
     ]
 
 
-def row_of(job: Job) -> Row:
-    """Run a job and return its row of the table."""
+def run_of(job: Job) -> ClosedLoopRun:
+    """Run a job and return its outcome."""
     result = run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings)
     detector, channel = job.arm.split(" ", 1)
     metrics = result.metrics
-    return Row(
+    return ClosedLoopRun(
         job.scenario,
         detector,
         channel,
@@ -69,23 +69,18 @@ def row_of(job: Job) -> Row:
     )
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the rows as a Markdown table, one line per detector, scenario and channel in their order of appearance."""
-    lines = [
-        "| detector | scenario | channel | collision-free | 95 % interval | false tracks per minute | "
-        "brakings without cause |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for detector, scenario, channel in dict.fromkeys((row.detector, row.scenario, row.channel) for row in rows):
-        mine = [row for row in rows if (row.detector, row.scenario, row.channel) == (detector, scenario, channel)]
-        free = wilson(sum(row.collisions == 0 for row in mine), len(mine))
-        false = sum(row.false_tracks for row in mine) / len(mine)
-        without_cause, brakings = sum(row.without_cause for row in mine), sum(row.brakings for row in mine)
-        lines.append(
-            f"| `{detector}` | {scenario.removeprefix('coop/')} | `{channel}` | {free.successes} of {len(mine)} | "
-            f"{free.low:.2f} to {free.high:.2f} | {false:.1f} | {without_cause} of {brakings} |"
-        )
-    return "\n".join(lines) + "\n"
+def table(runs: Sequence[ClosedLoopRun]) -> str:
+    """Return the runs as a Markdown table, one line per detector, scenario and channel in their order of appearance."""
+    titles = ("detector", "scenario", "channel", "collision-free", "95 % interval", "false tracks per minute")
+    lines = []
+    for (detector, scenario, channel), mine in grouped(runs, attrgetter("detector", "scenario", "channel")).items():
+        free = wilson(sum(run.collisions == 0 for run in mine), len(mine))
+        false = sum(run.false_tracks for run in mine) / len(mine)
+        without_cause, brakings = sum(run.without_cause for run in mine), sum(run.brakings for run in mine)
+        interval = f"{free.low:.2f} to {free.high:.2f}"
+        cells = (f"`{detector}`", scenario.removeprefix("coop/"), f"`{channel}`", f"{free.successes} of {len(mine)}")
+        lines.append((*cells, interval, f"{false:.1f}", f"{without_cause} of {brakings}"))
+    return markdown_table((*titles, "brakings without cause"), lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -94,26 +89,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=20, help="number of seeds, from 1")
     parser.add_argument("--detectors", default=",".join(DETECTORS))
     parser.add_argument("--channels", default=",".join(CHANNELS))
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
+    options = study_options(parser, arguments)
     record = options.out / "closed_loop.jsonl"
     text = record.read_text(encoding="utf-8") if record.is_file() else ""
-    rows = [Row(**json.loads(line)) for line in text.splitlines()]
+    runs = [ClosedLoopRun(**json.loads(line)) for line in text.splitlines()]
     console = Console(stderr=True)
     for seed in range(1, options.seeds + 1):
-        done = {(row.scenario, f"{row.detector} {row.channel}", row.seed) for row in rows}
+        done = {(run.scenario, f"{run.detector} {run.channel}", run.seed) for run in runs}
         requested = jobs(options.detectors.split(","), options.channels.split(","), seed)
         left = [job for job in requested if (job.scenario, job.arm, job.seed) not in done]
-        added = run_jobs(left, row_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
+        added = run_jobs(left, run_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
         with record.open("a", encoding="utf-8") as lines:
-            lines.writelines(json.dumps(asdict(row)) + "\n" for row in added)
-        rows += added
-    rows.sort(key=lambda row: (row.detector, row.scenario, row.channel, row.seed))
-    result = table(rows)
-    with write_atomically(options.out / "closed_loop.md") as stream:
-        stream.write(result.encode())
-    sys.stdout.write(result)
+            lines.writelines(json.dumps(asdict(run)) + "\n" for run in added)
+        runs += added
+    runs.sort(key=attrgetter("detector", "scenario", "channel", "seed"))
+    publish(table(runs), options.out / "closed_loop.md")
 
 
 if __name__ == "__main__":

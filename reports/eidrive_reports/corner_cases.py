@@ -8,14 +8,16 @@ The output is corner_cases.md, the table of docs/corner_cases.md.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 
 from rich.console import Console
 
-from eidrive_reports.planner_scenes import CONTACT, EGO, SceneRun, run_of
-from eidrive_scenario.api.common import write_atomically
+from eidrive_reports.driven_runs import CONTACT
+from eidrive_reports.paper import EGO
+from eidrive_reports.planner_scenes import SceneRun, run_of
+from eidrive_reports.tables import grouped, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings
 
@@ -65,15 +67,12 @@ def jobs(scenarios: Iterable[str], seeds: Sequence[int]) -> list[Job]:
 
 def table(runs: Sequence[SceneRun]) -> str:
     """Return the runs as a Markdown table, one line per scenario and arm in order of appearance."""
-    lines = [
-        "| scenario | senders | collisions | arrived | known after [s] | time lost [s] | hardest braking [m/s²] |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    titles = ("scenario", "senders", "collisions", "arrived", "known after [s]", "time lost [s]")
+    lines = []
     before = ""
-    for scenario, arm in dict.fromkeys((run.scenario, run.planner) for run in runs):
-        mine = [run for run in runs if (run.scenario, run.planner) == (scenario, arm)]
+    for (scenario, arm), mine in grouped(runs, attrgetter("scenario", "planner")).items():
         free = [run for run in mine if not run.collided]
-        cells = [
+        cells = (
             "" if scenario == before else f"`{scenario.split('/')[-1]}`",
             arm,
             f"{sum(run.collided for run in mine)} of {len(mine)}",
@@ -81,10 +80,10 @@ def table(runs: Sequence[SceneRun]) -> str:
             _mean([run.detected for run in mine if run.detected is not None]),
             _mean([run.lost for run in mine if run.arrived]),
             f"{max(run.braking for run in free):.1f}" if free else "-",
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
+        )
+        lines.append(cells)
         before = scenario
-    return "\n".join(lines) + "\n"
+    return markdown_table((*titles, "hardest braking [m/s²]"), lines)
 
 
 def _mean(values: Sequence[float]) -> str:
@@ -97,15 +96,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("names", nargs="*", choices=choices, help="scenarios (default: all)")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 1")
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
+    options = study_options(parser, arguments)
     chosen = jobs(options.names or ARMS, range(1, options.seeds + 1))
     runs = run_jobs(chosen, run_of, workers=options.workers, console=Console(stderr=True), title="corner cases")
-    result = table(runs)
-    with write_atomically(options.out / "corner_cases.md") as stream:
-        stream.write(result.encode())
-    sys.stdout.write(result)
+    publish(table(runs), options.out / "corner_cases.md")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ from eidrive_reports.paper import (
     tabulate,
 )
 from eidrive_reports.street_view import driver_view, helper_view, street_image
+from eidrive_reports.tables import positive
 from eidrive_scenario.api.actions import is_agent_controller
 from eidrive_scenario.api.common import Array, EidriveError, InputError, RoadNetwork, Scenario, write_atomically
 from eidrive_scenario.api.driving import agent_settings
@@ -76,21 +77,20 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
     snapshot = next((moment.snapshot for moment in story.moments if moment.kind == "braked"), None)
     if snapshot is None:
         return ()
-    view, images = snapshot.view, []
+    view = snapshot.view
     bodies = {name: actor_spec(name, scenario.entities[name]) for name in view.names}
-    pose = driver_view(view, EGO)
-    images.append(
+    cameras = {EGO: (driver_view(view, EGO), "start of braking")}
+    for report in snapshot.received[:1]:
+        sender = report.message.sender
+        cameras[sender] = (helper_view(view, sender, HIDDEN), f"towards {HIDDEN}")
+    return tuple(
         PageImage(
-            f"View of {EGO}",
-            f"at {view.time:.2f} s, start of braking",
-            street_image(bodies, roads, view, pose, without=EGO),
+            f"View of {name}",
+            f"at {view.time:.2f} s, {subject}",
+            street_image(bodies, roads, view, pose, without=name),
         )
+        for name, (pose, subject) in cameras.items()
     )
-    for sender in dict.fromkeys(report.message.sender for report in snapshot.received):
-        pose = helper_view(view, sender, HIDDEN)
-        png = street_image(bodies, roads, view, pose, without=sender)
-        images.append(PageImage(f"View of {sender}", f"at {view.time:.2f} s, towards {HIDDEN}", png))
-    return tuple(images[:2])
 
 
 def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
@@ -133,11 +133,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line. Exit codes: 0 completed, 2 invalid input, 3 aborted."""
     parser = argparse.ArgumentParser(prog="python -m eidrive_reports.demo", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("reports/demo.html"), help="file of the page")
-    parser.add_argument("--seeds", type=int, default=20, help="runs of each arm, with seeds from 1")
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
+    parser.add_argument("--seeds", type=positive, default=20, help="runs of each arm, with seeds from 1")
+    parser.add_argument("--workers", type=positive, default=None, help="processes; all cores by default")
     given = parser.parse_args(arguments)
-    if given.seeds < 1 or (given.workers is not None and given.workers < 1):
-        parser.error("--seeds and --workers: not a positive number")
     if given.out.is_dir() or any(above.exists() and not above.is_dir() for above in given.out.parents):
         parser.error(f"--out: not a path of a file (got {given.out}; expected, for example, reports/demo.html)")
     if given.out.suffix == ".json":

@@ -19,8 +19,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from eidrive_reports.driven_files import positive, table, worse_runs
+from eidrive_reports.driven_files import table, worse_runs
 from eidrive_reports.driven_runs import DEFAULT, STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_reports.tables import markdown_table, positive, study_options
 from eidrive_scenario.api.common import SettingError, write_atomically
 
 CORPORA, MAPS = "EIDRIVE_CORPORA", "EIDRIVE_MAPS"
@@ -99,11 +100,12 @@ def summary(groups: Sequence[tuple[Group, Sequence[DrivenRun]]]) -> str:
         "by own fault",
         "where the reference has none",
     )
-    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    lines = []
     for group, every in groups:
         runs = [run for run in every if not run.excluded]
         stacks = [run for run in runs if run.arm == STACK]
         counts = (
+            group.title,
             len({run.file for run in stacks}),
             len(stacks),
             sum(bool(run.error) for run in stacks),
@@ -111,17 +113,16 @@ def summary(groups: Sequence[tuple[Group, Sequence[DrivenRun]]]) -> str:
             sum(run.at_fault for run in stacks),
             "-" if group.reference is None else len(worse_runs(runs)),
         )
-        lines.append(f"| {group.title} | {' | '.join(map(str, counts))} |")
-    return "\n".join(lines) + "\n"
+        lines.append(counts)
+    return markdown_table(columns, lines)
 
 
 def report(groups: Sequence[tuple[Group, Sequence[DrivenRun]]]) -> str:
     """Return the summary and the table of each group."""
-    return "\n".join([summary(groups), *(f"### {group.title}\n\n{_table(group, runs)}" for group, runs in groups)])
-
-
-def _table(group: Group, runs: Sequence[DrivenRun]) -> str:
-    return table(runs, has_reference=group.reference is not None)
+    tables = (
+        f"### {group.title}\n\n{table(runs, has_reference=group.reference is not None)}" for group, runs in groups
+    )
+    return "\n".join([summary(groups), *tables])
 
 
 def folders(environment: dict[str, str] | os._Environ[str]) -> Path:
@@ -153,13 +154,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
+    options = study_options(parser, arguments)
     try:
         corpora, groups = folders(os.environ), selected(options.groups)
     except ValueError as error:
         parser.error(str(error))
-    options.out.mkdir(parents=True, exist_ok=True)
     record = options.out / "driven_corpora.jsonl"
     if not options.resume:
         record.unlink(missing_ok=True)

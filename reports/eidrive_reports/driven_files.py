@@ -12,24 +12,17 @@ one line per run; `--resume` repeats no run of that file.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable, Sequence
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
 from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_reports.tables import grouped, markdown_table, positive, publish, study_options
 from eidrive_scenario.api.actions import is_agent_controller
-from eidrive_scenario.api.common import (
-    Diagnostic,
-    InputError,
-    SettingError,
-    quoted,
-    registry,
-    suggestion,
-    write_atomically,
-)
+from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted, registry, suggestion
 from eidrive_scenario.api.experiments import definition
 from eidrive_scenario.api.run import Controller, load_distribution, load_scenario
 
@@ -52,30 +45,28 @@ def table(runs: Iterable[DrivenRun], *, has_reference: bool) -> str:
 
     has_reference  whether runs with a contact by own fault are compared with a reference driver
     """
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
+    lines: list[Sequence[object]] = []
     evaluated = [run for run in runs if not run.excluded]
-    for file in dict.fromkeys(run.file for run in evaluated):
-        mine = [run for run in evaluated if run.file == file]
+    for file, mine in grouped(evaluated, attrgetter("file")).items():
         stacks = [run for run in mine if run.arm == STACK]
         errors = sorted({run.error for run in stacks if run.error})
         if errors:
-            lines.append(f"| {file} | {len(stacks)} | {errors[0]} |{' |' * (len(COLUMNS) - 3)}")
+            lines.append((file, len(stacks), errors[0] + " |" * (len(COLUMNS) - 3)))  # other cells are empty
             continue
-        worse = str(len(worse_runs(mine))) if has_reference else "-"
         failed = sorted({name for run in stacks for name in run.failed})
         criteria = ", ".join(f"`{name}`" for name in failed) or ("none" if any(run.judged for run in stacks) else "-")
-        cells = [
+        cells = (
             file,
-            str(len(stacks)),
-            str(sum(run.collided for run in stacks)),
-            str(sum(run.at_fault for run in stacks)),
-            worse,
+            len(stacks),
+            sum(run.collided for run in stacks),
+            sum(run.at_fault for run in stacks),
+            len(worse_runs(mine)) if has_reference else "-",
             f"{np.mean([run.distance for run in stacks]):.0f}",
             f"{max(run.braking for run in stacks):.1f}",
             criteria,
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+        )
+        lines.append(cells)
+    return markdown_table(COLUMNS, lines)
 
 
 def worse_runs(runs: Iterable[DrivenRun]) -> list[DrivenRun]:
@@ -83,14 +74,6 @@ def worse_runs(runs: Iterable[DrivenRun]) -> list[DrivenRun]:
     runs = tuple(runs)
     avoided = {run.case for run in runs if run.arm == REFERENCE and not run.collided and not run.error}
     return [run for run in runs if run.arm == STACK and run.at_fault and run.case in avoided]
-
-
-def positive(text: str) -> int:
-    """Return the positive number of an option. Raise ValueError for any other text."""
-    number = int(text)
-    if number < 1:
-        raise ValueError
-    return number
 
 
 def wrong_reference(files: Iterable[Path], name: str, model: str) -> Diagnostic | None:
@@ -128,8 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(REFERENCE_OPTION, metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
+    options = study_options(parser, arguments)
     name, separator, model = (options.reference or "").partition("=")
     if options.reference and not (name and separator and model):
         parser.error("--reference: expected CONTROLLER=MODEL, for example ALKSController=alks")
@@ -144,7 +126,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for path in options.files
         for job in jobs_of_file(path, options.drive, options.planner, options.samples, reference)
     ]
-    options.out.mkdir(parents=True, exist_ok=True)
     record = options.out / "driven_files.jsonl"
     if not options.resume:
         record.unlink(missing_ok=True)
@@ -153,10 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         runs = run_recorded(jobs, record, workers=options.workers, console=console, title="driven files")
     except SettingError as error:
         parser.error(str(error))
-    result = table(runs, has_reference=reference is not None)
-    with write_atomically(options.out / "driven_files.md") as stream:
-        stream.write(result.encode())
-    sys.stdout.write(result)
+    publish(table(runs, has_reference=reference is not None), options.out / "driven_files.md")
 
 
 if __name__ == "__main__":

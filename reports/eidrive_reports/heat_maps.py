@@ -19,6 +19,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from eidrive_reports.tables import study_options
 from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted
 from eidrive_scenario.api.experiments import Job, from_library, run_jobs
 from eidrive_scenario.api.pages import heat_cells, write_figure
@@ -73,17 +74,19 @@ def run_outcome_grid(
     Raise SettingError if the distribution does not vary exactly two parameters, or a value is not a number.
     """
     runs = tuple(load_distribution(distribution, seed=seed))
-    x_name, y_name = _axes(distribution, runs)
+    names = tuple(runs[0].parameters)
+    if len(names) != 2:
+        message = f"the distribution varies {len(names)} parameters (expected 2, the axes of the grid)"
+        raise SettingError(Diagnostic(message, "use a distribution over two parameters", str(distribution)))
+    x_name, y_name = names
+    points = [(_number(distribution, run, x_name), _number(distribution, run, y_name)) for run in runs]
     jobs = [
         Job(str(run.scenario), arm, seed, RunSettings(parameters={**(parameters or {}), **values, **run.parameters}))
         for arm, values in arms.items()
         for run in runs
     ]
     outcomes = run_jobs(jobs, _outcome, workers=workers, console=console, title=distribution.stem)
-    cells = [
-        GridCell(_number(distribution, run, x_name), _number(distribution, run, y_name), *outcome)
-        for run, outcome in zip(runs * len(arms), outcomes, strict=True)
-    ]
+    cells = [GridCell(*point, *outcome) for point, outcome in zip(points * len(arms), outcomes, strict=True)]
     by_arm = {arm: tuple(cells[n * len(runs) : (n + 1) * len(runs)]) for n, arm in enumerate(arms)}
     return OutcomeGrid(distribution.stem, x_name, y_name, by_arm)
 
@@ -92,17 +95,6 @@ def _outcome(job: Job) -> tuple[bool, float | None]:
     result = run_file(job.scenario, seed=job.seed, settings=job.settings)
     speed = result.metrics.get("collision.impact_speed")
     return result.passed, None if speed is None else float(speed)
-
-
-def _axes(distribution: Path, runs: tuple[ConcreteRun, ...]) -> tuple[str, str]:
-    names = tuple(runs[0].parameters)
-    if len(names) != 2:
-        message = f"the distribution varies {len(names)} parameters (expected 2, the axes of the grid)"
-        raise SettingError(Diagnostic(message, "use a distribution over two parameters", str(distribution)))
-    for run in runs:
-        for name in names:
-            _number(distribution, run, name)
-    return names[0], names[1]
 
 
 def _number(distribution: Path, run: ConcreteRun, name: str) -> float:
@@ -164,10 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("reports/heat_maps"))
     parser.add_argument("--param", action="append", default=[], metavar="NAME=VALUE", help="parameter of all runs")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
-    if options.workers is not None and options.workers < 1:
-        parser.error(f"--workers: not a positive number (got {options.workers})")
+    options = study_options(parser, arguments)
     invalid = [text for text in options.param if "=" not in text]
     if invalid:
         parser.error(f"--param: not NAME=VALUE (got {invalid[0]!r})")

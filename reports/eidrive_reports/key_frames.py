@@ -74,10 +74,8 @@ class KeyFrames:
         self._builder = SnapshotBuilder(ego)
         self._times: list[float] = []
         self._positions: list[tuple[float, float]] = []
-        self._centers: list[float] = []
-        self._boxes: list[float] = []
-        self._speeds: list[float] = []
-        self._common_times: list[float] = []
+        self._series: list[tuple[float, float, float, float]] = []
+        """Time, distances between centers and bodies, and speed of the ego, while both cars are present."""
         self._events: dict[str, tuple[str, StationSnapshot]] = {}
         self._least = (math.inf, math.inf)
         self._touched = False
@@ -112,23 +110,12 @@ class KeyFrames:
                 continue
             title, snapshot = self._events.get(kind, (absent, None))
             moments.append(Moment(kind, title, snapshot and _portable(snapshot)))
-        return Story(
-            self.ego,
-            self.hidden,
-            tuple(moments),
-            tuple(self._common_times),
-            tuple(self._centers),
-            tuple(self._boxes),
-            tuple(self._speeds),
-            self._touched,
-        )
+        times, centers, boxes, speeds = zip(*self._series, strict=True) if self._series else ((), (), (), ())
+        return Story(self.ego, self.hidden, tuple(moments), times, centers, boxes, speeds, self._touched)
 
     def _measure(self, ego: list[float], hidden: list[float], snapshot: StationSnapshot) -> None:
         center, box = math.dist(ego[:2], hidden[:2]), box_distance(ego, hidden)
-        self._common_times.append(snapshot.time)
-        self._centers.append(center)
-        self._boxes.append(box)
-        self._speeds.append(snapshot.speeds[self.ego])
+        self._series.append((snapshot.time, center, box, snapshot.speeds[self.ego]))
         if self._touched:
             return
         pair = {self.ego, self.hidden}

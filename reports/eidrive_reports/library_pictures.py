@@ -16,12 +16,13 @@ import cv2
 import numpy as np
 import typer
 
+from eidrive_reports.paper import EGO
 from eidrive_scenario.api.common import InputError, write_atomically
 from eidrive_scenario.api.experiments import LibraryScenario, describe_scenarios
 from eidrive_scenario.api.pages import Image, ImageCanvas, RoadDrawing, Window, house_outline, road_drawing
 from eidrive_scenario.api.run import Simulation, buildings
 
-EGO, SENDER, OTHER, WALKER, TRAFFIC = "#2563eb", "#ea580c", "#334155", "#dc2626", "#94a3b8"
+EGO_COLOR, SENDER, OTHER, WALKER, TRAFFIC = "#2563eb", "#ea580c", "#334155", "#dc2626", "#94a3b8"
 """Colors of the ego, stations that send messages, other vehicles, pedestrians, and background traffic."""
 MARGIN = 8.0
 """Distance of the shown actors from the edge of the picture [m]."""
@@ -90,8 +91,6 @@ light gray is background traffic; lines are paths. `make library-pictures` draws
 """
 COLUMNS = 3
 """Scenarios in a row of the table."""
-EGO_NAME = "Ego"
-"""Name of the ego in the scenarios of the library."""
 
 
 def picture(name: str, *, seed: int = 1) -> Image:
@@ -108,13 +107,13 @@ def picture(name: str, *, seed: int = 1) -> Image:
     colors = {
         entity: SENDER if entity in stations else WALKER if categories.get(entity) == "pedestrian" else OTHER
         for entity in entities
-        if entity != EGO_NAME
+        if entity != EGO
     }
-    if roads is None:
-        return run_picture(run, RoadDrawing(), {**colors, EGO_NAME: EGO})
-    houses = tuple((house_outline(house), house.size[2]) for house in buildings(roads, without=entities))
-    drawing = replace(road_drawing(roads.roads.values()), houses=houses)
-    return run_picture(run, drawing, {**colors, EGO_NAME: EGO})
+    drawing = RoadDrawing()
+    if roads is not None:
+        houses = tuple((house_outline(house), house.size[2]) for house in buildings(roads, without=entities))
+        drawing = replace(road_drawing(roads.roads.values()), houses=houses)
+    return run_picture(run, drawing, {**colors, EGO: EGO_COLOR})
 
 
 def file_name(scenario: LibraryScenario) -> str:

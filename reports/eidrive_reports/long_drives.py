@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,8 @@ import networkx as nx
 from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, Stop, observed_run
+from eidrive_reports.paper import EGO
+from eidrive_reports.tables import markdown_table, publish, study_options
 from eidrive_scenario.api.common import (
     Diagnostic,
     EidriveError,
@@ -34,7 +35,6 @@ from eidrive_scenario.api.common import (
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings
 
-EGO = "Ego"
 GREEN, YELLOW, ALL_RED = 10.0, 3.0, 2.0
 """Durations of the phases of a traffic light [s]."""
 DEFAULT_SPEED = 50.0 / 3.6
@@ -352,7 +352,7 @@ def table(drives: Sequence[LongDrive], free: Sequence[LongDrive]) -> str:
         "longest stop [s]",
         "completed route",
     )
-    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    lines = []
     for drive, alone in zip(drives, free, strict=True):
         longest = max((stop.duration for stop in drive.stops), default=0.0)
         cells = (
@@ -369,15 +369,15 @@ def table(drives: Sequence[LongDrive], free: Sequence[LongDrive]) -> str:
             f"{longest:.0f}",
             f"{100.0 * drive.completed:.1f} %",
         )
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    text = "\n".join(lines) + "\n"
+        lines.append(cells)
     listed = [
         f"- {drive.scenario}, {stop.time:.0f} s at ({stop.x:.0f}, {stop.y:.0f}) m: {stop.duration:.0f} s, {stop.reason}"
         for drive in drives
         for stop in drive.stops
         if stop.duration >= LONG_STOP
     ]
-    return text + ("\n" + "\n".join([f"Stops of at least {LONG_STOP:g} s:", "", *listed]) + "\n" if listed else "")
+    text = markdown_table(columns, lines)
+    return "\n".join([text, f"Stops of at least {LONG_STOP:g} s:", "", *listed, ""]) if listed else text
 
 
 def minutes(text: str) -> float:
@@ -415,19 +415,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, from 1")
     parser.add_argument("--planner", default="behavior")
     parser.add_argument("--out", type=Path, default=Path("reports"))
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
-    folder = options.out / "long_drives"
-    folder.mkdir(parents=True, exist_ok=True)
+    options = study_options(parser, arguments)
     try:
-        jobs = _jobs(options, folder)
+        jobs = _jobs(options, options.out / "long_drives")
         drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
     except EidriveError as error:
         parser.error(str(error))
-    result = table(drives[::2], drives[1::2])
-    with write_atomically(options.out / "long_drives.md") as stream:
-        stream.write(result.encode())
-    sys.stdout.write(result)
+    publish(table(drives[::2], drives[1::2]), options.out / "long_drives.md")
 
 
 if __name__ == "__main__":

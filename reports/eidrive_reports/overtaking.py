@@ -10,9 +10,9 @@ sensors; they are repeated with other detectors. The output is overtaking.md and
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,12 +20,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from eidrive_reports.driven_runs import CONTACT, HARD, DrivenMotion
+from eidrive_reports.driven_runs import CONTACT, HARD, STANDING, DrivenMotion
+from eidrive_reports.paper import EGO
+from eidrive_reports.tables import grouped, markdown_table, publish, study_options
 from eidrive_scenario.api.common import generator, write_atomically
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings, Simulation
 
-EGO = "Ego"
 ROAD = 1800.0
 """Length of the road [m]."""
 ROAD_FILE = "overtaking.xodr"
@@ -52,8 +53,6 @@ OVER_BORDER = 0.3
 """Distance of the body beyond the middle of the road that counts as standing in the oncoming lane [m]."""
 SPACE = 1.0
 """Distance along the road from an obstacle at which there is space in the own lane [m]."""
-STANDING = 0.1
-"""Speed below which a vehicle stands [m/s]."""
 
 
 class Obstacle(NamedTuple):
@@ -283,16 +282,13 @@ def run_of(job: Job) -> OvertakingRun:
 
 def gap_table(runs: Sequence[OvertakingRun]) -> str:
     """Return the number of accepted gaps as a Markdown table; the arm of a run is its obstacle and gap."""
-    lines = [
-        f"| obstacle | {' | '.join(f'{gap} s' for gap in GAPS)} | collisions | hardest braking [m/s²] |",
-        "|---" * (len(GAPS) + 3) + "|",
-    ]
+    lines = []
     for kind in OBSTACLES:
         mine = [run for run in runs if run.arm.startswith(f"{kind}, ")]
         shares = [f"{accepted} of {count}" for accepted, count in _accepted(mine, kind)]
         hardest = max((run.braking for run in mine), default=0.0)
-        lines.append(f"| {kind} | {' | '.join(shares)} | {sum(run.collided for run in mine)} | {hardest:.1f} |")
-    return "\n".join(lines) + "\n"
+        lines.append((kind, *shares, sum(run.collided for run in mine), f"{hardest:.1f}"))
+    return markdown_table(("obstacle", *(f"{gap} s" for gap in GAPS), "collisions", "hardest braking [m/s²]"), lines)
 
 
 def _accepted(runs: Sequence[OvertakingRun], kind: str) -> list[tuple[int, int]]:
@@ -307,13 +303,19 @@ def _arm(kind: str, gap: int) -> str:
 
 def drive_table(runs: Sequence[OvertakingRun]) -> str:
     """Return the random drives as a Markdown table, a line for each detector."""
-    lines = [
-        "| detector | drives | collisions | by own fault | obstacle overtaken | stood in the oncoming lane | "
-        "of these with space to return | braking over 4.05 m/s² | hardest braking [m/s²] |",
-        "|---" * 9 + "|",
-    ]
-    for detector in dict.fromkeys(run.arm for run in runs):
-        mine = [run for run in runs if run.arm == detector]
+    titles = (
+        "detector",
+        "drives",
+        "collisions",
+        "by own fault",
+        "obstacle overtaken",
+        "stood in the oncoming lane",
+        "of these with space to return",
+        f"braking over {HARD:g} m/s²",
+        "hardest braking [m/s²]",
+    )
+    lines = []
+    for detector, mine in grouped(runs, attrgetter("arm")).items():
         cells = (
             f"`{detector}`",
             len(mine),
@@ -325,8 +327,8 @@ def drive_table(runs: Sequence[OvertakingRun]) -> str:
             sum(run.braking > HARD for run in mine),
             f"{max(run.braking for run in mine):.1f}",
         )
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(lines) + "\n"
+        lines.append(cells)
+    return markdown_table(titles, lines)
 
 
 def draw(runs: Sequence[OvertakingRun], path: Path) -> None:
@@ -352,10 +354,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--drives", type=int, default=1000, help="number of random drives with the oracle")
     parser.add_argument("--detector", action="append", default=None, metavar="NAME", help="for random drives, too")
     parser.add_argument("--detector-drives", type=int, default=100, help="number of random drives of each detector")
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
+    options = study_options(parser, arguments)
     folder = options.out / "overtaking"
-    folder.mkdir(parents=True, exist_ok=True)
     write_road(folder)
     gaps, drives = [], []
     for kind in OBSTACLES:
@@ -375,9 +375,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     result = "\n".join(text for text, some in ((gap_table(accepted), gaps), (drive_table(random), drives)) if some)
     if gaps:
         draw(accepted, (options.figures or options.out) / "overtaking.png")
-    with write_atomically(options.out / "overtaking.md") as stream:
-        stream.write(result.encode())
-    sys.stdout.write(result)
+    publish(result, options.out / "overtaking.md")
 
 
 def _settings(detector: str) -> RunSettings:

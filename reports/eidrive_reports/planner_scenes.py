@@ -8,7 +8,6 @@ The output is planner_scenes.md, the table of docs/planners.md.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,17 +15,15 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from eidrive_scenario.api.common import Array, write_atomically
+from eidrive_reports.driven_runs import CONTACT, WINDOW
+from eidrive_reports.paper import EGO
+from eidrive_reports.tables import markdown_table, publish, study_options
+from eidrive_scenario.api.common import Array
 from eidrive_scenario.api.experiments import Job, describe_scenarios, jobs_of, resolve_scenario, run_jobs
 from eidrive_scenario.api.run import RunResult, RunSettings, Simulation
 
-EGO = "Ego"
 PLANNERS = ("route", "behavior")
 FAMILIES = ("driving", "ei")
-CONTACT = "contact"
-"""Name of the criterion that counts all collisions."""
-WINDOW = 0.5
-"""Length of the average of the accelerations [s]."""
 
 
 @dataclass(frozen=True)
@@ -93,11 +90,8 @@ def _hardest_braking(speeds: Array, dt: float) -> float:
 
 def table(runs: Sequence[SceneRun]) -> str:
     """Return the runs as a Markdown table, one line per scenario in order of appearance."""
-    lines = [
-        "| scene | `route`: collisions, by own fault | arrived | `behavior`: collisions, by own fault | arrived | "
-        "time lost [s] | hardest braking [m/s²] |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    outcomes = (title for planner in PLANNERS for title in (f"`{planner}`: collisions, by own fault", "arrived"))
+    lines = []
     for scenario in dict.fromkeys(run.scenario for run in runs):
         cells = [scenario]
         for planner in PLANNERS:
@@ -106,8 +100,8 @@ def table(runs: Sequence[SceneRun]) -> str:
             cells.append(f"{sum(run.arrived for run in mine)} of {len(mine)}")
         cells.append(f"{sum(run.lost for run in mine) / max(len(mine), 1):.1f}")
         cells.append(f"{max((run.braking for run in mine), default=0.0):.1f}")
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+        lines.append(cells)
+    return markdown_table(("scene", *outcomes, "time lost [s]", "hardest braking [m/s²]"), lines)
 
 
 def scenes() -> list[str]:
@@ -119,18 +113,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 1")
-    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
+    options = study_options(parser, arguments)
     contact = {"collision": {"of": EGO, "name": CONTACT}}
     arms = {planner: RunSettings(parameters={"Planner": planner}, criteria=contact) for planner in PLANNERS}
     seeds = range(1, options.seeds + 1)
     jobs = [job for scene in scenes() for job in jobs_of(scene, arms, seeds)]
     runs = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="scenes")
-    result = table(runs)
-    with write_atomically(options.out / "planner_scenes.md") as stream:
-        stream.write(result.encode())
-    sys.stdout.write(result)
+    publish(table(runs), options.out / "planner_scenes.md")
 
 
 if __name__ == "__main__":

@@ -24,17 +24,17 @@ ROAD = "coop_1.xodr"
 CAMERA = CameraSettings(width=640, height=360, fov=80.0, supersampling=2)
 SPEED = (8.0, 0.0, 0.0)
 """Velocity of the car with the camera [m/s], which determines the apparent direction of rain."""
-_BODIES: dict[str, tuple[str, str, tuple[float, float, float], float, float]] = {
-    "car": ("car", "car", (4.89, 1.84, 1.49), 2.85, 0.33),
-    "firetruck": ("firetruck", "truck", (8.47, 2.89, 3.83), 4.6, 0.5),
-    "bus": ("bus", "bus", (10.3, 2.8, 3.2), 5.6, 0.48),
-    "van": ("van", "van", (5.6, 2.0, 2.5), 3.4, 0.35),
-    "truck": ("truck", "truck", (8.0, 2.5, 3.5), 4.5, 0.5),
-    "motorbike": ("motorbike", "motorbike", (2.2, 0.8, 1.6), 1.5, 0.32),
-    "bicycle": ("bicycle", "bicycle", (1.8, 0.6, 1.7), 1.1, 0.34),
-    "pedestrian": ("pedestrian", "pedestrian", (0.5, 0.5, 1.75), 0.0, 0.3),
+_BODIES: dict[str, tuple[str, tuple[float, float, float], float, float]] = {
+    "car": ("car", (4.89, 1.84, 1.49), 2.85, 0.33),
+    "firetruck": ("truck", (8.47, 2.89, 3.83), 4.6, 0.5),
+    "bus": ("bus", (10.3, 2.8, 3.2), 5.6, 0.48),
+    "van": ("van", (5.6, 2.0, 2.5), 3.4, 0.35),
+    "truck": ("truck", (8.0, 2.5, 3.5), 4.5, 0.5),
+    "motorbike": ("motorbike", (2.2, 0.8, 1.6), 1.5, 0.32),
+    "bicycle": ("bicycle", (1.8, 0.6, 1.7), 1.1, 0.34),
+    "pedestrian": ("pedestrian", (0.5, 0.5, 1.75), 0.0, 0.3),
 }
-"""Shape, class, size (length, width, height) [m], wheelbase [m] and wheel radius [m]."""
+"""Class, size (length, width, height) [m], wheelbase [m] and wheel radius [m] by shape."""
 _STREET: tuple[tuple[str, str, float, float, float], ...] = (
     ("Ego", "car", 0.0, 0.0, 0.0),
     ("Leader", "car", 21.0, -0.1, 0.0),
@@ -60,8 +60,8 @@ _VIEWS = (
 def street() -> World:
     """Return the crossing of scenario 1 with traffic. The caller closes the world."""
     world = World(RoadNetwork.load(library_path() / "roads" / ROAD), picture_maker=picture_maker)
-    for name, body, x, y, yaw in _STREET:
-        shape, category, size, wheelbase, wheel = _BODIES[body]
+    for name, shape, x, y, yaw in _STREET:
+        category, size, wheelbase, wheel = _BODIES[shape]
         offset = (wheelbase / 2.0, 0.0, size[2] / 2.0)
         spec = ActorSpec(name, shape, category, size, offset, wheelbase=wheelbase, wheel_radius=wheel)
         world.add(spec, Placement(x, y, 0.0, yaw))
@@ -93,7 +93,7 @@ def contact_sheet(weathers: list[Weather], camera: CameraSettings = CAMERA) -> N
 
 def _describe_weather(weather: Weather) -> str:
     parts = [f"sun {weather.sun_elevation:.0f} deg", f"clouds {weather.cloud_cover:.0%}"]
-    parts.append(f"visual range {weather.visual_range:g} m")
+    parts += [f"visual range {weather.visual_range:g} m"]
     if weather.precipitation != "none":
         parts.append(f"{weather.precipitation} {weather.precipitation_intensity:g} mm/h")
     if weather.wetness > 0.0:

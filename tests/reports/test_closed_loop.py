@@ -6,12 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
-from eidrive_reports.closed_loop import Row, jobs, main, table
+from eidrive_reports.closed_loop import ClosedLoopRun, jobs, main, table
 
 
-def row(seed: int, collisions: int, **given: object) -> Row:
+def row(seed: int, collisions: int, **given: object) -> ClosedLoopRun:
     values = {"scenario": "coop/scenario_1", "detector": "oracle", "channel": "none", "distance": 1.0, **given}
-    return Row(seed=seed, collisions=collisions, false_tracks=2.0 * seed, brakings=2, without_cause=seed % 2, **values)  # type: ignore[arg-type]
+    tracks = {"false_tracks": 2.0 * seed, "brakings": 2, "without_cause": seed % 2}
+    return ClosedLoopRun(seed=seed, collisions=collisions, **tracks, **values)  # type: ignore[arg-type]
 
 
 def test_table_has_one_line_per_arm_with_counts_and_means() -> None:

@@ -249,7 +249,7 @@ def test_number_of_samples_is_positive(samples: str, tmp_path: Path, capsys: pyt
     with pytest.raises(SystemExit) as exit_:
         driven_files.main([str(write(tmp_path, 70.0)), "--samples", samples])
     assert exit_.value.code == 2
-    assert f"argument --samples: invalid positive value: '{samples}'" in capsys.readouterr().err
+    assert f"argument --samples: not a positive number (got {samples})" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from eidrive_reports.library_pictures import (
-    EGO,
+    EGO_COLOR,
     OTHER,
     PAGE,
     TRAFFIC,
@@ -38,7 +38,7 @@ def test_picture_has_actors_paths_and_lanes_at_their_places() -> None:
         run.add(("Swarm.0001",), [(30.0, 12.0, 1.0, 4.0, 2.0, 1.5, 0.0)])
     lane = np.array([(-8.0, -2.0), (52.0, -2.0), (52.0, 2.0), (-8.0, 2.0)])
     roads = RoadDrawing((("driving", lane),))
-    image = run_picture(run, roads, {"Car": OTHER, "Ego": EGO}, size=(600, 400))
+    image = run_picture(run, roads, {"Car": OTHER, "Ego": EGO_COLOR}, size=(600, 400))
     assert image.shape == (400, 600, 3)
 
     def at(x: float, y: float) -> list[int]:
@@ -46,8 +46,8 @@ def test_picture_has_actors_paths_and_lanes_at_their_places() -> None:
         found: list[int] = image[round(400 - 10 * (y - bottom)), round(10 * (x + 8.0))].tolist()
         return found
 
-    assert at(-0.5, 0.3) == color(EGO)
-    assert at(20.0, 0.0) == color(EGO)
+    assert at(-0.5, 0.3) == color(EGO_COLOR)
+    assert at(20.0, 0.0) == color(EGO_COLOR)
     assert at(20.0, 1.5) == color(LANE)
     assert at(9.5, -12.3) == color(OTHER)
     assert at(29.5, 11.7) == color(TRAFFIC)

@@ -1,0 +1,49 @@
+"""Tables of the studies as Markdown, and the options that all studies have."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from eidrive_scenario.api.common import write_atomically
+
+T = TypeVar("T")
+
+
+def markdown_table(titles: Sequence[str], lines: Iterable[Iterable[object]]) -> str:
+    """Return a table as Markdown, with the text of each cell."""
+    header, *rest = [f"| {' | '.join(map(str, cells))} |\n" for cells in (titles, *lines)]
+    return "".join([header, "|---" * len(titles) + "|\n", *rest])
+
+
+def grouped(runs: Iterable[T], key: Callable[[T], Any]) -> dict[Any, list[T]]:
+    """Return runs by their key, in the order of the first ones."""
+    groups: dict[Any, list[T]] = {}
+    for run in runs:
+        groups.setdefault(key(run), []).append(run)
+    return groups
+
+
+def publish(text: str, path: Path) -> None:
+    """Write the result of a study to a file and to the standard output."""
+    with write_atomically(path) as stream:
+        stream.write(text.encode())
+    sys.stdout.write(text)
+
+
+def positive(text: str) -> int:
+    """Return the positive number of an option. Raise ArgumentTypeError for any other text."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"not a positive number (got {text})")
+    return int(text)
+
+
+def study_options(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Return the options of a study, with `--workers` in addition, and create the folder of its results."""
+    parser.add_argument("--workers", type=positive, default=None, help="processes; all cores by default")
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    return options

@@ -1,0 +1,35 @@
+"""Tables and options of the studies."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import pytest
+from eidrive_reports.tables import markdown_table, publish
+
+STUDIES = ("closed_loop", "corner_cases", "demo", "driven_corpora", "heat_maps", "overtaking", "planner_scenes")
+
+
+def test_table_has_header_rule_and_one_line_per_row() -> None:
+    assert markdown_table(("name", "count"), [("a", 1), ("b", 2)]) == (
+        "| name | count |\n|---|---|\n| a | 1 |\n| b | 2 |\n"
+    )
+    assert markdown_table(("name",), []) == "| name |\n|---|\n"
+
+
+def test_result_is_written_to_file_and_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    publish("| ² |\n", tmp_path / "out" / "table.md")
+    assert (tmp_path / "out" / "table.md").read_text(encoding="utf-8") == capsys.readouterr().out == "| ² |\n"
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_number_of_processes_of_each_study_is_positive(
+    study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        importlib.import_module(f"eidrive_reports.{study}").main(["--workers", "0"])
+    assert ended.value.code == 2
+    assert "argument --workers: not a positive number (got 0)" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir()), "an invalid call writes nothing"
