@@ -23,8 +23,8 @@ from eidrive_reports.reproduction.benchmark_arms import (
     settings_of,
     shared_channel,
 )
-from eidrive_reports.reproduction.benchmark_page import write_benchmark_page
 from eidrive_reports.reproduction.episodes import BUSY, BYTES, Episode, air_metrics
+from eidrive_reports.reproduction.page import write_benchmark_page
 from lxml import html
 
 from eidrive_scenario.api.experiments import resolve_scenario

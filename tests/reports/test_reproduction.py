@@ -102,7 +102,7 @@ def test_csv_has_all_digits_and_markdown_the_format() -> None:
         {"name": "a", "value": 1.0 / 3.0, "low": None, "holds": True},
         {"name": "b", "value": 2.0, "low": 1.0},
     )
-    columns = (plain("name", "name"), Column("range", "{low:.1f} to {value:.2f}", ("low", "value")))
+    columns = (plain("name", "name"), Column("range", "{low:.1f} to {value:.2f}"))
     lines = DataTable("t", columns, rows).markdown().splitlines()
     assert lines == ["| name | range |", "|---|---|", "| a | - |", "| b | 1.0 to 2.00 |"]
     read = list(csv.DictReader(io.StringIO(as_csv(rows[:1]))))

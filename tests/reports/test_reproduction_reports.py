@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 from eidrive_reports.paper import ARMS, COUNTS, RATIOS, TABLE_2, TABLE_3
-from eidrive_reports.reproduction import detection, ei, pipeline, sensitivity, table_2, table_3
+from eidrive_reports.reproduction import detection, sensitivity, table_2, table_3
+from eidrive_reports.reproduction.drives import EI, PIPELINE
 from eidrive_reports.reproduction.encounters import CENTER, COLLISIONS, GAP, TIME_TO_COLLISION
 from eidrive_reports.reproduction.episodes import Episode, EpisodeJob, run_episode
 from eidrive_reports.reproduction.part import Part
@@ -215,7 +216,7 @@ def drives(part: Part, failing: dict[str, str]) -> list[Episode]:
 
 def test_pipeline_states_completed_runs_and_failed_criteria() -> None:
     """Four scenarios with the oracle, two with each other detector; the mean of 20 and 40 s is 30 s."""
-    report = pipeline.report(drives(pipeline.PART, {"ssd": "reach_position"}), pipeline.DETECTORS)
+    report = PIPELINE.report(drives(PIPELINE, {"ssd": "reach_position"}), PIPELINE.detectors)
     rows = report.data()["pipeline"]
     assert [(row["detector"], row["passed"], row["failed"]) for row in rows[:3]] == [
         ("oracle", 2, ""),
@@ -229,18 +230,18 @@ def test_pipeline_states_completed_runs_and_failed_criteria() -> None:
 
 
 def test_ei_compares_the_lane_follower_with_the_statement_of_the_paper() -> None:
-    text = ei.report(drives(ei.PART, {"route": "collision"}), ei.DETECTORS).markdown()
+    text = EI.report(drives(EI, {"route": "collision"}), EI.detectors).markdown()
     assert "The lane follower has a collision in every run of 17 of 17 scenarios (paper: in all)." in text
     assert "`behavior` completes 34 of 34 drives. Scenarios with other runs: none." in text
-    other = ei.report(drives(ei.PART, {"behavior": "reach_position"}), ei.DETECTORS).markdown()
+    other = EI.report(drives(EI, {"behavior": "reach_position"}), EI.detectors).markdown()
     assert "in every run of 0 of 17 scenarios" in other
     assert "`behavior` completes 0 of 34 drives. Scenarios with other runs: ei/scenario_01 (2 runs" in other
 
 
-@pytest.mark.parametrize("part", [pipeline.PART, ei.PART], ids=lambda part: part.name)
+@pytest.mark.parametrize("part", [PIPELINE, EI], ids=lambda part: part.name)
 def test_scenarios_of_drives_are_those_of_the_library(part: Part) -> None:
     family = part.name
-    named = {case.scenario for case in part.cases(part.default)}
+    named = {case.scenario for case in part.cases(part.detectors)}
     assert named == {name for name in scenarios() if name.startswith(f"{family}/")}
 
 

@@ -82,6 +82,10 @@ as in the literature. Without a share in its name, `where2comm` sends 1 % of the
 sends all."""
 
 
+SenderSettings = tuple[PoseNoise | None, str, tuple[tuple[str, Any], ...]]
+"""Pose error, fusion method and its settings."""
+
+
 @dataclass(frozen=True)
 class Condition:
     """Arm under faults.
@@ -109,9 +113,9 @@ class Condition:
         return "; ".join([self.arm, *parts, f"every {self.every}", f"cell {self.cell:g}"])
 
     @property
-    def senders(self) -> tuple[PoseNoise | None, str, tuple[tuple[str, Any], ...]]:
-        """Pose error, fusion method and its settings of the senders. Conditions with equal ones have the same messages,
-        of which those for boxes only lack the points."""
+    def senders(self) -> SenderSettings:
+        """Settings of the senders. Conditions with equal ones have the same messages, of which those for boxes only
+        lack the points."""
         arm = ARMS[self.arm]
         if arm.shares == "features":
             return self.pose_noise, "attention", tuple((name, arm.settings[name]) for name in ("share", "encoding"))
@@ -275,23 +279,11 @@ class AgentFactory:
         context, detector = self._context, self.detectors[name]
         return build_agent(settings, self.specs[name], self.roads, seed=self.seed, dt=context.dt, detector=detector)
 
-
-class Senders:
-    """Agents of all senders with one pose error, fusion method and its settings. They do not receive messages."""
-
-    def __init__(
-        self, factory: AgentFactory, pose_noise: PoseNoise | None, fusion: str, settings: Sequence[tuple[str, Any]]
-    ) -> None:
-        changes = {"fusion": fusion, "fusion_settings": dict(settings), "cooperates_with": ()}
-        self._agents = {name: factory.agent(name, pose_noise=pose_noise, **changes) for name in factory.senders}
-
-    def messages(self, readings: Mapping[str, Readings], now: float) -> list[Message]:
-        """Return the messages of a scan, with boxes, and with points or features."""
-        return [
-            message
-            for name, agent in self._agents.items()
-            for message in agent.act(readings[name], (), now, None).outbox
-        ]
+    def sending_agents(self, settings: SenderSettings) -> dict[str, Agent]:
+        """Return agents of all senders. They do not receive messages, and send boxes and points or features."""
+        pose_noise, fusion, fusion_settings = settings
+        changes = {"fusion": fusion, "fusion_settings": dict(fusion_settings), "cooperates_with": ()}
+        return {name: self.agent(name, pose_noise=pose_noise, **changes) for name in self.senders}
 
 
 @dataclass(frozen=True)

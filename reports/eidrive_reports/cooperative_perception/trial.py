@@ -14,7 +14,7 @@ from eidrive_reports.cooperative_perception.receivers import (
     Condition,
     Receiver,
     Reception,
-    Senders,
+    SenderSettings,
 )
 from eidrive_reports.cooperative_perception.scores import (
     RANGES,
@@ -26,10 +26,11 @@ from eidrive_reports.cooperative_perception.scores import (
     true_objects,
 )
 from eidrive_scenario.api.common import TIME_TOLERANCE, ActorSpec, Integers, WorldView
-from eidrive_scenario.api.driving import AgentStep, StackContext, StackInputs, Stations
+from eidrive_scenario.api.driving import Agent, AgentStep, StackContext, StackInputs, Stations
 from eidrive_scenario.api.experiments import resolve_scenario
 from eidrive_scenario.api.perception import Readings
 from eidrive_scenario.api.run import RunResult, RunSettings, World, run_file
+from eidrive_scenario.api.v2x import Message
 
 FIRST_SAMPLE = 1.0
 """Time of the first measured frame [s]: messages with the largest latency have arrived."""
@@ -63,7 +64,7 @@ class Measurement:
         self.view: WorldView | None = None
         self.receptions: dict[Condition, Reception] = {}
         self._conditions = conditions
-        self._senders: dict[object, Senders] = {}
+        self._senders: dict[SenderSettings, dict[str, Agent]] = {}
         self._receivers: dict[Condition, Receiver] = {}
         self._samples: dict[Condition, list[tuple[Codes, Codes, Integers]]] = {
             condition: [] for condition in conditions
@@ -72,10 +73,9 @@ class Measurement:
     def scan(self, view: WorldView, readings: Mapping[str, Readings]) -> None:
         self.view, now = view, view.time
         if not self._receivers:
-            for condition in self._conditions:
-                self._receivers[condition] = Receiver(self.factory, condition)
-                if condition.senders not in self._senders:
-                    self._senders[condition.senders] = Senders(self.factory, *condition.senders)
+            self._receivers = {condition: Receiver(self.factory, condition) for condition in self._conditions}
+            sending = dict.fromkeys(condition.senders for condition in self._conditions)
+            self._senders = {settings: self.factory.sending_agents(settings) for settings in sending}
         sampled = now > FIRST_SAMPLE - TIME_TOLERANCE and _is_multiple(now, SAMPLE_INTERVAL)
         merged = sampled or _is_multiple(now + EARLIER_SCAN, SAMPLE_INTERVAL)
         ego = self.factory.ego
@@ -88,7 +88,10 @@ class Measurement:
             truth = true_objects(view, ego, clouds)
             self.truths.append(truth)
         center = view.boxes[view.row(ego), :2]
-        messages = {key: senders.messages(readings, now) for key, senders in self._senders.items()}
+        messages: dict[SenderSettings, list[Message]] = {}
+        for settings, agents in self._senders.items():
+            steps = [agent.act(readings[name], (), now, None) for name, agent in agents.items()]
+            messages[settings] = [message for step in steps for message in step.outbox]
         for condition, receiver in self._receivers.items():
             reception = receiver.scan(readings[ego], messages[condition.senders], merged=merged)
             self.receptions[condition] = reception

@@ -10,6 +10,7 @@ import shlex
 from collections.abc import Sequence
 from functools import partial
 from itertools import product
+from typing import Any
 
 from eidrive_reports.reproduction.benchmark_arms import (
     CHANNELS,
@@ -24,8 +25,19 @@ from eidrive_reports.reproduction.benchmark_arms import (
     scenarios_of,
     settings_of,
 )
-from eidrive_reports.reproduction.episodes import BUSY, BYTES, Episode
-from eidrive_reports.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, finite, plain
+from eidrive_reports.reproduction.episodes import BUSY, BYTES, Episode, gaps
+from eidrive_reports.reproduction.layout import (
+    Column,
+    DataTable,
+    PartReport,
+    Row,
+    Section,
+    bounds,
+    groups,
+    number,
+    plain,
+    where,
+)
 from eidrive_reports.reproduction.part import Case, Part, by_case
 from eidrive_scenario.api.common import Diagnostic, SettingError, registry
 from eidrive_scenario.api.experiments import (
@@ -73,7 +85,7 @@ def cases(plan: Plan) -> list[Case]:
     ]
 
 
-def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
+def outcome(episodes: Sequence[Episode]) -> Row:
     """Return the measured values of some runs.
 
     passed, share, low, high  runs that pass all criteria, their share and its Wilson interval
@@ -85,27 +97,20 @@ def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
     """
     passed = sum(episode.passed is True for episode in episodes)
     share = wilson(passed, len(episodes))
-    nearest = []
-    for episode in episodes:
-        distances = [
-            distance
-            for name, distance in episode.metrics.items()
-            if name.startswith("min_distance.") and name.endswith(".box")
-        ]
-        nearest += [min(distances)] if distances else []
+    nearest = [min(distances) for episode in episodes if (distances := gaps(episode))]
     interval = mean_interval(nearest) if nearest else None
+    ends = bounds(interval)
     busy = [episode.metrics[BUSY] for episode in episodes if BUSY in episode.metrics]
     rates = [episode.metrics[BYTES] / episode.simulated_s for episode in episodes if episode.simulated_s > 0.0]
     return {
         "runs": len(episodes),
         "passed": passed,
         "share": share.share,
-        "low": share.low,
-        "high": share.high,
+        **bounds(share),
         "collisions": sum(episode.metrics.get("collision.count", 0.0) > 0.0 for episode in episodes),
         "distance": None if interval is None else interval.mean,
-        "distance_low": None if interval is None else finite(interval.low),
-        "distance_high": None if interval is None else finite(interval.high),
+        "distance_low": ends["low"],
+        "distance_high": ends["high"],
         "bytes_per_s": sum(rates) / len(rates) if rates else None,
         "busy": sum(busy) / len(busy) if busy else None,
     }
@@ -175,19 +180,19 @@ def rank_rows(episodes: Sequence[Episode], plan: Plan) -> list[Row]:
             ]
             for method in methods
         }
-        measured: list[dict[str, Value]] = []
+        measured: list[dict[str, Any]] = []
         for method, own in mine.items():
             alone = mine.get(Method(NO_COOPERATION, method.detector), []) if method.cooperates else []
-            key: dict[str, Value] = {"channel": channel.name, "channel_title": channel.title, "method": method.name}
-            key |= {"rate": channel.rate, "stations": channel.stations}
-            measured.append({**key, **outcome(own), **_gain(alone, own)})
+            key = {"channel": channel.name, "channel_title": channel.title, "method": method.name}
+            shared = {"rate": channel.rate, "stations": channel.stations}
+            measured.append({**key, **shared, **outcome(own), **_gain(alone, own)})
         for row in measured:
-            row["rank"] = 1 + sum(float(other["share"] or 0) > float(row["share"] or 0) for other in measured)
-        rows += sorted(measured, key=lambda row: (int(row["rank"] or 0), float(row["bytes_per_s"] or 0)))
+            row["rank"] = 1 + sum(other["share"] > row["share"] for other in measured)
+        rows += sorted(measured, key=lambda row: (row["rank"], number(row, "bytes_per_s")))
     return rows
 
 
-def _gain(alone: Sequence[Episode], own: Sequence[Episode]) -> dict[str, Value]:
+def _gain(alone: Sequence[Episode], own: Sequence[Episode]) -> Row:
     if not alone:
         return dict.fromkeys(("gain", "gain_low", "gain_high"))
     pairs = PairedVerdicts.of([run.passed is True for run in alone], [run.passed is True for run in own])
@@ -196,8 +201,8 @@ def _gain(alone: Sequence[Episode], own: Sequence[Episode]) -> dict[str, Value]:
 
 
 SUCCESS = (
-    Column("success", "{passed} of {runs} = {share:.0%}", ("passed", "runs", "share")),
-    Column("95 %", "{low:.0%} to {high:.0%}", ("low", "high")),
+    Column("success", "{passed} of {runs} = {share:.0%}"),
+    Column("95 %", "{low:.0%} to {high:.0%}"),
 )
 MEASURED = (
     plain("min. distance [m]", "distance", ".2f"),
@@ -209,7 +214,7 @@ RANK_COLUMNS = (
     plain("rank", "rank"),
     plain("method", "method"),
     *SUCCESS,
-    Column("gain, 95 %", "{gain:+.0%} ({gain_low:+.0%} to {gain_high:+.0%})", ("gain", "gain_low", "gain_high")),
+    Column("gain, 95 %", "{gain:+.0%} ({gain_low:+.0%} to {gain_high:+.0%})"),
     *MEASURED,
 )
 CELL_COLUMNS = (
@@ -253,13 +258,9 @@ def setup(episodes: Sequence[Episode], plan: Plan) -> tuple[str, ...]:
 
 def conclusions(ranks: Sequence[Row]) -> tuple[str, ...]:
     """Return the best methods of each channel."""
-    best: dict[str, list[Row]] = {}
-    for row in ranks:
-        if row["rank"] == 1:
-            best.setdefault(str(row["channel_title"]), []).append(row)
     listed = [
-        f"{channel}: {', '.join('`' + str(row['method']) + '`' for row in rows)} ({rows[0]['share']:.0%})"
-        for channel, rows in best.items()
+        f"{channel}: {', '.join('`' + row['method'] + '`' for row in rows)} ({rows[0]['share']:.0%})"
+        for channel, rows in groups(where(ranks, rank=1), "channel_title").items()
     ]
     return (f"Best methods by channel. {'; '.join(listed)}.",)
 
@@ -296,7 +297,7 @@ def benchmark_part(
         "Which fusion method avoids most failures on which channel, and at how many bytes?",
         5,
         tuple(registry("detectors")),
-        tuple(detectors or DETECTORS),
         lambda _: cases(plan),
         partial(report, plan=plan),
+        default=tuple(detectors or DETECTORS),
     )

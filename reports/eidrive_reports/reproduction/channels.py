@@ -21,11 +21,12 @@ from eidrive_reports.reproduction.layout import (
     PartReport,
     Row,
     Section,
-    Value,
-    distinct,
+    bounds,
+    groups,
     number,
     plain,
     scenario_title,
+    where,
 )
 from eidrive_reports.reproduction.part import Case, Part, by_case
 from eidrive_reports.reproduction.sensitivity import delay
@@ -59,22 +60,20 @@ def setup(runs: Mapping[tuple[str, str], int], loaded: int) -> tuple[str, ...]:
 def conclusions(faults: Sequence[Row], loads: Sequence[Row]) -> tuple[str, ...]:
     """Return per scenario and planner the effect of latency, loss and radio, and the effect of the load."""
     texts = []
-    for key in dict.fromkeys((row["scenario"], row["planner"]) for row in faults):
-        mine = [row for row in faults if (row["scenario"], row["planner"]) == key]
-        texts.append(f"{scenario_title(str(key[0]))}, `{key[1]}`. {_latency(mine)} {_bursts(mine)} {_radio(mine)}")
-    texts += [_load([row for row in loads if row["access"] == access]) for access in distinct(loads, "access")]
-    return tuple(texts)
+    for (scenario, planner), mine in groups(faults, "scenario", "planner").items():
+        texts.append(f"{scenario_title(scenario)}, `{planner}`. {_latency(mine)} {_bursts(mine)} {_radio(mine)}")
+    return (*texts, *map(_load, groups(loads, "access").values()))
 
 
 def _latency(rows: Sequence[Row]) -> str:
-    (without,) = (row for row in rows if row["fault"] == "none")
-    line = [row for row in rows if row["fault"] == "latency"]
-    before, after = min(pairwise(line), key=lambda pair: number(pair[1], "share") - number(pair[0], "share"))
+    (without,) = where(rows, fault="none")
+    line = where(rows, fault="latency")
+    before, after = min(pairwise(line), key=lambda pair: pair[1]["share"] - pair[0]["share"])
     text = (
         f"Success is {without['share']:.0%} without cooperation, {line[0]['share']:.0%} without latency and "
         f"{line[-1]['share']:.0%} at {line[-1]['value']:g} s"
     )
-    if number(after, "share") >= number(before, "share"):
+    if after["share"] >= before["share"]:
         return f"{text}; it nowhere decreases with the latency."
     return (
         f"{text}; the largest step is from {before['share']:.0%} at {before['value']:g} s to {after['share']:.0%} at "
@@ -83,22 +82,21 @@ def _latency(rows: Sequence[Row]) -> str:
 
 
 def _bursts(rows: Sequence[Row]) -> str:
-    single = {row["value"]: row for row in rows if row["fault"] == "independent"}
-    bursts = {row["value"]: row for row in rows if row["fault"] == "bursty"}
     listed = [
-        f"{loss:.0%} lost: {single[loss]['share']:.0%} and {bursts[loss]['share']:.0%}"
-        for loss in single
-        if loss is not None
+        f"{single['value']:.0%} lost: {single['share']:.0%} and {bursty['share']:.0%}"
+        for single, bursty in zip(where(rows, fault="independent"), where(rows, fault="bursty"), strict=True)
     ]
     return f"Success with independent and with bursty losses: {'; '.join(listed)}."
 
 
 def _radio(rows: Sequence[Row]) -> str:
     """Return the success of the radio beside that of independent losses at the nearest share of received messages."""
-    single = [row for row in rows if row["fault"] == "independent"]
+    single = where(rows, fault="independent")
     listed = []
-    for row in (row for row in rows if row["fault"] == "radio" and number(row, "reception") < 0.95):
+    for row in where(rows, fault="radio"):
         received = number(row, "reception")
+        if received >= 0.95:
+            continue
         nearest = min(single, key=lambda row: abs(number(row, "reception") - received))
         listed.append(
             f"{row['share']:.0%} with {received:.0%} received ({nearest['share']:.0%} with independent losses and "
@@ -171,16 +169,26 @@ def loaded(access: str) -> Mapping[str, Any]:
     return {**URBAN, **ACCESS[access], "line_of_sight": "clear", "jitter": 0.05}
 
 
+FAULTS: Mapping[tuple[str, float | None], str | Mapping[str, Any]] = {
+    ("none", None): "none",
+    **{("latency", latency): delay(latency) for latency in LATENCIES},
+    **{(kind, share): losses(kind, share) for kind in ("independent", "bursty") for share in LOSSES},
+    **{("radio", power): radio(power) for power in POWERS},
+}
+"""Channel by fault and its value, without added stations."""
+
+
+def arm_of(detector: str, planner: str, fault: str, value: float | None, block: int) -> str:
+    """Return the name of an arm without added stations."""
+    return f"{detector} {planner} {fault if value is None else f'{fault} {value}'} {block}"
+
+
 def cases(detectors: Sequence[str]) -> list[Case]:
     """Return the runs of all arms."""
     runs = []
     for detector, ((scenario, planner), blocks) in product(detectors, BLOCKS.items()):
-        arms: dict[str, str | Mapping[str, Any]] = {"none": "none"}
-        arms |= {f"latency {latency}": delay(latency) for latency in LATENCIES}
-        arms |= {f"{kind} {share}": losses(kind, share) for kind in ("independent", "bursty") for share in LOSSES}
-        arms |= {f"radio {power}": radio(power) for power in POWERS}
-        for (arm, channel), block in product(arms.items(), range(blocks)):
-            name = f"{detector} {planner} {arm} {block}"
+        for ((fault, value), channel), block in product(FAULTS.items(), range(blocks)):
+            name = arm_of(detector, planner, fault, value, block)
             runs.append(Case(scenario, name, _settings(scenario, detector, planner, channel), shift=1000 * block))
     for detector, access, stations in product(detectors, ACCESS, STATIONS):
         settings = _settings(LOADED[0], detector, LOADED[1], loaded(access), sender="RSU")
@@ -198,16 +206,11 @@ def _settings(
         criteria = {"age_of_information": links, "packet_reception_ratio": links}
     if sender is not None:
         criteria["channel_busy_ratio"] = {"of": EGO}
-    return RunSettings(
-        detector=detector,
-        planner=planner,
-        channel=channel,
-        criteria=criteria or None,
-        time_limit=DURATIONS[scenario],
-    )
+    limit = DURATIONS[scenario]
+    return RunSettings(detector=detector, planner=planner, channel=channel, criteria=criteria or None, time_limit=limit)
 
 
-def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
+def outcome(episodes: Sequence[Episode]) -> Row:
     """Return the measured values of an arm.
 
     free, share, low, high   runs without a collision, their share and its Wilson interval
@@ -216,21 +219,16 @@ def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
     """
     free = sum(not collided(episode) for episode in episodes)
     collision_free = wilson(free, len(episodes))
-    received = [episode.metrics["packet_reception_ratio"] for episode in episodes if _has_links(episode)]
-    age = _median(episodes, "age_of_information.mean")
+    ratios = [episode.metrics.get("packet_reception_ratio") for episode in episodes]
+    received = [ratio for ratio in ratios if ratio is not None]
     return {
         "episodes": len(episodes),
         "free": free,
         "share": collision_free.share,
-        "low": collision_free.low,
-        "high": collision_free.high,
+        **bounds(collision_free),
         "reception": sum(received) / len(received) if received else None,
-        "age": age,
+        "age": _median(episodes, "age_of_information.mean"),
     }
-
-
-def _has_links(episode: Episode) -> bool:
-    return "packet_reception_ratio" in episode.metrics
 
 
 def _median(episodes: Sequence[Episode], name: str) -> float | None:
@@ -242,16 +240,11 @@ def _median(episodes: Sequence[Episode], name: str) -> float | None:
 def fault_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the arms of fixed latencies, fixed losses and radio by geometry."""
     runs = by_case(episodes)
-    arms: list[tuple[str, float | None]] = [("none", None)]
-    arms += [("latency", latency) for latency in LATENCIES]
-    arms += [(kind, share) for kind in ("independent", "bursty") for share in LOSSES]
-    arms += [("radio", power) for power in POWERS]
-    for detector, (scenario, planner) in product(detectors, BLOCKS):
-        for fault, value in arms:
-            arm = fault if value is None else f"{fault} {value}"
-            blocks = range(BLOCKS[scenario, planner])
-            mine = [episode for block in blocks for episode in runs[scenario, f"{detector} {planner} {arm} {block}"]]
-            key: dict[str, Value] = {"detector": detector, "scenario": scenario, "planner": planner}
+    for detector, ((scenario, planner), blocks) in product(detectors, BLOCKS.items()):
+        for fault, value in FAULTS:
+            arms = [arm_of(detector, planner, fault, value, block) for block in range(blocks)]
+            mine = [episode for arm in arms for episode in runs[scenario, arm]]
+            key = {"detector": detector, "scenario": scenario, "planner": planner}
             yield {**key, "fault": fault, "value": value, **outcome(mine)}
 
 
@@ -271,8 +264,8 @@ def load_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator
 
 
 SUCCESS = (
-    Column("success", "{free} of {episodes} = {share:.0%}", ("free", "episodes", "share")),
-    Column("95 %", "{low:.0%} to {high:.0%}", ("low", "high")),
+    Column("success", "{free} of {episodes} = {share:.0%}"),
+    Column("95 %", "{low:.0%} to {high:.0%}"),
     plain("received", "reception", ".0%"),
     plain("mean age [s]", "age", ".3f"),
 )
@@ -295,9 +288,9 @@ LOAD_COLUMNS = (
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: success over latency, loss and load."""
     faults, loads = tuple(fault_rows(episodes, detectors)), tuple(load_rows(episodes, detectors))
-    runs = {(str(row["scenario"]), str(row["planner"])): int(row["episodes"] or 0) for row in faults}
+    runs = {(row["scenario"], row["planner"]): row["episodes"] for row in faults}
     sections = (
-        Section("Set-up", setup(runs, int(loads[0]["episodes"] or 0))),
+        Section("Set-up", setup(runs, loads[0]["episodes"])),
         Section("Result", conclusions(faults, loads)),
         Section("Latency, loss and radio", (), DataTable("channels", FAULT_COLUMNS, faults)),
         Section("Load", (), DataTable("channels_load", LOAD_COLUMNS, loads)),
@@ -313,7 +306,6 @@ PART = Part(
         "of cooperation?"
     ),
     10,
-    DETECTORS,
     DETECTORS,
     cases,
     report,

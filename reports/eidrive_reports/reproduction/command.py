@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+_selection = partial(typer.Option, metavar="A,B", show_default=False)
 
 
 def reproduce(
@@ -34,30 +37,9 @@ def reproduce(
             show_default="the paper's; table3: oracle; perception: lidar; learned, benchmark: pillars",
         ),
     ] = None,
-    fusion: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B",
-            help="benchmark: methods, NAME[:DETECTOR].",
-            show_default=False,
-        ),
-    ] = None,
-    channels: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B",
-            help="benchmark: channel profiles, or RATEmbit_STATIONS.",
-            show_default=False,
-        ),
-    ] = None,
-    scenarios: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B",
-            help="benchmark: names, files, or families such as ncap.",
-            show_default=False,
-        ),
-    ] = None,
+    fusion: Annotated[str | None, _selection(help="benchmark: methods, NAME[:DETECTOR].")] = None,
+    channels: Annotated[str | None, _selection(help="benchmark: channel profiles, or RATEmbit_STATIONS.")] = None,
+    scenarios: Annotated[str | None, _selection(help="benchmark: names, files, or families such as ncap.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the tables and of the records of all runs.")] = Path(
         "reports/paper"
     ),
@@ -83,9 +65,8 @@ def reproduce(
     from rich.console import Console
 
     from eidrive_reports.reproduction import benchmark
-    from eidrive_reports.reproduction.benchmark_page import write_benchmark_page
     from eidrive_reports.reproduction.figures import draw
-    from eidrive_reports.reproduction.page import write_paper_page, write_part_replays
+    from eidrive_reports.reproduction.page import write_benchmark_page, write_paper_page, write_part_replays
     from eidrive_reports.reproduction.parts import ALL, selected_detectors, selected_parts
     from eidrive_reports.reproduction.reproduce import reproduce as reproduce_part
 

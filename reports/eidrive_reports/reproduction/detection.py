@@ -16,12 +16,13 @@ from eidrive_reports.reproduction.layout import (
     PartReport,
     Row,
     Section,
-    Value,
-    finite,
+    bounds,
+    groups,
     plain,
     result_sections,
+    where,
 )
-from eidrive_reports.reproduction.part import Case, Part, select
+from eidrive_reports.reproduction.part import Case, Part, Runs, by_case
 from eidrive_scenario.api.common import Array
 from eidrive_scenario.api.experiments import interval_text, mean_interval, paired_difference, paired_ratio, summarize
 from eidrive_scenario.api.run import RunSettings
@@ -63,12 +64,12 @@ def moving_average(counts: Array, window: int = WINDOW) -> Array:
     return averages
 
 
-def _means(episodes: Sequence[Episode], scenario: str, detector: str, arm: str) -> list[float]:
-    means: list[float] = counts_of(select(episodes, scenario, f"{detector} {arm}")).mean(axis=1).tolist()
+def _means(runs: Runs, scenario: str, detector: str, arm: str) -> list[float]:
+    means: list[float] = counts_of(runs[scenario, f"{detector} {arm}"]).mean(axis=1).tolist()
     return means
 
 
-def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str) -> dict[str, Value]:
+def cell_row(runs: Runs, scenario: str, detector: str, arm: str) -> Row:
     """Return the fields of a cell beside those of the paper.
 
     mean, sd, low, high  mean count of an episode: mean, standard deviation and 95 % interval over the episodes; no
@@ -76,7 +77,7 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str
     least, most          extremes over all time steps
     actors               mean number of different vehicles that the ego knows, without duplicates and false objects
     """
-    mine = select(episodes, scenario, f"{detector} {arm}")
+    mine = runs[scenario, f"{detector} {arm}"]
     counts, published = counts_of(mine), COUNTS[scenario, detector, arm]
     means = counts.mean(axis=1).tolist()
     interval = mean_interval(means)
@@ -87,8 +88,7 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str
         "episodes": len(mine),
         "mean": interval.mean,
         "sd": summarize(means).population_sd,
-        "low": finite(interval.low),
-        "high": finite(interval.high),
+        **bounds(interval),
         "least": int(counts.min()),
         "most": int(counts.max()),
         "actors": float(np.mean([episode.metrics[f"detection_count.{EGO}.mean"] for episode in mine])),
@@ -98,30 +98,27 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, arm: str
     }
 
 
-def ratio_row(episodes: Sequence[Episode], scenario: str, detector: str) -> dict[str, Value]:
+def ratio_row(runs: Runs, scenario: str, detector: str) -> Row:
     """Return the ratio of the counts with and without cooperation; None if an episode counts nothing."""
-    none, cooperation = (_means(episodes, scenario, detector, arm) for arm in ARMS)
+    none, cooperation = (_means(runs, scenario, detector, arm) for arm in ARMS)
     ratio = paired_ratio(none, cooperation) if min(*none, *cooperation) > 0.0 else None
     return {
         "scenario": scenario,
         "detector": detector,
         "senders": SENDERS[scenario],
         "ratio": None if ratio is None else ratio.mean,
-        "low": None if ratio is None else finite(ratio.low),
-        "high": None if ratio is None else finite(ratio.high),
+        **bounds(ratio),
         "more": float(np.mean(cooperation)) > float(np.mean(none)),
         "paper_ratio": RATIOS[scenario, detector],
     }
 
 
-def series(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
+def series(runs: Runs, detectors: Sequence[str]) -> Iterator[Row]:
     """Yield mean and standard deviation over the episodes of the moving averages at each time step."""
     for scenario, detector, arm in product(SENDERS, detectors, ARMS):
-        averages = moving_average(counts_of(select(episodes, scenario, f"{detector} {arm}")))
-        for step, (mean, sd) in enumerate(
-            zip(averages.mean(axis=0).tolist(), averages.std(axis=0).tolist(), strict=True)
-        ):
-            key = {"scenario": scenario, "detector": detector, "arm": arm}
+        averages = moving_average(counts_of(runs[scenario, f"{detector} {arm}"]))
+        key = {"scenario": scenario, "detector": detector, "arm": arm}
+        for step, (mean, sd) in enumerate(np.stack([averages.mean(axis=0), averages.std(axis=0)], axis=1).tolist()):
             yield {**key, "step": step, "time": round(step * STEP, 6), "mean": mean, "sd": sd}
 
 
@@ -129,12 +126,10 @@ CELL_COLUMNS = (
     plain("scenario", "scenario"),
     plain("detector", "detector"),
     plain("arm", "arm"),
-    Column("objects", "{mean:.1f} ± {sd:.1f}", ("mean", "sd")),
-    Column("95 %", "{low:.1f} to {high:.1f}", ("low", "high")),
-    Column("range", "{least} to {most}", ("least", "most")),
-    Column(
-        "paper (range)", "{paper_mean:.1f} ({paper_least} to {paper_most})", ("paper_mean", "paper_least", "paper_most")
-    ),
+    Column("objects", "{mean:.1f} ± {sd:.1f}"),
+    Column("95 %", "{low:.1f} to {high:.1f}"),
+    Column("range", "{least} to {most}"),
+    Column("paper (range)", "{paper_mean:.1f} ({paper_least} to {paper_most})"),
     plain("different vehicles", "actors", ".1f"),
 )
 RATIO_COLUMNS = (
@@ -142,23 +137,24 @@ RATIO_COLUMNS = (
     plain("senders", "senders"),
     plain("detector", "detector"),
     plain("ratio", "ratio", ".2f"),
-    Column("95 %", "{low:.2f} to {high:.2f}", ("low", "high")),
+    Column("95 %", "{low:.2f} to {high:.2f}"),
     plain("paper", "paper_ratio", ".2f"),
 )
 
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: ratios, counts, and the moving averages as data."""
-    cells = [cell_row(episodes, *key) for key in product(SENDERS, detectors, ARMS)]
-    ratios = tuple(ratio_row(episodes, *key) for key in product(SENDERS, detectors))
+    runs = by_case(episodes)
+    cells = [cell_row(runs, *key) for key in product(SENDERS, detectors, ARMS)]
+    ratios = tuple(ratio_row(runs, *key) for key in product(SENDERS, detectors))
     sections = (
-        Section("Set-up", _setup(int(cells[0]["episodes"] or 0))),
-        *result_sections(_conclusions(episodes, cells, ratios), DataTable("detection_ratios", RATIO_COLUMNS, ratios)),
+        Section("Set-up", _setup(cells[0]["episodes"])),
+        *result_sections(_conclusions(runs, cells, ratios), DataTable("detection_ratios", RATIO_COLUMNS, ratios)),
         Section("Counts", (), DataTable("detection", CELL_COLUMNS, tuple(cells))),
         Section(
             "Moving averages",
             (f"Means over {WINDOW} time steps, and their standard deviation over the episodes: detection_series.csv.",),
-            DataTable("detection_series", (), tuple(series(episodes, detectors))),
+            DataTable("detection_series", (), tuple(series(runs, detectors))),
         ),
     )
     return PartReport(PART.title, sections)
@@ -176,16 +172,16 @@ def _setup(episodes: int) -> tuple[str, ...]:
     )
 
 
-def _conclusions(episodes: Sequence[Episode], cells: Sequence[Row], ratios: Sequence[Row]) -> tuple[str, ...]:
-    more = sum(bool(row["more"]) for row in ratios)
+def _conclusions(runs: Runs, cells: Sequence[Row], ratios: Sequence[Row]) -> tuple[str, ...]:
+    more = len(where(ratios, more=True))
     listed = ", ".join(
-        f"{str(row['scenario']).removeprefix('coop/')} {row['detector']} "
+        f"{row['scenario'].removeprefix('coop/')} {row['detector']} "
         + ("without a ratio" if row["ratio"] is None else f"{row['ratio']:.2f} (paper {row['paper_ratio']:.2f})")
         for row in ratios
     )
     texts = [f"Cooperation finds more objects in {more} of {len(ratios)} panels (paper: 4 of 4). Ratios: {listed}."]
-    for detector in dict.fromkeys(str(row["detector"]) for row in ratios):
-        vehicle, units = (_means(episodes, scenario, detector, "cooperation") for scenario in SENDERS)
+    for detector in groups(ratios, "detector"):
+        vehicle, units = (_means(runs, scenario, detector, "cooperation") for scenario in SENDERS)
         difference = paired_difference(vehicle, units)
         paper = [COUNTS[scenario, detector, "cooperation"].mean for scenario in SENDERS]
         texts.append(
@@ -193,7 +189,7 @@ def _conclusions(episodes: Sequence[Episode], cells: Sequence[Row], ratios: Sequ
             f"vehicle (95 % interval: {interval_text(difference.low, difference.high, '+.1f')}; "
             f"paper {paper[1] - paper[0]:+.1f})."
         )
-    fewer = [row for row in cells if float(row["mean"] or 0.0) < float(row["paper_mean"] or 0.0)]
+    fewer = [row for row in cells if row["mean"] < row["paper_mean"]]
     if fewer:
         texts.append(f"The counts are below the paper's in {len(fewer)} of {len(cells)} cells.")
         texts.append(
@@ -211,7 +207,6 @@ PART = Part(
         "4) send what they detect?"
     ),
     5,
-    DETECTORS,
     DETECTORS,
     cases,
     report,

@@ -9,7 +9,7 @@ from typing import Any
 
 from eidrive_reports.paper import EGO, HIDDEN
 from eidrive_reports.reproduction.episodes import Episode
-from eidrive_reports.reproduction.layout import Column, Value, finite, plain
+from eidrive_reports.reproduction.layout import Column, Row, bounds, plain
 from eidrive_scenario.api.common import SimulationError
 from eidrive_scenario.api.experiments import mean_interval, summarize, wilson
 
@@ -42,7 +42,7 @@ def collided(episode: Episode) -> bool:
     return metric(episode, COLLISIONS) > 0
 
 
-def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
+def encounter_fields(episodes: Sequence[Episode]) -> Row:
     """Return the measured values of a cell.
 
     mean, sd, low, high   minimum distance between the centers: mean, population standard deviation, 95 % interval [m];
@@ -64,8 +64,7 @@ def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
         "episodes": len(episodes),
         "mean": interval.mean,
         "sd": summary.population_sd,
-        "low": finite(interval.low),
-        "high": finite(interval.high),
+        **bounds(interval),
         "gap": sum(gaps) / len(gaps),
         "gap_least": min(gaps),
         "impact_speed": sum(speeds) / len(speeds) if speeds else None,
@@ -78,12 +77,12 @@ def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
 
 
 DISTANCE_COLUMNS = (
-    Column("centers [m]", "{mean:.2f} ± {sd:.2f}", ("mean", "sd")),
-    Column("95 %", "{low:.2f} to {high:.2f}", ("low", "high")),
+    Column("centers [m]", "{mean:.2f} ± {sd:.2f}"),
+    Column("95 %", "{low:.2f} to {high:.2f}"),
 )
 """Columns of the paper's metric."""
 GAP_COLUMNS = (
-    Column("gap [m]", "{gap:.2f}, least {gap_least:.2f}", ("gap", "gap_least")),
+    Column("gap [m]", "{gap:.2f}, least {gap_least:.2f}"),
     plain("impact [m/s]", "impact_speed", ".1f"),
     plain("time to collision [s]", "time_to_collision", ".2f"),
 )

@@ -120,6 +120,12 @@ def run_episode(job: EpisodeJob) -> Episode:
     )
 
 
+def gaps(episode: Episode) -> list[float]:
+    """Return the minimum distances between the bodies of actors, of each criterion that measures them [m]."""
+    metrics = episode.metrics.items()
+    return [value for name, value in metrics if name.startswith("min_distance.") and name.endswith(".box")]
+
+
 BYTES, BUSY = "air.bytes", "air.busy"
 """Metrics of the radio: bytes of the messages that another station uses, and largest channel busy ratio."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,77 +15,60 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from eidrive_reports.paper import COUNTS, TABLE_2
-from eidrive_reports.reproduction.layout import PartReport, Row, distinct, limits, number, scenario_title
+from eidrive_reports.reproduction.layout import PartReport, Row, groups, limits, number, numbers, scenario_title, where
 from eidrive_reports.reproduction.sensitivity import LIBRARY, ORIGINAL
 from eidrive_scenario.api.pages import heat_cells, write_figure
 
-FAULT_COLORS = {"independent": "#0072b2", "bursty": "#d55e00", "radio": "#009e73"}
-"""Colors of Okabe and Ito, which color-blind readers can distinguish."""
-MARKERS = {"independent": "o", "bursty": "s", "radio": "^"}
+Tables = Mapping[str, Sequence[Row]]
+"""Rows of the tables of a part by the name of their file."""
+FAULT_STYLES = {"independent": ("#0072b2", "o"), "bursty": ("#d55e00", "s"), "radio": ("#009e73", "^")}
+"""Colors of Okabe and Ito, which color-blind readers can distinguish, and markers."""
+ACCESS_STYLES = (("#0072b2", "o"), ("#d55e00", "s"))
 
 
-def channels_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
+def channels_figure(data: Tables) -> Figure:
     """Draw success over latency and over received messages by scenario and planner, and the effects of the load."""
-    faults, loads = data["channels"], data["channels_load"]
-    columns = list(dict.fromkeys((str(row["scenario"]), str(row["planner"])) for row in faults))
+    columns = groups(data["channels"], "scenario", "planner")
     figure = Figure(figsize=(3.4 * len(columns) + 0.6, 8.4), layout="constrained")
     panels = figure.subplots(3, len(columns), squeeze=False)
-    for (scenario, planner), column in zip(columns, panels.T, strict=True):
-        mine = [row for row in faults if (row["scenario"], row["planner"]) == (scenario, planner)]
-        _latency(column[0], mine)
-        _losses(column[1], mine)
+    for ((scenario, planner), rows), column in zip(columns.items(), panels.T, strict=True):
+        line = where(rows, fault="latency")
+        _rate_curve(column[0], [row["value"] for row in line], line, "#0072b2", "o", "latency, 95 %")
+        column[0].set_xlabel("latency [s]", fontsize=8)
+        for fault, style in FAULT_STYLES.items():
+            line = sorted(where(rows, fault=fault), key=lambda row: number(row, "reception"))
+            _rate_curve(column[1], numbers(line, "reception"), line, *style, fault)
+        column[1].set_xlabel("received share of the messages", fontsize=8)
+        (without,) = where(rows, fault="none")
+        for axes in column[:2]:
+            axes.axhline(without["share"], color="black", lw=0.8, ls="--", label="no cooperation")
         column[0].set_title(f"{scenario_title(scenario)}, {planner}", fontsize=9)
     for axes in panels[:2, 0]:
         axes.set_ylabel("share of runs without a collision", fontsize=8)
     panels[0, 0].legend(fontsize=7, loc="upper right")
     panels[1, 0].legend(fontsize=7, loc="upper left")
-    _load(panels[2], loads)
+    _load(panels[2], data["channels_load"])
     for axes in panels.ravel():
         axes.tick_params(labelsize=7)
     return figure
 
 
-def _latency(axes: Axes, rows: Sequence[Row]) -> None:
-    line = [row for row in rows if row["fault"] == "latency"]
-    _rate_curve(axes, [number(row, "value") for row in line], line, "#0072b2", "o", "latency, 95 %")
-    _without_messages(axes, rows)
-    axes.set_xlabel("latency [s]", fontsize=8)
-
-
-def _losses(axes: Axes, rows: Sequence[Row]) -> None:
-    for fault, color in FAULT_COLORS.items():
-        line = sorted((row for row in rows if row["fault"] == fault), key=lambda row: number(row, "reception"))
-        _rate_curve(axes, [number(row, "reception") for row in line], line, color, MARKERS[fault], fault)
-    _without_messages(axes, rows)
-    axes.set_xlabel("received share of the messages", fontsize=8)
-
-
 def _rate_curve(axes: Axes, at: Sequence[float], rows: Sequence[Row], color: str, marker: str, label: str) -> None:
-    low, share, high = ([number(row, name) for row in rows] for name in ("low", "share", "high"))
-    axes.fill_between(at, low, high, color=color, alpha=0.15, lw=0)
-    axes.plot(at, share, marker=marker, color=color, ms=4, lw=1, label=label)
+    axes.fill_between(at, numbers(rows, "low"), numbers(rows, "high"), color=color, alpha=0.15, lw=0)
+    axes.plot(at, numbers(rows, "share"), marker=marker, color=color, ms=4, lw=1, label=label)
     axes.set_ylim(-0.03, 1.03)
-
-
-def _without_messages(axes: Axes, rows: Sequence[Row]) -> None:
-    (row,) = (row for row in rows if row["fault"] == "none")
-    axes.axhline(number(row, "share"), color="black", lw=0.8, ls="--", label="no cooperation")
 
 
 def _load(panels: Sequence[Axes], rows: Sequence[Row]) -> None:
     """Draw busy ratio and received share, age of information, and success over the number of stations."""
     busy, age, success = panels[:3]
-    for (access, color), marker in zip(
-        zip(distinct(rows, "access"), ("#0072b2", "#d55e00"), strict=False), "os", strict=False
-    ):
-        mine = [row for row in rows if row["access"] == access]
-        at = [number(row, "stations") for row in mine]
-        busy.plot(at, [number(row, "busy") for row in mine], marker=marker, color=color, ms=4, lw=1, label=access)
-        received = [number(row, "reception") for row in mine]
-        busy.plot(at, received, marker=marker, mfc="none", color=color, ms=4, lw=1, ls=":")
-        age.plot(at, [number(row, "age") for row in mine], marker=marker, color=color, ms=4, lw=1, label="mean")
-        late = [number(row, "p95_age") for row in mine]
-        age.plot(at, late, marker=marker, mfc="none", color=color, ms=4, lw=1, ls=":", label="95 % of the time below")
+    for (access, mine), (color, marker) in zip(groups(rows, "access").items(), ACCESS_STYLES, strict=False):
+        at = numbers(mine, "stations")
+        look: dict[str, Any] = {"marker": marker, "color": color, "ms": 4, "lw": 1}
+        busy.plot(at, numbers(mine, "busy"), label=access, **look)
+        busy.plot(at, numbers(mine, "reception"), mfc="none", ls=":", **look)
+        age.plot(at, numbers(mine, "age"), label="mean", **look)
+        age.plot(at, numbers(mine, "p95_age"), mfc="none", ls=":", label="95 % of the time below", **look)
         _rate_curve(success, at, mine, color, marker, access)
     busy.set_ylabel("busy ratio (solid), received (dotted)", fontsize=8)
     age.set_ylabel("age of information [s]", fontsize=8)
@@ -105,22 +89,21 @@ PAPER_LATENCY = 0.3
 """Latency of the arm `latency` of the paper [s]."""
 
 
-def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
+def sensitivity_figure(data: Tables) -> Figure:
     """Draw one map per planner, scenario and arm, and the curve over the latency beside them."""
-    cells, curve = data["sensitivity"], data["sensitivity_latency"]
-    arms = list(dict.fromkeys(str(row["arm"]) for row in cells))
-    lines = list(dict.fromkeys((str(row["planner"]), str(row["scenario"])) for row in cells))
+    lines = groups(data["sensitivity"], "planner", "scenario")
+    arms = list(groups(data["sensitivity"], "arm"))
     figure = Figure(figsize=(2.1 * len(arms) + 3.6, 2.7 * len(lines)), layout="constrained")
     panels = figure.subplots(len(lines), len(arms) + 1, squeeze=False, width_ratios=[1.0] * len(arms) + [1.5])
-    for (planner, scenario), line in zip(lines, panels, strict=True):
-        for arm, axes in zip(arms, line[:-1], strict=True):
-            mine = [row for row in cells if (row["planner"], row["scenario"], row["arm"]) == (planner, scenario, arm)]
+    for ((planner, scenario), cells), line in zip(lines.items(), panels, strict=True):
+        for (arm, mine), axes in zip(groups(cells, "arm").items(), line[:-1], strict=True):
             image = _map(axes, mine)
-            _marks(axes, scenario)
+            for symbol, label, places in MARKS:
+                axes.plot(*places[scenario], symbol, ms=5, mfc="none", mec="black", label=label)
             axes.set_title(f"{scenario_title(scenario)}, {arm}", fontsize=8)
             axes.tick_params(labelsize=7, labelleft=arm == arms[0])
         line[0].set_ylabel(f"{planner}\nspeed of the ego [m/s]", fontsize=8)
-        _latency_curve(line[-1], [row for row in curve if (row["planner"], row["scenario"]) == (planner, scenario)])
+        _latency_curve(line[-1], where(data["sensitivity_latency"], planner=planner, scenario=scenario))
         line[-1].set_title(f"{scenario_title(scenario)}, start of the library", fontsize=8)
     for axes in panels[-1][:-1]:
         axes.set_xlabel("start of the hidden car [m]", fontsize=7)
@@ -133,22 +116,15 @@ def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
 
 
 def _map(axes: Axes, rows: Sequence[Row]) -> QuadMesh:
-    starts, speeds = (sorted({number(row, name) for row in rows}) for name in ("start", "speed"))
+    starts, speeds = (sorted(groups(rows, name)) for name in ("start", "speed"))
     shares = np.full((len(speeds), len(starts)), np.nan)
     for row in rows:
-        cell = speeds.index(number(row, "speed")), starts.index(number(row, "start"))
-        shares[cell] = number(row, "collisions") / number(row, "episodes")
+        shares[speeds.index(row["speed"]), starts.index(row["start"])] = row["collisions"] / row["episodes"]
     return heat_cells(axes, starts, speeds, shares, colors=MAP_COLORS, scale=Normalize(0.0, 1.0), line=0.0)
 
 
-def _marks(axes: Axes, scenario: str) -> None:
-    for symbol, label, places in MARKS:
-        start, speed = places[scenario]
-        axes.plot(start, speed, symbol, ms=5, mfc="none", mec="black", label=label)
-
-
 def _latency_curve(axes: Axes, rows: Sequence[Row]) -> None:
-    latency, low, share, high = ([number(row, name) for row in rows] for name in ("latency", "low", "share", "high"))
+    latency, low, share, high = (numbers(rows, name) for name in ("latency", "low", "share", "high"))
     axes.fill_between(latency, low, high, color="#0b6e99", alpha=0.2, lw=0)
     axes.plot(latency, share, "o-", color="#0b6e99", ms=3, lw=1)
     axes.axvline(PAPER_LATENCY, color="black", lw=0.8, ls="--")
@@ -179,13 +155,13 @@ INTERVALS = 0.25
 """Opacity of the 95 % intervals of curves."""
 
 
-def precision_figure(data: Mapping[str, Sequence[Row]], part: str) -> Figure:
+def precision_figure(data: Tables, part: str) -> Figure:
     """Draw the precision at two overlaps and the recall of hidden objects over each axis, then volume and ranges."""
     curves, hidden, volumes = data[part], data[f"{part}_hidden"], data[f"{part}_volume"]
-    names = [name for name in AXIS_LABELS if name in distinct(curves, "axis")]
+    names = [name for name in AXIS_LABELS if name in groups(curves, "axis")]
     figure = Figure(figsize=(7.6, 2.0 * (len(names) + 1) + 0.7), layout="constrained")
     panels = figure.subplots(len(names) + 1, len(OVERLAPS) + 1, squeeze=False)
-    whole = [row for row in curves if row["range"] == "all"]
+    whole = where(curves, range="all")
     for name, line in zip(names, panels, strict=False):
         for overlap, axes in zip(OVERLAPS, line, strict=False):
             _curves(axes, _on_axis(whole, name, overlap), "ap")
@@ -194,13 +170,13 @@ def precision_figure(data: Mapping[str, Sequence[Row]], part: str) -> Figure:
             axes.set_xlabel(AXIS_LABELS[name], fontsize=8)
             axes.set_ylim(0.0, 1.0)
     for overlap, column in zip(OVERLAPS, panels.T, strict=False):
-        top = 1.05 * max(limits([row for row in whole if row["iou"] == overlap], "ap")[1])
+        top = 1.05 * max(limits(where(whole, iou=overlap), "ap")[1])
         for axes in column[:-1]:
             axes.set_ylim(0.0, min(1.0, top))
         column[0].set_title(f"average precision at {overlap:g}", fontsize=9)
         _volumes(column[-1], volumes, overlap)
     panels[0][-1].set_title("recall of hidden objects at 0.5", fontsize=9)
-    _ranges(panels[-1][-1], [row for row in curves if row["axis"] == "latency" and row["value"] == 0.0])
+    _ranges(panels[-1][-1], where(curves, axis="latency", value=0.0))
     for axes in panels.ravel():
         axes.tick_params(labelsize=7)
         axes.grid(axis="y", color="#e5e7eb", lw=0.5)
@@ -217,42 +193,41 @@ def precision_figure(data: Mapping[str, Sequence[Row]], part: str) -> Figure:
 
 def _on_axis(rows: Sequence[Row], axis: str, overlap: float) -> list[Row]:
     """Return the rows of an axis; those of aligned poses only if poses have errors, as they do not differ otherwise."""
-    return [
-        row
-        for row in rows
-        if (row["axis"], row["iou"]) == (axis, overlap)
-        and (axis.startswith("pose") or not str(row["arm"]).endswith("aligned"))
-    ]
+    mine = where(rows, axis=axis, iou=overlap)
+    return mine if axis.startswith("pose") else _without_alignment(mine)
+
+
+def _without_alignment(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if not row["arm"].endswith("aligned")]
 
 
 def _present(rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
     """Return color and style of the arms of these rows."""
-    names = distinct(rows, "arm")
+    names = groups(rows, "arm")
     return {arm: style for arm, style in ARM_STYLES.items() if arm in names}
 
 
 def _curves(axes: Axes, rows: Sequence[Row], name: str) -> None:
     """Draw one curve per arm, with its intervals side by side."""
     styles = _present(rows)
-    step = 0.008 * max((number(row, "value") for row in rows), default=0.0)
+    step = 0.008 * max((row["value"] for row in rows), default=0.0)
     for index, (arm, (color, style)) in enumerate(styles.items()):
-        mine = [row for row in rows if row["arm"] == arm]
-        at, middle = ([number(row, field) for row in mine] for field in ("value", name))
+        mine = where(rows, arm=arm)
+        at = numbers(mine, "value")
         shift = step * (index - (len(styles) - 1) / 2.0)
         axes.vlines([value + shift for value in at], *limits(mine, name), color=color, alpha=INTERVALS, lw=1.2)
-        axes.plot(at, middle, "o", ls=style, color=color, ms=2.5, lw=1.3)
+        axes.plot(at, numbers(mine, name), "o", ls=style, color=color, ms=2.5, lw=1.3)
 
 
 def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
     """Draw the average precision by range and arm; aligned poses do not differ without errors."""
-    mine = [row for row in rows if row["range"] != "all" and row["iou"] == 0.5]
-    mine = [row for row in mine if not str(row["arm"]).endswith("aligned")]
-    ranges, styles = distinct(mine, "range"), _present(mine)
+    mine = [row for row in _without_alignment(where(rows, iou=0.5)) if row["range"] != "all"]
+    ranges, styles = list(groups(mine, "range")), _present(mine)
     width = 0.8 / len(styles)
     for index, (arm, (color, _)) in enumerate(styles.items()):
-        some = [row for row in mine if row["arm"] == arm]
-        at = [ranges.index(str(row["range"])) + width * (index - (len(styles) - 1) / 2.0) for row in some]
-        axes.bar(at, [number(row, "ap") for row in some], width, color=color)
+        some = where(mine, arm=arm)
+        at = [ranges.index(row["range"]) + width * (index - (len(styles) - 1) / 2.0) for row in some]
+        axes.bar(at, numbers(some, "ap"), width, color=color)
         axes.vlines(at, *limits(some, "ap"), color="black", lw=0.6)
     axes.set_xticks(range(len(ranges)), labels=ranges)
     axes.set_xlabel("distance from the ego, without faults", fontsize=8)
@@ -276,12 +251,11 @@ def _volumes(axes: Axes, rows: Sequence[Row], overlap: float) -> None:
         if curve not in styles:
             continue
         color, style = styles[curve]
-        values = [number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
+        values = numbers(mine, f"ap_{round(100.0 * overlap)}")
         if curve == "none":
             axes.axhline(values[0], color=color, lw=1.3, ls=style)
         else:
-            at = [number(row, VOLUME) for row in mine]
-            axes.plot(at, values, "o", ls=style, color=color, ms=2.5, lw=1.3)
+            axes.plot(numbers(mine, VOLUME), values, "o", ls=style, color=color, ms=2.5, lw=1.3)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("all messages [MB/s]", fontsize=8)
@@ -289,7 +263,7 @@ def _volumes(axes: Axes, rows: Sequence[Row], overlap: float) -> None:
 
 def _volume_curve(row: Row) -> str:
     """Return the curve over the volume to which a row belongs."""
-    arm = str(row["arm"])
+    arm: str = row["arm"]
     if row["share"] is None or arm in ("max", "attention, aligned"):
         return arm
     if row["encoding"] == "codes":
@@ -300,22 +274,22 @@ def _volume_curve(row: Row) -> str:
 ORDERED_COLORS = ("#0b6e99", "#c2410c")
 PAPER = "#111827"
 """Color of the values of the paper."""
-PaperRows = Mapping[str, Sequence[Row]]
 
 
-def table_2_figure(data: PaperRows) -> Figure:
+def table_2_figure(data: Tables) -> Figure:
     """Draw the means of the minimum distance by arm: one panel per planner and column of the paper."""
     rows = data["table2"]
-    planners, arms, rules = (distinct(rows, name) for name in ("planner", "arm", "channel"))
-    columns = list(dict.fromkeys((str(row["scenario"]), str(row["detector"])) for row in rows))
+    planners, columns = groups(rows, "planner"), list(groups(rows, "scenario", "detector"))
+    arms = list(groups(rows, "arm"))
     figure = Figure(figsize=(2.9 * len(columns) + 1.2, 3.2 * len(planners)), layout="constrained")
     panels = figure.subplots(len(planners), len(columns), sharex=True, sharey="row", squeeze=False)
     for planner, line in zip(planners, panels, strict=True):
         for (scenario, detector), axes in zip(columns, line, strict=True):
-            mine = _select(rows, planner=planner, scenario=scenario, detector=detector)
-            for shift, (rule, color) in enumerate(zip(rules, ORDERED_COLORS, strict=False)):
-                some = _select(mine, channel=rule)
-                _points(axes, [arms.index(str(row["arm"])) - 0.2 + 0.2 * shift for row in some], some, color, rule)
+            mine = groups(where(rows, planner=planner, scenario=scenario, detector=detector), "channel")
+            for shift, ((rule, some), color) in enumerate(zip(mine.items(), ORDERED_COLORS, strict=False)):
+                at = [arms.index(row["arm"]) - 0.2 + 0.2 * shift for row in some]
+                low, high = limits(some, "mean")
+                _interval(axes, at, low, numbers(some, "mean"), high, color, f"{rule}, 95 %")
             _paper_points(axes, arms, scenario, detector)
             axes.set_title(f"{scenario_title(scenario)}, {detector}\n{planner}", fontsize=9)
             axes.set_xticks(range(len(arms)), labels=arms, fontsize=8, rotation=20)
@@ -341,19 +315,19 @@ def _paper_values(
     axes.errorbar(at, values, yerr=spread, fmt="D", ms=5, mfc="none", color=PAPER, capsize=2, lw=1, label=label)
 
 
-def table_3_figure(data: PaperRows) -> Figure:
+def table_3_figure(data: Tables) -> Figure:
     """Draw the success rates by senders: one panel per scenario and detector."""
     rows = data["table3"]
-    scenarios, detectors, senders = (distinct(rows, name) for name in ("scenario", "detector", "senders"))
+    scenarios, detectors, senders = (list(groups(rows, name)) for name in ("scenario", "detector", "senders"))
     figure = Figure(figsize=(2.6 * len(scenarios) + 1.0, 3.0 * len(detectors)), layout="constrained")
     panels = figure.subplots(len(detectors), len(scenarios), sharex=True, sharey=True, squeeze=False)
     for detector, line in zip(detectors, panels, strict=True):
         for scenario, axes in zip(scenarios, line, strict=True):
-            mine = _select(rows, scenario=scenario, detector=detector)
-            at = [senders.index(str(row["senders"])) for row in mine]
-            low, rate, high = ([number(row, name) for row in mine] for name in ("rate_low", "rate", "rate_high"))
+            mine = where(rows, scenario=scenario, detector=detector)
+            at = [senders.index(row["senders"]) for row in mine]
+            low, rate, high = (numbers(mine, name) for name in ("rate_low", "rate", "rate_high"))
             _interval(axes, [index - 0.1 for index in at], low, rate, high, ORDERED_COLORS[0], "measured, 95 %")
-            paper, spread = ([number(row, name) for row in mine] for name in ("paper_rate", "paper_rate_sd"))
+            paper, spread = (numbers(mine, name) for name in ("paper_rate", "paper_rate_sd"))
             _paper_values(axes, [index + 0.1 for index in at], paper, spread, "paper ± sd")
             axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
             axes.set_xticks(range(len(senders)), labels=senders, fontsize=8)
@@ -364,21 +338,19 @@ def table_3_figure(data: PaperRows) -> Figure:
     return figure
 
 
-def detection_figure(data: PaperRows) -> Figure:
+def detection_figure(data: Tables) -> Figure:
     """Draw the moving averages of the counts over time, with and without cooperation: one panel per column."""
     rows = data["detection_series"]
-    scenarios, detectors, arms = (distinct(rows, name) for name in ("scenario", "detector", "arm"))
+    scenarios, detectors = (groups(rows, name) for name in ("scenario", "detector"))
     figure = Figure(figsize=(3.6 * len(detectors) + 1.0, 2.6 * len(scenarios)), layout="constrained")
     panels = figure.subplots(len(scenarios), len(detectors), sharex=True, sharey=True, squeeze=False)
     for scenario, line in zip(scenarios, panels, strict=True):
         for detector, axes in zip(detectors, line, strict=True):
-            for arm, color in zip(arms, ORDERED_COLORS, strict=False):
-                mine = _select(rows, scenario=scenario, detector=detector, arm=arm)
-                time, mean, sd = ([number(row, name) for row in mine] for name in ("time", "mean", "sd"))
+            mine = groups(where(rows, scenario=scenario, detector=detector), "arm")
+            for (arm, some), color in zip(mine.items(), ORDERED_COLORS, strict=False):
+                time, mean, sd = np.array([numbers(some, name) for name in ("time", "mean", "sd")])
                 axes.plot(time, mean, color=color, lw=1.2, label=arm)
-                band = [value - spread for value, spread in zip(mean, sd, strict=True)]
-                top = [value + spread for value, spread in zip(mean, sd, strict=True)]
-                axes.fill_between(time, band, top, color=color, alpha=0.2, lw=0)
+                axes.fill_between(time, mean - sd, mean + sd, color=color, alpha=0.2, lw=0)
                 paper = COUNTS[scenario, detector, arm].mean
                 axes.axhline(paper, color=color, lw=1, ls="--", label=f"{arm}, mean of the paper")
             axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
@@ -390,7 +362,7 @@ def detection_figure(data: PaperRows) -> Figure:
     return figure
 
 
-FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
+FIGURES: Mapping[str, Callable[[Tables], Figure]] = {
     "table2": table_2_figure,
     "table3": table_3_figure,
     "detection": detection_figure,
@@ -419,11 +391,6 @@ def draw(part: str, report: PartReport, out: Path) -> Path | None:
     return path
 
 
-def _points(axes: Axes, at: Sequence[float], rows: Sequence[Row], color: str, label: str) -> None:
-    low, high = limits(rows, "mean")
-    _interval(axes, at, low, [number(row, "mean") for row in rows], high, color, f"{label}, 95 %")
-
-
 def _interval(
     axes: Axes,
     at: Sequence[float],
@@ -433,11 +400,5 @@ def _interval(
     color: str,
     label: str,
 ) -> None:
-    below = [value - end for value, end in zip(middle, low, strict=True)]
-    above = [end - value for value, end in zip(middle, high, strict=True)]
-    errors = [[max(0.0, length) for length in lengths] for lengths in (below, above)]
+    errors = np.maximum(0.0, [np.subtract(middle, low), np.subtract(high, middle)])
     axes.errorbar(at, middle, yerr=errors, fmt="o", ms=4, color=color, capsize=3, lw=1, label=label)
-
-
-def _select(rows: Sequence[Row], **fields: str) -> list[Row]:
-    return [row for row in rows if all(row[name] == value for name, value in fields.items())]

@@ -5,12 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from operator import itemgetter
+from string import Formatter
 from typing import Any
 
-Value = str | int | float | bool | None
-Row = Mapping[str, Value]
+from eidrive_reports.tables import grouped, markdown_table
+
+Row = Mapping[str, Any]
+"""Texts, numbers, booleans and None by the name of their field."""
 
 NO_VALUE = "-"
 """Text of a table cell without a value."""
@@ -18,19 +23,19 @@ NO_VALUE = "-"
 
 @dataclass(frozen=True)
 class Column:
-    """Column of the Markdown table: a format of fields of a row, such as `{low:.2f} to {high:.2f}`.
-
-    fields  fields of the format; if one is None, the cell is empty
-    """
+    """Column of the Markdown table: a format of fields of a row, such as `{low:.2f} to {high:.2f}`."""
 
     title: str
     template: str
-    fields: tuple[str, ...]
+
+    @cached_property
+    def fields(self) -> tuple[str, ...]:
+        """Fields of the format."""
+        return tuple(field for _, field, _, _ in Formatter().parse(self.template) if field)
 
     def text(self, row: Row) -> str:
-        """Return the cell of a row."""
-        values = {name: row[name] for name in self.fields}
-        return NO_VALUE if None in values.values() else self.template.format(**values)
+        """Return the cell of a row, which is empty if a field is None."""
+        return NO_VALUE if any(row[name] is None for name in self.fields) else self.template.format_map(row)
 
 
 @dataclass(frozen=True)
@@ -47,9 +52,11 @@ class DataTable:
 
     def markdown(self) -> str:
         """Return the table as Markdown."""
-        lines = ["| " + " | ".join(column.title for column in self.columns) + " |", "|---" * len(self.columns) + "|"]
-        lines += ["| " + " | ".join(column.text(row) for column in self.columns) + " |" for row in self.rows]
-        return "\n".join(lines) + "\n"
+        return markdown_table([column.title for column in self.columns], self.cells())
+
+    def cells(self) -> list[list[str]]:
+        """Return the formatted cells by row; empty for a table without columns."""
+        return [[column.text(row) for column in self.columns] for row in self.rows] if self.columns else []
 
 
 def as_csv(rows: Sequence[Row]) -> str:
@@ -62,12 +69,10 @@ def as_csv(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def _exact(value: Value) -> str:
+def _exact(value: object) -> str:
     if value is None:
         return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(value) if isinstance(value, float) else str(value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 @dataclass(frozen=True)
@@ -78,23 +83,21 @@ class Section:
     paragraphs: tuple[str, ...] = ()
     table: DataTable | None = None
 
-    @property
-    def columns(self) -> tuple[Column, ...]:
-        """Columns of the table; empty without a table."""
-        return () if self.table is None else self.table.columns
-
-    def cells(self) -> list[list[str]]:
-        """Return the formatted cells of the table by row; empty for a table without columns."""
-        if self.table is None or not self.columns:
-            return []
-        return [[column.text(row) for column in self.columns] for row in self.table.rows]
-
-    def markdown(self, level: int = 2) -> str:
-        """Return the section as Markdown with a heading of this level."""
-        parts = [f"{'#' * level} {self.title}\n", *(f"{text}\n" for text in self.paragraphs)]
-        if self.table is not None and self.columns:
+    def markdown(self) -> str:
+        """Return the section as Markdown."""
+        parts = [f"## {self.title}\n", *(f"{text}\n" for text in self.paragraphs)]
+        if self.table is not None and self.table.columns:
             parts.append(self.table.markdown())
         return "\n".join(parts)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the texts of the section and of its table."""
+        return {
+            "title": self.title,
+            "paragraphs": list(self.paragraphs),
+            "columns": [column.title for column in self.table.columns] if self.table else [],
+            "rows": self.table.cells() if self.table else [],
+        }
 
 
 REASON = "Likely reason"
@@ -125,15 +128,7 @@ class PartReport:
 
     def as_json(self) -> dict[str, Any]:
         """Return the texts of the sections, and the rows of the tables that the report shows with all digits."""
-        sections = [
-            {
-                "title": section.title,
-                "paragraphs": list(section.paragraphs),
-                "columns": [column.title for column in section.columns],
-                "rows": section.cells(),
-            }
-            for section in self.sections
-        ]
+        sections = [section.as_json() for section in self.sections]
         return {"title": self.title, "sections": sections, "tables": self.data(shown=True)}
 
     def markdown(self) -> str:
@@ -143,7 +138,7 @@ class PartReport:
 
 def plain(title: str, field: str, form: str = "") -> Column:
     """Return a column of one field with a format specification such as `.2f`."""
-    return Column(title, f"{{{field}:{form}}}", (field,))
+    return Column(title, f"{{{field}:{form}}}")
 
 
 def number(row: Row, name: str) -> float:
@@ -151,20 +146,35 @@ def number(row: Row, name: str) -> float:
     return float(row[name] or 0.0)
 
 
+def numbers(rows: Iterable[Row], name: str) -> list[float]:
+    """Return a field of rows as numbers; 0 where it is empty."""
+    return [number(row, name) for row in rows]
+
+
+def where(rows: Iterable[Row], **fields: object) -> list[Row]:
+    """Return the rows with these values of fields."""
+    return [row for row in rows if all(row[name] == value for name, value in fields.items())]
+
+
 def finite(value: float) -> float | None:
     """Return a number, or None for NaN: an undefined value is an empty field."""
     return None if math.isnan(value) else value
 
 
-def limits(rows: Sequence[Row], name: str, low: str = "low", high: str = "high") -> tuple[list[float], list[float]]:
+def bounds(interval: Any) -> dict[str, float | None]:
+    """Return the limits `low` and `high` of an interval as fields; None for an undefined one, and without interval."""
+    return {end: None if interval is None else finite(getattr(interval, end)) for end in ("low", "high")}
+
+
+def limits(rows: Sequence[Row], name: str) -> tuple[list[float], list[float]]:
     """Return the limits of the intervals of a field; the value itself where there is none."""
-    ends = [[number(row, name if row[end] is None else end) for row in rows] for end in (low, high)]
-    return ends[0], ends[1]
+    below, above = ([number(row, name if row[end] is None else end) for row in rows] for end in ("low", "high"))
+    return below, above
 
 
-def distinct(rows: Sequence[Row], name: str) -> list[str]:
-    """Return the values of a field as texts, in the order of their first rows."""
-    return list(dict.fromkeys(str(row[name]) for row in rows))
+def groups(rows: Iterable[Row], *names: str) -> dict[Any, list[Row]]:
+    """Return rows by the value of a field, or by the tuple of those of several, in the order of their first rows."""
+    return grouped(rows, itemgetter(*names))
 
 
 def scenario_title(scenario: str) -> str:

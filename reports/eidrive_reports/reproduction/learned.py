@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+from typing import Any
 
 from eidrive_reports.cooperative_perception.receivers import (
     ARMS,
@@ -27,11 +27,11 @@ from eidrive_reports.reproduction.layout import (
     PartReport,
     Row,
     Section,
-    Value,
-    finite,
-    number,
+    bounds,
+    groups,
     plain,
     result_sections,
+    where,
 )
 from eidrive_reports.reproduction.part import Case, Part
 from eidrive_reports.reproduction.perception import SCENES, measured_cases, protocol
@@ -43,7 +43,6 @@ from eidrive_reports.reproduction.perception_tables import (
     curve_sections,
     data_sections,
     hidden_rows,
-    interval_column,
     object_counts,
     pool,
     records,
@@ -115,15 +114,13 @@ def gain_rows(measured: Sequence[PerceptionRecord]) -> Iterator[Row]:
     without = [[*measured[:number], *measured[number + 1 :]] for number in range(len(measured))]
     for late, (arm, fault, value) in product(LATE, conditions):
         compared = [Condition(name) if fault == NO_FAULT else on_axis(name, fault, value) for name in (arm, late)]
-        fields: dict[str, Value] = {"arm": arm, "over": late, "fault": fault, "value": value}
+        fields: dict[str, Any] = {"arm": arm, "over": late, "fault": fault, "value": value}
         for index, overlap in list(enumerate(OVERLAPS))[1:]:
-            gain = _gain(measured, compared, index)
-            low = high = math.nan
+            gain, interval = _gain(measured, compared, index), None
             if len(measured) > 1:
                 interval = jackknife_interval(gain, [_gain(others, compared, index) for others in without])
-                low, high = interval.low, interval.high
-            key = round(100.0 * overlap)
-            fields |= {f"gain_{key}": gain, f"low_{key}": finite(low), f"high_{key}": finite(high)}
+            values = {"gain": gain, **bounds(interval)}
+            fields |= {f"{name}_{round(100.0 * overlap)}": value for name, value in values.items()}
         yield fields
 
 
@@ -135,43 +132,39 @@ def _gain(measured: Sequence[PerceptionRecord], compared: Sequence[Condition], o
 
 def _gain_column(title: str, prefix: str = "") -> Column:
     """Return the column of a gain in AP 0.7 with its interval; `prefix` begins the names of the fields."""
-    return interval_column(title, (f"{prefix}gain_70", f"{prefix}low_70", f"{prefix}high_70"), "+")
+    return Column(title, f"{{{prefix}gain_70:+.3f}} ({{{prefix}low_70:+.2f}} to {{{prefix}high_70:+.2f}})")
 
 
 def gain_table(gains: Sequence[Row], late: str) -> DataTable:
     """Return the table of the gain in AP 0.7 over one arm with late fusion: a line per fault, a column per arm."""
-    lines: dict[tuple[Value, Value], dict[str, Value]] = {}
-    for row in gains:
-        if row["over"] == late and row["arm"] in INTERMEDIATE:
-            line = lines.setdefault(
-                (row["fault"], row["value"]), {name: row[name] for name in ("over", "fault", "value")}
-            )
-            line |= {f"{row['arm']} {name}": row[name] for name in ("gain_70", "low_70", "high_70")}
-    columns = (
-        plain("fault", "fault"),
-        plain("value", "value", "g"),
-        *(_gain_column(f"{arm} (95 %)", f"{arm} ") for arm in INTERMEDIATE),
-    )
-    return DataTable("learned_gain_curves", columns, tuple(lines.values()))
+    shown = [row for row in where(gains, over=late) if row["arm"] in INTERMEDIATE]
+    lines = [
+        {"over": late, "fault": fault, "value": value}
+        | {f"{row['arm']} {name}": row[name] for row in mine for name in ("gain_70", "low_70", "high_70")}
+        for (fault, value), mine in groups(shown, "fault", "value").items()
+    ]
+    intervals = (_gain_column(f"{arm} (95 %)", f"{arm} ") for arm in INTERMEDIATE)
+    columns = (plain("fault", "fault"), plain("value", "value", "g"), *intervals)
+    return DataTable("learned_gain_curves", columns, tuple(lines))
 
 
 def conclusions(arms: Sequence[Row], gains: Sequence[Row]) -> tuple[str, ...]:
     """Return the paragraphs about the measured values."""
     return (
         *(_target(gains, late, value) for late in LATE for value in TARGETS),
-        *_departures({str(row["arm"]): number(row, "ap_70") for row in arms}, gains),
+        *_departures({row["arm"]: row["ap_70"] for row in arms}, gains),
     )
 
 
 def _target(gains: Sequence[Row], late: str, deviation: float) -> str:
     """Return whether intermediate fusion gains as much over late fusion as expected at a pose error [m]."""
-    key = (late, "pose error" if deviation else NO_FAULT, deviation)
-    mine = [row for row in gains if (row["over"], row["fault"], row["value"]) == key and row["arm"] in INTERMEDIATE]
+    fault = "pose error" if deviation else NO_FAULT
+    mine = [row for row in where(gains, over=late, fault=fault, value=deviation) if row["arm"] in INTERMEDIATE]
     texts = [f"{row['arm']} {_gain_column('').text(row)}" for row in mine]
-    reached = [str(row["arm"]) for row in mine if number(row, "gain_70") >= TARGETS[deviation]]
-    where = f"at a pose error of {deviation:g} m" if deviation else "without faults"
+    reached = [row["arm"] for row in mine if row["gain_70"] >= TARGETS[deviation]]
+    situation = f"at a pose error of {deviation:g} m" if deviation else "without faults"
     return (
-        f"AP 0.7 of intermediate fusion less that of `{late}` {where}: {', '.join(texts)}. The expected gain of "
+        f"AP 0.7 of intermediate fusion less that of `{late}` {situation}: {', '.join(texts)}. The expected gain of "
         f"{TARGETS[deviation]:+g} is reached by {', '.join(reached) or 'none of them'}."
     )
 
@@ -190,17 +183,13 @@ def _departures(ap_70: Mapping[str, float], gains: Sequence[Row]) -> Iterator[st
             f"{ap_70['attention, codes']:.3f}): 256 entries round the eight compressed numbers of a cell coarsely: "
             "objects are found, and their boxes are displaced and turned."
         )
-    displaced = [
-        row
-        for row in gains
-        if (row["fault"], row["over"]) == ("pose error", LATE[0]) and not str(row["arm"]).endswith("aligned")
-    ]
-    if any(number(row, "gain_70") < 0.0 for row in displaced):
+    displaced = [row for row in where(gains, fault="pose error", over=LATE[0]) if not row["arm"].endswith("aligned")]
+    if any(row["gain_70"] < 0.0 for row in displaced):
         yield (
             f"{REASON} (with pose errors intermediate fusion without aligned poses is below `{LATE[0]}`): covariance "
             "intersection knows the covariance of the pose of a sender, keeps the accurate own box of an object that "
-            "both see, and averages "
-            "independent errors over the scans; features have no covariance, and displaced ones blur those of the ego."
+            "both see, and averages independent errors over the scans; features have no covariance, and displaced ones "
+            "blur those of the ego."
         )
 
 
@@ -242,7 +231,6 @@ PART = Part(
         "latency, lost frames and fewer bytes cost?"
     ),
     2,
-    DETECTORS,
     DETECTORS,
     cases,
     report,

@@ -1,8 +1,9 @@
-"""Page of the reproduction: the reports of all parts in a folder, with their figures, in one file."""
+"""Pages of the results in a folder: the reports of all parts with their figures, and the benchmark."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +12,10 @@ from typing import Any
 from markupsafe import Markup, escape
 from rich.console import Console
 
+from eidrive_reports.reproduction import benchmark
+from eidrive_reports.reproduction.benchmark_arms import NO_COOPERATION
 from eidrive_reports.reproduction.episodes import EpisodeJob
+from eidrive_reports.reproduction.layout import Row, groups
 from eidrive_reports.reproduction.part import Part
 from eidrive_reports.reproduction.parts import PARTS
 from eidrive_reports.reproduction.provenance import read_provenance
@@ -80,10 +84,21 @@ def _duration(origins: Mapping[str, Mapping[str, Any]]) -> str:
     return f"{runs:,.0f} runs in {duration} on {processes} process{'es' if processes > 1 else ''}"
 
 
-def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
-    path, figure = out / f"{name}.json", out / f"{name}.png"
+@contextmanager
+def _intact_report(out: Path, name: str) -> Iterator[dict[str, Any]]:
+    """Yield the report of a part from its JSON file. Raise SettingError for a damaged file: if it cannot be read, or
+    lacks what the block reads."""
+    path = out / f"{name}.json"
     try:
-        report = load_json(path.read_bytes())
+        yield load_json(path.read_bytes())
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        hint = f"run `eidrive reproduce {name}` again"
+        raise SettingError(Diagnostic(f"the file is damaged: {error!r}", hint, str(path))) from error
+
+
+def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
+    figure = out / f"{name}.png"
+    with _intact_report(out, name) as report:
         sections = [
             {
                 "title": str(section["title"]),
@@ -94,9 +109,6 @@ def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
             for section in report["sections"]
         ]
         title = str(report["title"])
-    except (ValueError, KeyError, TypeError) as error:
-        hint = "run `eidrive reproduce` for this part again"
-        raise SettingError(Diagnostic(f"the file is damaged: {error!r}", hint, str(path))) from error
     return {
         "name": name,
         "title": title,
@@ -128,3 +140,41 @@ def text_with_code(text: str) -> Markup:
     return Markup("").join(
         Markup("<code>{}</code>").format(part) if number % 2 else escape(part) for number, part in enumerate(parts)
     )
+
+
+def write_benchmark_page(out: Path) -> Path:
+    """Write the page of the benchmark from its JSON file in a folder. Return its path.
+
+    Raise SettingError if the file is damaged, or if the page cannot be written.
+    """
+    with _intact_report(out, benchmark.NAME) as report:
+        ranks, cells = report["tables"][benchmark.RANKS], report["tables"][benchmark.CELLS]
+        texts = {section["title"]: list(map(text_with_code, section["paragraphs"])) for section in report["sections"]}
+        channels = {row["channel"]: row["channel_title"] for row in ranks}
+        choices = {name: list(groups(cells, name)) for name in ("scenario", "method", "channel")}
+        values = {
+            "title": str(report["title"]),
+            "question": texts["Question"],
+            "setup": texts["Set-up"],
+            "channels": channels,
+            "ranks": groups(ranks, "channel_title"),
+            "overall": _matrix(choices["method"], list(channels), ranks),
+            "scenarios": {
+                name: _matrix(choices["method"], list(channels), rows)
+                for name, rows in groups(cells, "scenario").items()
+            },
+            "cells": cells,
+            "choices": choices,
+        }
+    origin = ", ".join(origin_texts(read_provenance(out).get(benchmark.NAME, {})))
+    template = Path(__file__).with_name("benchmark.html.jinja")
+    return write_page(out / f"{benchmark.NAME}.html", template, origin=origin, **values)
+
+
+def _matrix(methods: Sequence[str], channels: Sequence[str], rows: Sequence[Row]) -> list[tuple[str, list[Row | None]]]:
+    """Return the rows of each method on each channel; that of no cooperation is equal on all channels."""
+    at = {(row["method"], row["channel"]): row for row in rows}
+    return [
+        (method, [at.get((method, channel), at.get((method, NO_COOPERATION))) for channel in channels])
+        for method in methods
+    ]

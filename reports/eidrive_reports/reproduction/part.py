@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 from eidrive_reports.cooperative_perception.receivers import Condition
 from eidrive_reports.reproduction.episodes import Episode, EpisodeJob
 from eidrive_reports.reproduction.layout import PartReport
 from eidrive_reports.reproduction.provenance import job_digest
+from eidrive_reports.tables import grouped
 from eidrive_scenario.api.run import RunSettings
 
 
@@ -52,9 +54,9 @@ class Part:
     question   question that it examines
     episodes   number of episodes per cell without an option, with seeds from 1
     detectors  detectors that it can use
-    default    detectors without an option
     cases      function that returns its cases for some detectors
     report     function that returns its report from the episodes of these detectors
+    default    detectors without an option; by default all that it can use
     has_replays  whether its runs can be recorded for replays: few cases, each a run of a scenario of the library
     """
 
@@ -63,9 +65,9 @@ class Part:
     question: str
     episodes: int
     detectors: tuple[str, ...]
-    default: tuple[str, ...]
     cases: Callable[[Sequence[str]], Sequence[Case]]
     report: Callable[[Sequence[Episode], Sequence[str]], PartReport]
+    default: tuple[str, ...] = ()
     has_replays: bool = False
 
     def jobs(self, episodes: int, detectors: Sequence[str]) -> list[EpisodeJob]:
@@ -74,15 +76,10 @@ class Part:
         return [case.job(seed) for seed in range(1, episodes + 1) for case in cases]
 
 
-def by_case(episodes: Sequence[Episode]) -> dict[tuple[str, str], list[Episode]]:
-    """Return the episodes of each case by scenario and arm, ordered by seed."""
-    cases: dict[tuple[str, str], list[Episode]] = {}
-    for episode in sorted(episodes, key=lambda episode: episode.seed):
-        cases.setdefault((episode.scenario, episode.arm), []).append(episode)
-    return cases
+Runs = Mapping[tuple[str, str], Sequence[Episode]]
+"""Episodes of each case by scenario and arm, ordered by seed."""
 
 
-def select(episodes: Sequence[Episode], scenario: str, arm: str) -> list[Episode]:
-    """Return the episodes of a case, ordered by seed."""
-    mine = [episode for episode in episodes if (episode.scenario, episode.arm) == (scenario, arm)]
-    return sorted(mine, key=lambda episode: episode.seed)
+def by_case(episodes: Sequence[Episode]) -> Runs:
+    """Return the episodes of each case."""
+    return grouped(sorted(episodes, key=attrgetter("seed")), attrgetter("scenario", "arm"))

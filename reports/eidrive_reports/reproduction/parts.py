@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from eidrive_reports.reproduction import (
-    channels,
-    detection,
-    ei,
-    learned,
-    perception,
-    pipeline,
-    sensitivity,
-    table_2,
-    table_3,
-)
+from eidrive_reports.reproduction import channels, detection, drives, learned, perception, sensitivity, table_2, table_3
 from eidrive_reports.reproduction.part import Part
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, suggestion
 
-MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels, perception, learned)
-PARTS = {module.PART.name: module.PART for module in MODULES}
+PARTS = {
+    part.name: part
+    for part in (
+        table_2.PART,
+        table_3.PART,
+        detection.PART,
+        drives.PIPELINE,
+        drives.EI,
+        sensitivity.PART,
+        channels.PART,
+        perception.PART,
+        learned.PART,
+    )
+}
 """Parts by name."""
 ALL = "all"
 """Name of all parts in PARTS together."""
@@ -44,7 +46,7 @@ def selected_detectors(part: Part, names: Sequence[str]) -> tuple[str, ...]:
     _check_names(
         "--detectors", names, dict.fromkeys(name for user in (*PARTS.values(), part) for name in user.detectors)
     )
-    detectors = tuple(name for name in part.detectors if name in names) if names else part.default
+    detectors = tuple(name for name in part.detectors if name in names) if names else part.default or part.detectors
     if not detectors:
         message = f"--detectors: part {part.name} uses none of them (got {quoted(','.join(names))})"
         raise SettingError(Diagnostic(message, f"known: {', '.join(part.detectors)}"))

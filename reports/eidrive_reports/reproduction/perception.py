@@ -20,7 +20,7 @@ from eidrive_reports.cooperative_perception.scores import RANGES, PerceptionReco
 from eidrive_reports.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_reports.reproduction import pose_errors
 from eidrive_reports.reproduction.episodes import Episode
-from eidrive_reports.reproduction.layout import REASON, PartReport, Row, Section, number, result_sections
+from eidrive_reports.reproduction.layout import REASON, PartReport, Row, Section, number, result_sections, where
 from eidrive_reports.reproduction.part import Case, Part
 from eidrive_reports.reproduction.perception_shapes import crossing, shape_section
 from eidrive_reports.reproduction.perception_tables import (
@@ -101,11 +101,8 @@ def protocol(study: Study) -> tuple[str, ...]:
 
 def conclusions(arms: Sequence[Row], curves: Sequence[Row], volumes: Sequence[Row]) -> tuple[str, ...]:
     """Return the paragraphs about the measured values."""
-    by_arm = {str(row["arm"]): row for row in arms}
-    listed = [
-        f"{name} {number(row, 'ap_30'):.3f}, {number(row, 'ap_50'):.3f} and {number(row, 'ap_70'):.3f}"
-        for name, row in by_arm.items()
-    ]
+    by_arm = {row["arm"]: row for row in arms}
+    listed = [f"{name} {row['ap_30']:.3f}, {row['ap_50']:.3f} and {row['ap_70']:.3f}" for name, row in by_arm.items()]
     hidden = [f"{name} {number(row, 'hidden_50'):.0%}" for name, row in by_arm.items()]
     return (
         f"Without faults, AP at 0.3, 0.5 and 0.7: {'; '.join(listed)}.",
@@ -123,13 +120,9 @@ def _limits(curves: Sequence[Row], axis: str) -> str:
     for arm in SENDING:
         ends = []
         for overlap in (0.5, 0.7):
+            shown = where(curves, axis=axis, range="all", iou=overlap)
             mine, alone = (
-                {
-                    number(row, "value"): number(row, "ap")
-                    for row in curves
-                    if (row["arm"], row["axis"], row["range"], row["iou"]) == (name, axis, "all", overlap)
-                }
-                for name in (arm, "none")
+                {row["value"]: number(row, "ap") for row in where(shown, arm=name)} for name in (arm, "none")
             )
             at = crossing(mine, alone[0.0])
             ends.append("nowhere" if at is None else f"from {at:.2f}")
@@ -139,19 +132,19 @@ def _limits(curves: Sequence[Row], axis: str) -> str:
 
 
 def _volume(volumes: Sequence[Row]) -> str:
-    most = {str(row["arm"]): row for row in reversed(volumes) if row["cell"] in (None, 0.1)}
+    most = {row["arm"]: row for row in reversed(volumes) if row["cell"] in (None, 0.1)}
     late, early = most["covariance_intersection"], most["early"]
-    ratio = number(early, "megabytes_per_second") / max(number(late, "megabytes_per_second"), 1e-12)
+    ratio = early["megabytes_per_second"] / max(late["megabytes_per_second"], 1e-12)
     return (
-        f"Points need {ratio:.0f} times the bytes of boxes ({number(early, 'megabytes_per_second'):.3f} and "
-        f"{number(late, 'megabytes_per_second'):.3f} MB/s over all links), for an AP 0.7 of "
-        f"{number(early, 'ap_70'):.3f} and {number(late, 'ap_70'):.3f}."
+        f"Points need {ratio:.0f} times the bytes of boxes ({early['megabytes_per_second']:.3f} and "
+        f"{late['megabytes_per_second']:.3f} MB/s over all links), for an AP 0.7 of "
+        f"{early['ap_70']:.3f} and {late['ap_70']:.3f}."
     )
 
 
 def _sorting(arms: Sequence[Row]) -> str:
-    lost = [number(row, "ap_50") - number(row, "ap_50_local_sort") for row in arms]
-    gained = [number(row, "ap_50_hit") - number(row, "ap_50") for row in arms]
+    lost = [row["ap_50"] - row["ap_50_local_sort"] for row in arms]
+    gained = [number(row, "ap_50_hit") - row["ap_50"] for row in arms]
     return (
         f"Local sort lowers AP 0.5 by {min(lost):.3f} to {max(lost):.3f}. With hit objects only it is higher by "
         f"{min(gained):.3f} to {max(gained):.3f}."
@@ -163,11 +156,11 @@ def _departures(arms: Mapping[str, Row]) -> Iterator[str]:
     late, early, alone, filtered, mean = (
         arms[name] for name in ("covariance_intersection", "early", "none", "none, filtered", "average")
     )
-    if number(early, "ap_50") < number(late, "ap_50"):
+    if early["ap_50"] < late["ap_50"]:
         yield (
             f"{REASON} (early fusion is below covariance intersection, other than in the literature): "
             "covariance intersection uses earlier scans, which own detections alone gain "
-            f"{number(filtered, 'ap_50') - number(alone, 'ap_50'):+.3f} from; and the detector groups points by "
+            f"{filtered['ap_50'] - alone['ap_50']:+.3f} from; and the detector groups points by "
             "the distance from the ego, which suits points of others less the farther they are (AP 0.5 of "
             f"{number(early, 'ap_50_range_2'):.3f} against {number(late, 'ap_50_range_2'):.3f} from {RANGES[1]:g} "
             "m on)."
@@ -225,7 +218,6 @@ PART = Part(
         "fewer bytes cost, and do pose errors make the ego brake?"
     ),
     4,
-    DETECTORS,
     DETECTORS,
     cases,
     report,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from eidrive_reports.cooperative_perception.receivers import ARMS, AXES, POSE_AND_LATENCY, Study
-from eidrive_reports.reproduction.layout import DataTable, Row, Section, number, plain
+from eidrive_reports.reproduction.layout import DataTable, Row, Section, groups, number, plain, where
 
 ALONE = "none"
 LATE, FILTERED = "average", "covariance_intersection"
@@ -50,11 +50,10 @@ def shapes(study: Study, curves: Sequence[Row], volumes: Sequence[Row]) -> tuple
 
     curves  rows with arm, axis, value, range, iou and ap; volumes: rows with arm, share, megabytes_per_second and ap_50
     """
-    by_curve: dict[tuple[str, str, float], dict[float, float]] = {}
-    for row in curves:
-        if row["range"] == "all":
-            key = str(row["arm"]), str(row["axis"]), number(row, "iou")
-            by_curve.setdefault(key, {})[number(row, "value")] = number(row, "ap")
+    by_curve = {
+        key: {row["value"]: number(row, "ap") for row in mine}
+        for key, mine in groups(where(curves, range="all"), "arm", "axis", "iou").items()
+    }
     sending = [arm for arm in study.compared if ARMS[arm].cooperates]
     intermediate = [arm for arm in sending if ARMS[arm].shares == "features"]
     others = [arm for arm in sending if arm not in intermediate]
@@ -227,21 +226,19 @@ def _plateaus(volumes: Sequence[Row], arms: Sequence[str]) -> list[Row]:
     """Half of the messages cost little, and a fifth costs more."""
     rows = []
     for arm in arms:
-        mine = [row for row in volumes if row["arm"] == arm and row["cell"] in (None, 0.1)]
+        mine = [row for row in where(volumes, arm=arm) if row["cell"] in (None, 0.1)]
         if len(mine) < 2:
             continue  # the study does not vary the messages of this arm
-        values, volume = ([number(row, name) for row in mine] for name in ("ap_50", "megabytes_per_second"))
-        text = ", ".join(f"{ap:.3f} at {size:.3g} MB/s" for ap, size in zip(values, volume, strict=True))
+        text = ", ".join(f"{row['ap_50']:.3f} at {row['megabytes_per_second']:.3g} MB/s" for row in mine)
         shape = f"{arm}: AP 0.5 is on a plateau at half of the volume (loss up to {PLATEAU:g})"
-        rows.append(_row(shape, values[0] - values[1] <= PLATEAU, text))
+        rows.append(_row(shape, mine[0]["ap_50"] - mine[1]["ap_50"] <= PLATEAU, text))
     return rows
 
 
 def _masks(volumes: Sequence[Row]) -> list[Row]:
     """A few per cent of the cells suffice, and less does not."""
-    mine = [row for row in volumes if str(row["arm"]).startswith(FEATURES_ONLY)]
-    by_share = {number(row, "share"): number(row, "ap_50") for row in mine}
-    (alone,) = (number(row, "ap_50") for row in volumes if row["arm"] == ALONE)
+    by_share = {row["share"]: row["ap_50"] for row in volumes if row["arm"].startswith(FEATURES_ONLY)}
+    (alone,) = (row["ap_50"] for row in where(volumes, arm=ALONE))
     text = ", ".join(f"{precision:.3f} with {share:.2%} of the cells" for share, precision in by_share.items())
     fewest = min(by_share)
     return [

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
+from typing import Any
 
 from eidrive_reports.cooperative_perception.receivers import ARMS, AXES, SCAN_RATE, Condition, Study, on_axis
 from eidrive_reports.cooperative_perception.scores import OVERLAPS, RANGES, PerceptionRecord, Pool
 from eidrive_reports.reproduction.episodes import Episode
-from eidrive_reports.reproduction.layout import Column, DataTable, Row, Section, Value, finite, plain
+from eidrive_reports.reproduction.layout import Column, DataTable, Row, Section, bounds, finite, groups, plain, where
 from eidrive_reports.reproduction.part import by_case
 
 ALL_RANGES = "all"
@@ -59,8 +60,7 @@ def curve_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterat
                     "range": range_name(range_class),
                     "iou": overlap,
                     "ap": finite(precision.value),
-                    "low": finite(precision.low),
-                    "high": finite(precision.high),
+                    **bounds(precision),
                     "ap_local_sort": finite(precision.local),
                     "objects": precision.objects,
                 }
@@ -81,8 +81,7 @@ def hidden_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Itera
                     "detected": recall.detected,
                     "hidden": recall.objects,
                     "recall": finite(recall.value),
-                    "low": finite(recall.low),
-                    "high": finite(recall.high),
+                    **bounds(recall),
                 }
 
 
@@ -91,13 +90,10 @@ def arm_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator
     for arm in study.arms:
         pooled = pool(measurements, study, Condition(arm))
         precisions = [pooled.precision(index) for index in range(len(OVERLAPS))]
-        fields: dict[str, Value] = {"arm": arm}
+        fields: dict[str, Any] = {"arm": arm}
         for overlap, precision in zip(OVERLAPS, precisions, strict=True):
-            fields |= {
-                f"ap_{_key(overlap)}": precision.value,
-                f"low_{_key(overlap)}": finite(precision.low),
-                f"high_{_key(overlap)}": finite(precision.high),
-            }
+            values = {"ap": precision.value, **bounds(precision)}
+            fields |= {f"{name}_{_key(overlap)}": value for name, value in values.items()}
         for range_class in range(study.reach):
             fields[f"ap_50_range_{range_class}"] = finite(pooled.precision(1, range_class).value)
         fields["ap_50_local_sort"] = precisions[1].local
@@ -113,7 +109,7 @@ def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Itera
     """
     for condition in (Condition(study.arms[0]), *study.volumes):
         pooled, arm = pool(measurements, study, condition), ARMS[condition.arm]
-        fields: dict[str, Value] = {
+        fields: dict[str, Any] = {
             "arm": condition.arm,
             "messages_per_second": SCAN_RATE / condition.every if arm.cooperates else None,
             "cell": condition.cell if arm.shares == "points" else None,
@@ -129,15 +125,9 @@ def _key(overlap: float) -> int:
     return round(100.0 * overlap)
 
 
-def interval_column(title: str, fields: tuple[str, str, str], sign: str = "") -> Column:
-    """Return the column of a value with its interval, by the names of value, low and high; `sign` is their format."""
-    value, low, high = fields
-    return Column(title, f"{{{value}:{sign}.3f}} ({{{low}:{sign}.2f}} to {{{high}:{sign}.2f}})", fields)
-
-
 def _precision(overlap: float) -> Column:
     key = _key(overlap)
-    return interval_column(f"AP {overlap:g} (95 %)", (f"ap_{key}", f"low_{key}", f"high_{key}"))
+    return Column(f"AP {overlap:g} (95 %)", f"{{ap_{key}:.3f}} ({{low_{key}:.2f}} to {{high_{key}:.2f}})")
 
 
 VOLUME_COLUMNS = (
@@ -166,36 +156,26 @@ def arm_table(rows: Sequence[Row], study: Study) -> DataTable:
 
 def volume_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of precision and volume, with the columns that differ between its rows."""
-    fields = [
+    columns = [
         column
         for column in VOLUME_COLUMNS
-        if column.fields[0] in ("arm", "megabytes_per_second")
-        or len({row[column.fields[0]] for row in rows} - {None}) > 1
+        for field in column.fields
+        if field in ("arm", "megabytes_per_second") or len({row[field] for row in rows} - {None}) > 1
     ]
-    return DataTable(f"{study.name}_volume", tuple(fields), tuple(rows))
+    return DataTable(f"{study.name}_volume", tuple(columns), tuple(rows))
+
+
+AXIS_COLUMNS = (plain("axis", "axis"), plain("value", "value", "g"))
 
 
 def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of all ranges with one column per arm and overlap."""
-    precisions = {
-        (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
-    }
-    lines: list[Row] = [
-        {
-            "axis": axis,
-            "value": value,
-            **{
-                f"{arm}_{_key(overlap)}": precisions[axis, value, arm, overlap]
-                for arm in study.compared
-                for overlap in OVERLAPS
-            },
-        }
-        for axis in study.axes
-        for value in AXES[axis][2]
+    lines = [
+        {"axis": axis, "value": value, **{f"{row['arm']}_{_key(row['iou'])}": row["ap"] for row in mine}}
+        for (axis, value), mine in groups(where(rows, range=ALL_RANGES), "axis", "value").items()
     ]
     columns = (
-        plain("axis", "axis"),
-        plain("value", "value", "g"),
+        *AXIS_COLUMNS,
         *(
             plain(f"{arm}, AP {overlap:g}", f"{arm}_{_key(overlap)}", ".3f")
             for overlap in OVERLAPS[1:]
@@ -207,23 +187,11 @@ def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
 
 def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
     """Return the table of the recall at the overlap 0.5 with one column per arm."""
-    recalls = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
-    lines: list[Row] = [
-        {
-            "axis": axis,
-            "value": value,
-            **{arm: recalls[axis, value, arm]["recall"] for arm in study.compared},
-            "hidden": recalls[axis, value, study.compared[0]]["hidden"],
-        }
-        for axis in study.axes
-        for value in AXES[axis][2]
+    lines = [
+        {"axis": axis, "value": value, **{row["arm"]: row["recall"] for row in mine}, "hidden": mine[0]["hidden"]}
+        for (axis, value), mine in groups(where(rows, iou=OVERLAPS[1]), "axis", "value").items()
     ]
-    columns = (
-        plain("axis", "axis"),
-        plain("value", "value", "g"),
-        *(plain(arm, arm, ".3f") for arm in study.compared),
-        plain("objects", "hidden"),
-    )
+    columns = (*AXIS_COLUMNS, *(plain(arm, arm, ".3f") for arm in study.compared), plain("objects", "hidden"))
     return DataTable(f"{study.name}_hidden_curves", columns, tuple(lines))
 
 

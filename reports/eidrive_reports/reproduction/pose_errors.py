@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from eidrive_reports.cooperative_perception.receivers import DRIFT_TIME, YAW_PER_POSITION
 from eidrive_reports.paper import EGO
-from eidrive_reports.reproduction.drives import COLLISIONS
+from eidrive_reports.reproduction.encounters import COLLISIONS
 from eidrive_reports.reproduction.episodes import Episode
 from eidrive_reports.reproduction.layout import DataTable, Row, Section, plain
-from eidrive_reports.reproduction.part import Case, select
+from eidrive_reports.reproduction.part import Case, by_case
 from eidrive_scenario.api.run import RunSettings
 
 SCENE = "driving/parked_cars"
@@ -79,9 +79,9 @@ def rows(episodes: Sequence[Episode]) -> Iterator[Row]:
     least_speed, mean_least_speed  minimum speed of the ego, and its mean over the runs [m/s]
     brakings, collisions           number of brakings of all runs, and of runs with a collision
     """
+    runs = by_case(episodes)
     for arm in arms():
-        own = select(episodes, SCENE, arm.name)
-        if own:
+        if own := runs.get((SCENE, arm.name)):
             speeds = [episode.metrics[f"min_speed.{EGO}"] for episode in own]
             yield {
                 "detector": arm.detector,

@@ -20,11 +20,11 @@ from eidrive_reports.reproduction.layout import (
     PartReport,
     Row,
     Section,
-    Value,
-    distinct,
-    number,
+    bounds,
+    groups,
     plain,
     scenario_title,
+    where,
 )
 from eidrive_reports.reproduction.part import Case, Part, by_case
 from eidrive_scenario.api.common import generator
@@ -53,16 +53,16 @@ def setup(per_cell: int, per_latency: int) -> tuple[str, ...]:
 def conclusions(cells: Sequence[Row], effects: Sequence[Row], curve: Sequence[Row]) -> tuple[str, ...]:
     """Return per planner where messages help, do nothing or harm, and at which latency their effect ends."""
     texts = []
-    for planner in dict.fromkeys(str(row["planner"]) for row in cells):
-        some, effect, line = ([row for row in rows if row["planner"] == planner] for rows in (cells, effects, curve))
+    for planner, some in groups(cells, "planner").items():
+        effect, line = (where(rows, planner=planner) for rows in (effects, curve))
         texts += [f"`{planner}`. {_effects(effect)}", f"`{planner}`. {_collisions_near_starts(some)}"]
-        texts += [f"`{planner}`, {_threshold(line, scenario)}" for scenario in distinct(line, "scenario")]
+        texts += [f"`{planner}`, {_threshold(scenario, mine)}" for scenario, mine in groups(line, "scenario").items()]
     return tuple(texts)
 
 
 def _effects(effects: Sequence[Row]) -> str:
     listed = [
-        f"{scenario_title(str(row['scenario']))}, {row['arm']}: {row['helps']}, {row['nothing']} and {row['harms']} of "
+        f"{scenario_title(row['scenario'])}, {row['arm']}: {row['helps']}, {row['nothing']} and {row['harms']} of "
         f"{row['cells']}"
         for row in effects
         if row["arm"] != "none"
@@ -72,30 +72,28 @@ def _effects(effects: Sequence[Row]) -> str:
 
 def _collisions_near_starts(cells: Sequence[Row]) -> str:
     near = [
-        f"{scenario_title(scenario)}, start {name}: {_at(cells, scenario, *places[scenario])}"
-        for scenario in distinct(cells, "scenario")
+        f"{scenario_title(scenario)}, start {name}: {_at(mine, *places[scenario])}"
+        for scenario, mine in groups(cells, "scenario").items()
         for name, places in (("of EI-Drive", ORIGINAL), ("of the library", LIBRARY))
     ]
     return f"Collisions in the cell that is nearest to a start. {'; '.join(near)}."
 
 
-def _at(cells: Sequence[Row], scenario: str, start: float, speed: float) -> str:
-    mine = [row for row in cells if row["scenario"] == scenario]
-    nearest = min(mine, key=lambda row: (abs(number(row, "start") - start), abs(number(row, "speed") - speed)))
-    same = [row for row in mine if (row["start"], row["speed"]) == (nearest["start"], nearest["speed"])]
+def _at(cells: Sequence[Row], start: float, speed: float) -> str:
+    nearest = min(cells, key=lambda row: (abs(row["start"] - start), abs(row["speed"] - speed)))
+    same = where(cells, start=nearest["start"], speed=nearest["speed"])
     counts = ", ".join(f"{row['arm']} {row['collisions']}" for row in same)
     return f"{counts} of {nearest['episodes']} at {nearest['start']:g} m and {nearest['speed']:g} m/s"
 
 
-def _threshold(curve: Sequence[Row], scenario: str) -> str:
-    mine = [row for row in curve if row["scenario"] == scenario]
-    first, last = mine[0], mine[-1]
-    before, after = max(pairwise(mine), key=lambda pair: number(pair[1], "share") - number(pair[0], "share"))
+def _threshold(scenario: str, curve: Sequence[Row]) -> str:
+    first, last = curve[0], curve[-1]
+    before, after = max(pairwise(curve), key=lambda pair: pair[1]["share"] - pair[0]["share"])
     ends = (
         f"{scenario_title(scenario)}: {first['share']:.0%} of the runs have a collision without latency, "
         f"{last['share']:.0%} at {last['latency']:g} s"
     )
-    if number(after, "share") <= number(before, "share"):
+    if after["share"] <= before["share"]:
         return f"{ends}; the share nowhere increases."
     step = f"{before['share']:.0%} at {before['latency']:g} s to {after['share']:.0%} at {after['latency']:g} s"
     return f"{ends}; the largest step is from {step}."
@@ -178,7 +176,7 @@ def map_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[
         for start, speed in product(STARTS[scenario], SPEEDS):
             mine = runs[scenario, f"{detector} {planner} map {start} {speed} {arm}"]
             hits = sum(map(collided, mine))
-            key: dict[str, Value] = {"scenario": scenario, "detector": detector, "planner": planner, "arm": arm}
+            key = {"scenario": scenario, "detector": detector, "planner": planner, "arm": arm}
             yield {**key, "start": start, "speed": speed, "episodes": len(mine), "collisions": hits}
 
 
@@ -197,8 +195,7 @@ def curve_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterato
             "episodes": len(mine),
             "collisions": share.successes,
             "share": share.share,
-            "low": share.low,
-            "high": share.high,
+            **bounds(share),
         }
 
 
@@ -207,38 +204,28 @@ def effects(rows: Sequence[Row]) -> Iterator[Row]:
 
     A cell counts by the number of collisions, with the same seeds as without cooperation.
     """
-    hits = {(_map(row), row["arm"], row["start"], row["speed"]): row for row in rows}
-    for key, arm in dict.fromkeys((_map(row), row["arm"]) for row in rows):
-        mine = [row for row in rows if (_map(row), row["arm"]) == (key, arm)]
-        changes = [_count(row) - _count(hits[key, "none", row["start"], row["speed"]]) for row in mine]
+    maps = groups(rows, "detector", "planner", "scenario", "arm")
+    for (*stack, arm), mine in maps.items():
+        alone = maps[*stack, "none"]  # has its cells in the same order
+        changes = [row["collisions"] - other["collisions"] for row, other in zip(mine, alone, strict=True)]
         yield {
-            "detector": key[0],
-            "planner": key[1],
-            "scenario": key[2],
+            **dict(zip(("detector", "planner", "scenario"), stack, strict=True)),
             "arm": arm,
             "cells": len(mine),
-            "episodes": sum(int(row["episodes"] or 0) for row in mine),
-            "collisions": sum(map(_count, mine)),
+            "episodes": sum(row["episodes"] for row in mine),
+            "collisions": sum(row["collisions"] for row in mine),
             "helps": sum(change < 0 for change in changes),
             "nothing": sum(change == 0 for change in changes),
             "harms": sum(change > 0 for change in changes),
         }
 
 
-def _map(row: Row) -> tuple[str, str, str]:
-    return str(row["detector"]), str(row["planner"]), str(row["scenario"])
-
-
-def _count(row: Row) -> int:
-    return int(row["collisions"] or 0)
-
-
 EFFECT_COLUMNS = (
     plain("planner", "planner"),
     plain("scenario", "scenario"),
     plain("arm", "arm"),
-    Column("collisions", "{collisions} of {episodes}", ("collisions", "episodes")),
-    Column("cells with fewer than without cooperation", "{helps} of {cells}", ("helps", "cells")),
+    Column("collisions", "{collisions} of {episodes}"),
+    Column("cells with fewer than without cooperation", "{helps} of {cells}"),
     plain("as many", "nothing"),
     plain("more", "harms"),
 )
@@ -246,8 +233,8 @@ CURVE_COLUMNS = (
     plain("planner", "planner"),
     plain("scenario", "scenario"),
     plain("latency [s]", "latency", ".2f"),
-    Column("collisions", "{collisions} of {episodes}", ("collisions", "episodes")),
-    Column("95 %", "{low:.0%} to {high:.0%}", ("low", "high")),
+    Column("collisions", "{collisions} of {episodes}"),
+    Column("95 %", "{low:.0%} to {high:.0%}"),
 )
 
 
@@ -257,7 +244,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     summary, curve = tuple(effects(cells)), tuple(curve_rows(episodes, detectors))
     table = DataTable("sensitivity_effects", EFFECT_COLUMNS, summary)
     sections = (
-        Section("Set-up", setup(int(cells[0]["episodes"] or 0), int(curve[0]["episodes"] or 0))),
+        Section("Set-up", setup(cells[0]["episodes"], curve[0]["episodes"])),
         Section("Result", conclusions(cells, summary, curve), table),
         Section("Latency", (), DataTable("sensitivity_latency", CURVE_COLUMNS, curve)),
         Section("Maps", ("All cells: sensitivity.csv.",), DataTable("sensitivity", (), cells)),
@@ -273,7 +260,6 @@ PART = Part(
         "nothing, or cause them, and where are the cells of Table II?"
     ),
     3,
-    DETECTORS,
     DETECTORS,
     cases,
     report,

@@ -6,11 +6,11 @@ channel and with two planners: the paper's, which brakes while an object is in t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from eidrive_reports.paper import ARMS, SCENARIOS, TABLE_2, VARIANTS, ExperimentArm, ModelVariant
+from eidrive_reports.paper import ARMS, SCENARIOS, TABLE_2, VARIANTS, ModelVariant
 from eidrive_reports.reproduction.encounters import (
     CRITERIA,
     DISTANCE_COLUMNS,
@@ -26,17 +26,21 @@ from eidrive_reports.reproduction.layout import (
     PartReport,
     Row,
     Section,
-    Value,
-    finite,
+    bounds,
+    groups,
     plain,
     result_sections,
+    scenario_title,
+    where,
 )
-from eidrive_reports.reproduction.part import Case, Part, select
-from eidrive_scenario.api.experiments import PairedDifference, paired_difference, paired_spread
+from eidrive_reports.reproduction.part import Case, Part, Runs, by_case
+from eidrive_scenario.api.experiments import paired_difference, paired_spread
 from eidrive_scenario.api.run import RunSettings
 
 PAPERS_PLANNER = "conflict_area"
 """Planner with the rule of the paper."""
+STACK = ("planner", "channel")
+"""Fields of the planner and the rule for the channel, under each of which the table is repeated."""
 AIM = 0.6
 """Mean absolute difference to the paper's means that counts as agreement [m]."""
 
@@ -66,9 +70,9 @@ SUMMARY_COLUMNS = (
     plain("planner", "planner"),
     plain("channel", "channel"),
     plain("statement", "statement"),
-    Column("holds", "{holds} of {columns}", ("holds", "columns")),
-    Column("95 % interval above 0", "{certain} of {columns}", ("certain", "columns")),
-    Column("paper", "{paper} of {columns}", ("paper", "columns")),
+    Column("holds", "{holds} of {columns}"),
+    Column("95 % interval above 0", "{certain} of {columns}"),
+    Column("paper", "{paper} of {columns}"),
 )
 
 REASONS = {
@@ -92,23 +96,19 @@ REASONS = {
 
 def summary(compared: Sequence[Row]) -> tuple[Row, ...]:
     """Return in how many columns each statement holds, by planner and rule for the channel, and in the paper."""
-    rows: list[Row] = []
-    for planner, channel in dict.fromkeys(_settings_of(row) for row in compared):
-        mine = [row for row in compared if _settings_of(row) == (planner, channel)]
-        for statement in dict.fromkeys(str(row["statement"]) for row in mine):
-            some = [row for row in mine if row["statement"] == statement]
-            rows.append(
-                {
-                    "planner": planner,
-                    "channel": channel,
-                    "statement": statement,
-                    "columns": len(some),
-                    "holds": sum(bool(row["holds"]) for row in some),
-                    "certain": sum(bool(row["certain"]) for row in some),
-                    "paper": sum(float(row["paper_difference"] or 0.0) > 0.0 for row in some),
-                }
-            )
-    return tuple(rows)
+    return tuple(
+        {
+            "planner": planner,
+            "channel": channel,
+            "statement": statement,
+            "columns": len(some),
+            "holds": len(where(some, holds=True)),
+            "certain": len(where(some, certain=True)),
+            "paper": sum(row["paper_difference"] > 0.0 for row in some),
+        }
+        for (planner, channel), mine in groups(compared, *STACK).items()
+        for statement, some in groups(mine, "statement").items()
+    )
 
 
 def conclusions(rows: Sequence[Row], compared: Sequence[Row]) -> tuple[str, ...]:
@@ -116,14 +116,10 @@ def conclusions(rows: Sequence[Row], compared: Sequence[Row]) -> tuple[str, ...]
     return (*_agreement(compared), *_means(rows), _spread(rows), _collisions(rows))
 
 
-def _settings_of(row: Row) -> tuple[str, str]:
-    return str(row["planner"]), str(row["channel"])
-
-
 def _agreement(compared: Sequence[Row]) -> tuple[str, ...]:
     """Return the statements whose sign differs from the paper's with the planner of the paper, and likely reasons."""
-    with_rule = [row for row in compared if row["planner"] == PAPERS_PLANNER]
-    apart = [row for row in with_rule if (float(row["paper_difference"] or 0.0) > 0.0) != bool(row["holds"])]
+    with_rule = where(compared, planner=PAPERS_PLANNER)
+    apart = [row for row in with_rule if (row["paper_difference"] > 0.0) != row["holds"]]
     agree = len(with_rule) - len(apart)
     signs = f"With the planner of the paper, {agree} of {len(with_rule)} comparisons have the sign of the paper."
     if not apart:
@@ -133,34 +129,30 @@ def _agreement(compared: Sequence[Row]) -> tuple[str, ...]:
         f"{row['paper_difference']:+.2f} m)"
         for row in apart
     )
-    statements = dict.fromkeys(str(row["statement"]) for row in apart)
-    reasons = [f"{REASON} ({name}): {REASONS[name]}" for name in statements if name in REASONS]
+    reasons = [f"{REASON} ({name}): {REASONS[name]}" for name in groups(apart, "statement") if name in REASONS]
     return (f"{signs} The others are: {listed}.", *reasons)
 
 
 def _column(row: Row) -> str:
-    return f"{str(row['scenario']).removeprefix('coop/').replace('_', ' ')} with {row['detector']}"
+    return f"{scenario_title(row['scenario'])} with {row['detector']}"
 
 
 def _means(rows: Sequence[Row]) -> tuple[str, ...]:
     texts = []
-    for planner, channel in dict.fromkeys(_settings_of(row) for row in rows):
-        mine = [row for row in rows if _settings_of(row) == (planner, channel)]
-        differences = [float(row["difference"] or 0.0) for row in mine]
-        mean = sum(map(abs, differences)) / len(differences)
-        farthest = max(mine, key=lambda row: abs(float(row["difference"] or 0.0)))
+    for (planner, channel), mine in groups(rows, *STACK).items():
+        mean = sum(abs(row["difference"]) for row in mine) / len(mine)
+        farthest = max(mine, key=lambda row: abs(row["difference"]))
         texts.append(
             f"`{planner}`, `{channel}`: {mean:.2f} m from the {len(mine)} means of the paper on average "
             f"({'within' if mean <= AIM else 'beyond'} {AIM} m); farthest is {_column(farthest)} "
-            f"and {farthest['arm']}: {farthest['mean']:.2f} m against "
-            f"{farthest['paper_mean']:.2f} m"
+            f"and {farthest['arm']}: {farthest['mean']:.2f} m against {farthest['paper_mean']:.2f} m"
         )
     return (f"Mean absolute difference to the paper's means. {'; '.join(texts)}.", *_crashes(rows))
 
 
 def _crashes(rows: Sequence[Row]) -> tuple[str, ...]:
     """Return a likely reason of the differences of the means, if there are runs with a crash."""
-    least = [float(row["crash_least"]) for row in rows if row["crash_least"] is not None]
+    least = [row["crash_least"] for row in rows if row["crash_least"] is not None]
     if not least:
         return ()
     return (
@@ -172,8 +164,8 @@ def _crashes(rows: Sequence[Row]) -> tuple[str, ...]:
 
 def _spread(rows: Sequence[Row]) -> str:
     """Return the mean standard deviation of the cells without latency and loss: how much the seeds differ."""
-    mine = [row for row in rows if row["planner"] == PAPERS_PLANNER and row["arm"] in ("none", "cooperation")]
-    ours, paper = (sum(float(row[name] or 0.0) for row in mine) / len(mine) for name in ("sd", "paper_sd"))
+    mine = [row for row in where(rows, planner=PAPERS_PLANNER) if row["arm"] in ("none", "cooperation")]
+    ours, paper = (sum(row[name] for row in mine) / len(mine) for name in ("sd", "paper_sd"))
     return (
         f"Standard deviation in the cells without latency and loss, with the planner of the paper: {ours:.3f} m on "
         f"average, in the paper {paper:.3f} m."
@@ -182,11 +174,10 @@ def _spread(rows: Sequence[Row]) -> str:
 
 def _collisions(rows: Sequence[Row]) -> str:
     texts = []
-    for planner, channel in dict.fromkeys(_settings_of(row) for row in rows):
+    for (planner, channel), mine in groups(rows, *STACK).items():
         counts = []
-        for arm in dict.fromkeys(str(row["arm"]) for row in rows):
-            mine = [row for row in rows if (*_settings_of(row), row["arm"]) == (planner, channel, arm)]
-            hits, runs = (sum(int(row[name] or 0) for row in mine) for name in ("collisions", "episodes"))
+        for arm, some in groups(mine, "arm").items():
+            hits, runs = (sum(row[name] for row in some) for name in ("collisions", "episodes"))
             counts.append(f"{arm} {hits} of {runs}")
         texts.append(f"`{planner}`, `{channel}`: {', '.join(counts)}")
     return f"Runs with a collision, all columns together. {'; '.join(texts)}."
@@ -211,10 +202,6 @@ class Comparison:
     def statement(self) -> str:
         """The statement that the comparison examines."""
         return f"{'sd of ' if self.spread else ''}{self.greater} > {self.smaller}"
-
-    def measured(self, smaller: Sequence[float], greater: Sequence[float]) -> PairedDifference:
-        """Return the difference of pairs with equal seeds [m]."""
-        return (paired_spread if self.spread else paired_difference)(smaller, greater)
 
 
 COMPARISONS = (
@@ -243,73 +230,35 @@ def _settings(detector: str, planner: str, channel: str) -> RunSettings:
     return RunSettings(channel=channel, detector=detector, planner=planner, criteria=CRITERIA, time_limit=DURATION)
 
 
-@dataclass(frozen=True)
-class Cell:
-    """Cell of the table with its episodes, ordered by seed."""
-
-    scenario: str
-    detector: str
-    planner: str
-    variant: ModelVariant
-    arm: ExperimentArm
-    episodes: tuple[Episode, ...]
-
-    def row(self) -> dict[str, Value]:
-        """Return the fields of the cell beside those of the paper."""
-        published = TABLE_2[self.scenario, self.detector, self.arm.name]
-        fields = encounter_fields(self.episodes)
-        return {
-            **column_fields(self.scenario, self.detector, self.planner, self.variant),
-            "arm": self.arm.name,
-            **fields,
-            "paper_mean": published.mean,
-            "paper_sd": published.sd,
-            "difference": float(fields["mean"] or 0.0) - published.mean,
-        }
-
-
-def column_fields(scenario: str, detector: str, planner: str, variant: ModelVariant) -> dict[str, Value]:
-    """Return the fields that identify a column of the paper under a planner and a rule for the channel."""
-    return {"scenario": scenario, "detector": detector, "planner": planner, "channel": variant.name}
-
-
-def cells_of(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[tuple[Cell, ...]]:
-    """Yield the cells of each column in the order of the arms."""
-    for planner, variant, scenario, detector in product(PLANNERS, VARIANTS, SCENARIOS, detectors):
-        yield tuple(
-            Cell(
-                scenario,
-                detector,
-                planner,
-                variant,
-                arm,
-                tuple(select(episodes, scenario, _arm(detector, planner, arm.channel(variant)))),
-            )
-            for arm in ARMS
-        )
-
-
-def compare(column: Sequence[Cell]) -> Iterator[dict[str, Value]]:
-    """Yield the comparisons of the arms of a column, with the difference that the paper has."""
-    by_arm = {cell.arm.name: cell for cell in column}
-    first = column[0]
+def column_rows(
+    runs: Runs, planner: str, variant: ModelVariant, scenario: str, detector: str
+) -> tuple[list[Row], list[Row]]:
+    """Return the cells of a column of the paper under a planner and a rule for the channel, and the comparisons of its
+    arms, each beside the values of the paper."""
+    column = {"scenario": scenario, "detector": detector, "planner": planner, "channel": variant.name}
+    episodes = {arm.name: runs[scenario, _arm(detector, planner, arm.channel(variant))] for arm in ARMS}
+    cells, comparisons = list[Row](), list[Row]()
+    for arm, mine in episodes.items():
+        published, fields = TABLE_2[scenario, detector, arm], encounter_fields(mine)
+        paper = {"paper_mean": published.mean, "paper_sd": published.sd}
+        cells.append({**column, "arm": arm, **fields, **paper, "difference": fields["mean"] - published.mean})
     for comparison in COMPARISONS:
-        greater, smaller = by_arm[comparison.greater], by_arm[comparison.smaller]
-        difference = comparison.measured(centers(smaller.episodes), centers(greater.episodes))
-        paper = {
-            name: TABLE_2[first.scenario, first.detector, name] for name in (comparison.greater, comparison.smaller)
-        }
-        means = [(value.sd if comparison.spread else value.mean) for value in paper.values()]
-        yield {
-            **column_fields(first.scenario, first.detector, first.planner, first.variant),
-            "statement": comparison.statement,
-            "difference": difference.mean,
-            "low": finite(difference.low),
-            "high": finite(difference.high),
-            "holds": difference.mean > 0.0,
-            "certain": difference.low > 0.0,
-            "paper_difference": means[0] - means[1],
-        }
+        arms = (comparison.smaller, comparison.greater)
+        compare = paired_spread if comparison.spread else paired_difference
+        difference = compare(*(centers(episodes[arm]) for arm in arms))
+        smaller, greater = (TABLE_2[scenario, detector, arm] for arm in arms)
+        comparisons.append(
+            {
+                **column,
+                "statement": comparison.statement,
+                "difference": difference.mean,
+                **bounds(difference),
+                "holds": difference.mean > 0.0,
+                "certain": difference.low > 0.0,
+                "paper_difference": greater.sd - smaller.sd if comparison.spread else greater.mean - smaller.mean,
+            }
+        )
+    return cells, comparisons
 
 
 CELL_COLUMNS = (
@@ -317,12 +266,8 @@ CELL_COLUMNS = (
     plain("detector", "detector"),
     plain("arm", "arm"),
     *DISTANCE_COLUMNS,
-    Column("paper [m]", "{paper_mean:.2f} ± {paper_sd:.2f}", ("paper_mean", "paper_sd")),
-    Column(
-        "collisions",
-        "{collisions} of {episodes} ({collision_low:.2f} to {collision_high:.2f})",
-        ("collisions", "episodes", "collision_low", "collision_high"),
-    ),
+    Column("paper [m]", "{paper_mean:.2f} ± {paper_sd:.2f}"),
+    Column("collisions", "{collisions} of {episodes} ({collision_low:.2f} to {collision_high:.2f})"),
     *GAP_COLUMNS,
 )
 COMPARISON_COLUMNS = (
@@ -331,32 +276,30 @@ COMPARISON_COLUMNS = (
     plain("detector", "detector"),
     plain("planner", "planner"),
     plain("channel", "channel"),
-    Column("difference [m]", "{difference:+.2f}", ("difference",)),
-    Column("95 %", "{low:+.2f} to {high:+.2f}", ("low", "high")),
-    Column("paper [m]", "{paper_difference:+.2f}", ("paper_difference",)),
+    Column("difference [m]", "{difference:+.2f}"),
+    Column("95 %", "{low:+.2f} to {high:+.2f}"),
+    Column("paper [m]", "{paper_difference:+.2f}"),
 )
 
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: what agrees with the paper, the cells, and the comparisons."""
-    columns = list(cells_of(episodes, detectors))
-    rows = tuple(cell.row() for column in columns for cell in column)
+    runs = by_case(episodes)
+    columns = [column_rows(runs, *key) for key in product(PLANNERS, VARIANTS, SCENARIOS, detectors)]
+    rows = [row for cells, _ in columns for row in cells]
     order = [comparison.statement for comparison in COMPARISONS]
-    compared = [row for column in columns for row in compare(column)]
-    compared.sort(key=lambda row: order.index(str(row["statement"])))
+    compared = [row for _, comparisons in columns for row in comparisons]
+    compared.sort(key=lambda row: order.index(row["statement"]))
     sections = [
-        Section("Set-up", setup(len(columns[0][0].episodes))),
+        Section("Set-up", setup(rows[0]["episodes"])),
         *result_sections(conclusions(rows, compared), DataTable("table2_summary", SUMMARY_COLUMNS, summary(compared))),
     ]
     for planner, variant in product(PLANNERS, VARIANTS):
-        sections.append(Section(f"Planner `{planner}`, {variant.title}", (), _table(rows, planner, variant)))
+        mine = tuple(where(rows, planner=planner, channel=variant.name))
+        table = DataTable("table2", CELL_COLUMNS, mine)
+        sections.append(Section(f"Planner `{planner}`, {variant.title}", (), table))
     sections.append(Section("Comparisons", (), DataTable("table2_comparisons", COMPARISON_COLUMNS, tuple(compared))))
     return PartReport(PART.title, tuple(sections))
-
-
-def _table(rows: Sequence[Row], planner: str, variant: ModelVariant) -> DataTable:
-    mine = tuple(row for row in rows if (row["planner"], row["channel"]) == (planner, variant.name))
-    return DataTable("table2", CELL_COLUMNS, mine)
 
 
 PART = Part(
@@ -367,7 +310,6 @@ PART = Part(
         "or a vehicle (scenario 2) sends what it detects? What do latency and loss of the messages change?"
     ),
     20,
-    DETECTORS,
     DETECTORS,
     cases,
     report,

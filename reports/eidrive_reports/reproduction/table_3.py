@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 from eidrive_reports.paper import TABLE_3
@@ -21,12 +21,13 @@ from eidrive_reports.reproduction.layout import (
     PartReport,
     Row,
     Section,
-    Value,
+    groups,
     plain,
     result_sections,
     scenario_title,
+    where,
 )
-from eidrive_reports.reproduction.part import Case, Part, select
+from eidrive_reports.reproduction.part import Case, Part, Runs, by_case
 from eidrive_scenario.api.experiments import PairedVerdicts, resolve_scenario, wilson
 from eidrive_scenario.api.run import RunSettings, load_scenario, variations
 
@@ -54,9 +55,8 @@ def _settings(detector: str, senders: str) -> RunSettings:
     return RunSettings(detector=detector, parameters={"Participants": senders}, criteria=CRITERIA)
 
 
-def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, senders: str) -> dict[str, Value]:
+def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, senders: str) -> Row:
     """Return the fields of a cell beside those of the paper."""
-    fields = encounter_fields(episodes)
     free = sum(not collided(episode) for episode in episodes)
     rate, published = wilson(free, len(episodes)), TABLE_3[scenario, senders]
     within = abs(rate.share - published.rate) <= TOLERANCE
@@ -64,7 +64,7 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, senders:
         "scenario": scenario,
         "detector": detector,
         "senders": senders,
-        **fields,
+        **encounter_fields(episodes),
         "free": free,
         "rate": rate.share,
         "rate_low": rate.low,
@@ -77,67 +77,63 @@ def cell_row(episodes: Sequence[Episode], scenario: str, detector: str, senders:
     }
 
 
-def compare(episodes: Sequence[Episode], scenario: str, detector: str) -> list[dict[str, Value]]:
-    """Return the comparisons of the rates of a scenario, over pairs with equal seeds."""
-    rows: list[dict[str, Value]] = []
+def compare(runs: Runs, scenario: str, detector: str) -> Iterator[Row]:
+    """Yield the comparisons of the rates of a scenario, over pairs with equal seeds."""
     for higher, lower, equal in COMPARISONS:
         free = [
-            [not collided(episode) for episode in select(episodes, scenario, f"{detector} {senders}")]
+            [not collided(episode) for episode in runs[scenario, f"{detector} {senders}"]]
             for senders in (lower, higher)
         ]
         verdicts = PairedVerdicts.of(*free)
         low, high = verdicts.interval()
-        rows.append(
-            {
-                "scenario": scenario,
-                "detector": detector,
-                "statement": f"{higher} {'>=' if equal else '>'} {lower}",
-                "difference": verdicts.difference,
-                "low": low,
-                "high": high,
-                "holds": verdicts.difference >= 0.0 if equal else verdicts.difference > 0.0,
-                "paper_difference": TABLE_3[scenario, higher].rate - TABLE_3[scenario, lower].rate,
-            }
-        )
-    return rows
+        yield {
+            "scenario": scenario,
+            "detector": detector,
+            "statement": f"{higher} {'>=' if equal else '>'} {lower}",
+            "difference": verdicts.difference,
+            "low": low,
+            "high": high,
+            "holds": verdicts.difference >= 0.0 if equal else verdicts.difference > 0.0,
+            "paper_difference": TABLE_3[scenario, higher].rate - TABLE_3[scenario, lower].rate,
+        }
 
 
 CELL_COLUMNS = (
     plain("scenario", "scenario"),
     plain("senders", "senders"),
-    Column("success", "{free} of {episodes} = {rate:.0%}", ("free", "episodes", "rate")),
-    Column("95 %", "{rate_low:.0%} to {rate_high:.0%}", ("rate_low", "rate_high")),
-    Column("paper", "{paper_rate:.0%} ± {paper_rate_sd:.0%}", ("paper_rate", "paper_rate_sd")),
+    Column("success", "{free} of {episodes} = {rate:.0%}"),
+    Column("95 %", "{rate_low:.0%} to {rate_high:.0%}"),
+    Column("paper", "{paper_rate:.0%} ± {paper_rate_sd:.0%}"),
     *DISTANCE_COLUMNS,
-    Column("paper [m]", "{paper_mean:.2f} ± {paper_sd:.2f}", ("paper_mean", "paper_sd")),
+    Column("paper [m]", "{paper_mean:.2f} ± {paper_sd:.2f}"),
     *GAP_COLUMNS,
 )
 COMPARISON_COLUMNS = (
     plain("statement", "statement"),
     plain("scenario", "scenario"),
     plain("detector", "detector"),
-    Column("difference", "{difference:+.0%}", ("difference",)),
-    Column("95 %", "{low:+.0%} to {high:+.0%}", ("low", "high")),
-    Column("paper", "{paper_difference:+.0%}", ("paper_difference",)),
+    Column("difference", "{difference:+.0%}"),
+    Column("95 %", "{low:+.0%} to {high:+.0%}"),
+    Column("paper", "{paper_difference:+.0%}"),
 )
 
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: what agrees with the paper, the cells, and the comparisons."""
+    runs = by_case(episodes)
     rows = [
-        cell_row(select(episodes, scenario, f"{detector} {senders}"), scenario, detector, senders)
+        cell_row(runs[scenario, f"{detector} {senders}"], scenario, detector, senders)
         for detector, scenario, senders in product(detectors, SCENARIOS, SENDERS)
     ]
     compared = [
-        row for detector, scenario in product(detectors, SCENARIOS) for row in compare(episodes, scenario, detector)
+        row for detector, scenario in product(detectors, SCENARIOS) for row in compare(runs, scenario, detector)
     ]
     sections = [
         Section("Set-up", _setup(rows)),
         *result_sections([*(_finding(rows, compared, detector) for detector in detectors), *_reasons(rows)]),
     ]
-    for detector in detectors:
-        mine = tuple(row for row in rows if row["detector"] == detector)
-        sections.append(Section(f"Detector `{detector}`", (), DataTable("table3", CELL_COLUMNS, mine)))
+    for detector, mine in groups(rows, "detector").items():
+        sections.append(Section(f"Detector `{detector}`", (), DataTable("table3", CELL_COLUMNS, tuple(mine))))
     sections.append(Section("Comparisons", (), DataTable("table3_comparisons", COMPARISON_COLUMNS, tuple(compared))))
     return PartReport(PART.title, tuple(sections))
 
@@ -173,31 +169,30 @@ def _bus_start(scenario: str) -> str:
 
 def _misses(rows: Sequence[Row]) -> str:
     """Return the numbers of collisions with the vehicle as the only sender in the scenarios with one bus."""
-    alone = [row for row in rows if row["senders"] == "vehicle" and row["scenario"] in SCENARIOS[:2]]
+    alone = [row for row in where(rows, senders="vehicle") if row["scenario"] in SCENARIOS[:2]]
     return " and ".join(f"{row['collisions']} of {row['episodes']} ({_label(row)}, {row['detector']})" for row in alone)
 
 
 def _finding(rows: Sequence[Row], compared: Sequence[Row], detector: str) -> str:
-    mine = [row for row in rows if row["detector"] == detector]
-    agree = [row for row in mine if row["agrees"]]
+    mine = where(rows, detector=detector)
     apart = "; ".join(
         f"{_label(row)}, {row['senders']}: {row['rate']:.0%} against {row['paper_rate']:.0%}"
-        for row in mine
-        if not row["agrees"]
+        for row in where(mine, agrees=False)
     )
-    orders = []
-    for statement in dict.fromkeys(str(row["statement"]) for row in compared):
-        some = [row for row in compared if (row["statement"], row["detector"]) == (statement, detector)]
-        orders.append(f"{statement} in {sum(bool(row['holds']) for row in some)} of {len(some)} scenarios")
+    orders = [
+        f"{statement} in {len(where(some, holds=True))} of {len(some)} scenarios"
+        for statement, some in groups(where(compared, detector=detector), "statement").items()
+    ]
+    agree = len(where(mine, agrees=True))
     return (
-        f"`{detector}`: {len(agree)} of {len(mine)} rates are within {100 * TOLERANCE:.0f} points of the paper's, or "
-        "have it in their interval" + (f"; the others are {apart}" if apart else "") + f". {' and '.join(orders)}."
+        f"`{detector}`: {agree} of {len(mine)} rates are within {100 * TOLERANCE:.0f} points of the paper's, or have "
+        "it in their interval" + (f"; the others are {apart}" if apart else "") + f". {' and '.join(orders)}."
     )
 
 
 def _reasons(rows: Sequence[Row]) -> tuple[str, ...]:
     """Return likely reasons of the departures that these rows have."""
-    apart = {str(row["senders"]) for row in rows if not row["agrees"]}
+    apart = {row["senders"] for row in where(rows, agrees=False)}
     texts = []
     if apart & {"both", "rsu"}:
         texts.append(
@@ -226,8 +221,8 @@ PART = Part(
     ),
     40,
     DETECTORS,
-    DETECTORS[:1],
     cases,
     report,
+    default=DETECTORS[:1],
     has_replays=True,
 )
