@@ -17,7 +17,7 @@ from eidrive_reports.cooperative_perception.receivers import (
     Study,
     on_axis,
 )
-from eidrive_reports.cooperative_perception.scores import OVERLAPS, RANGES, PerceptionRecord
+from eidrive_reports.cooperative_perception.scores import OVERLAPS, RANGES, PerceptionRecord, Pool
 from eidrive_reports.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_reports.reproduction.episodes import Episode
 from eidrive_reports.reproduction.layout import (
@@ -36,18 +36,7 @@ from eidrive_reports.reproduction.layout import (
 from eidrive_reports.reproduction.part import Case, Part
 from eidrive_reports.reproduction.perception import SCENES, measured_cases, protocol
 from eidrive_reports.reproduction.perception_shapes import shape_section
-from eidrive_reports.reproduction.perception_tables import (
-    arm_rows,
-    arm_table,
-    curve_rows,
-    curve_sections,
-    data_sections,
-    hidden_rows,
-    object_counts,
-    pool,
-    records,
-    volume_rows,
-)
+from eidrive_reports.reproduction.perception_tables import StudyResult, records
 from eidrive_scenario.api.experiments import jackknife_interval
 
 STUDY = Study(
@@ -84,9 +73,9 @@ def cases(detectors: Sequence[str]) -> list[Case]:
     return measured_cases(detectors, STUDY)
 
 
-def setup(measured: Sequence[PerceptionRecord], seeds: int) -> tuple[str, ...]:
+def setup(result: StudyResult, seeds: int) -> tuple[str, ...]:
     """Return the paragraphs about runs and arms."""
-    frames, objects, hit, hidden = object_counts(measured, STUDY)
+    frames, objects, hit, hidden = result.object_counts
     return (
         f"The {len(SCENES)} scenes of part `perception` with {seeds} seeds each. All stations have the detector "
         "`pillars` (docs/perception.md; 32 rings, 10,000 points per scan, range 100 m, "
@@ -126,7 +115,8 @@ def gain_rows(measured: Sequence[PerceptionRecord]) -> Iterator[Row]:
 
 def _gain(measured: Sequence[PerceptionRecord], compared: Sequence[Condition], overlap: int) -> float:
     """Return the average precision of the first condition less that of the second."""
-    first, second = (pool(measured, STUDY, condition).precision(overlap).value for condition in compared)
+    pools = (Pool(measured, condition.name, STUDY.reach) for condition in compared)
+    first, second = (pool.precision(overlap).value for pool in pools)
     return first - second
 
 
@@ -195,14 +185,12 @@ def _departures(ap_70: Mapping[str, float], gains: Sequence[Row]) -> Iterator[st
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: set-up, results without faults, gain over late fusion, shapes, curves and volume."""
-    measured = records(episodes)
-    curves, hidden = tuple(curve_rows(measured, STUDY)), tuple(hidden_rows(measured, STUDY))
-    arms, volumes = tuple(arm_rows(measured, STUDY)), tuple(volume_rows(measured, STUDY))
-    gains = tuple(gain_rows(measured))
+    result = StudyResult(STUDY, records(episodes))
+    gains = tuple(gain_rows(result.measured))
     sections = (
-        Section("Set-up", setup(measured, len({episode.seed for episode in episodes}))),
+        Section("Set-up", setup(result, len({episode.seed for episode in episodes}))),
         Section("Protocol", protocol(STUDY)),
-        *result_sections(conclusions(arms, gains), arm_table(arms, STUDY)),
+        *result_sections(conclusions(result.arms, gains), result.arm_table()),
         *(
             Section(
                 f"Gain over {late}",
@@ -211,14 +199,14 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
             )
             for late in LATE
         ),
-        shape_section(STUDY, curves, volumes),
-        *curve_sections(curves, hidden, volumes, STUDY),
+        shape_section(result),
+        *result.curve_sections(),
         Section(
             "Data on gains",
             ("Gain of all arms in AP 0.5 and AP 0.7 over each arm with late fusion: learned_gains.csv.",),
             DataTable("learned_gains", (), gains),
         ),
-        *data_sections(curves, hidden, STUDY),
+        *result.data_sections(),
     )
     return PartReport(PART.title, sections)
 

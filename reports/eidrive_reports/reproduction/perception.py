@@ -16,24 +16,14 @@ from eidrive_reports.cooperative_perception.receivers import (
     Study,
     fewer_messages,
 )
-from eidrive_reports.cooperative_perception.scores import RANGES, PerceptionRecord
+from eidrive_reports.cooperative_perception.scores import RANGES
 from eidrive_reports.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_reports.reproduction import pose_errors
 from eidrive_reports.reproduction.episodes import Episode
 from eidrive_reports.reproduction.layout import REASON, PartReport, Row, Section, number, result_sections, where
 from eidrive_reports.reproduction.part import Case, Part
 from eidrive_reports.reproduction.perception_shapes import crossing, shape_section
-from eidrive_reports.reproduction.perception_tables import (
-    arm_rows,
-    arm_table,
-    curve_rows,
-    curve_sections,
-    data_sections,
-    hidden_rows,
-    object_counts,
-    records,
-    volume_rows,
-)
+from eidrive_reports.reproduction.perception_tables import StudyResult, records
 from eidrive_scenario.api.run import RunSettings
 
 SENDING = ("average", "covariance_intersection", "covariance_intersection, aligned", "early")
@@ -47,11 +37,11 @@ STUDY = Study(
 )
 
 
-def setup(measured: Sequence[PerceptionRecord], seeds: int, scenes: int) -> tuple[str, ...]:
+def setup(result: StudyResult, seeds: int) -> tuple[str, ...]:
     """Return the paragraphs about runs and arms."""
-    frames, objects, hit, hidden = object_counts(measured, STUDY)
+    frames, objects, hit, hidden = result.object_counts
     return (
-        f"{scenes} scenes of the library with {seeds} seeds each: scenario 3 (parked ego, one vehicle sends), 4 "
+        f"{len(SCENES)} scenes of the library with {seeds} seeds each: scenario 3 (parked ego, one vehicle sends), 4 "
         "(parked ego, three roadside units), 5 and 7 (ego turns at a crossing, a vehicle and one or two roadside "
         "units). All stations have the detector `lidar` (32 rings, 10,000 points per scan, range 100 m, "
         f"{SCAN_RATE:g} Hz) without a tracker. One frame is measured every {SAMPLE_INTERVAL:g} s from "
@@ -99,17 +89,17 @@ def protocol(study: Study) -> tuple[str, ...]:
     )
 
 
-def conclusions(arms: Sequence[Row], curves: Sequence[Row], volumes: Sequence[Row]) -> tuple[str, ...]:
+def conclusions(result: StudyResult) -> tuple[str, ...]:
     """Return the paragraphs about the measured values."""
-    by_arm = {row["arm"]: row for row in arms}
+    by_arm = {row["arm"]: row for row in result.arms}
     listed = [f"{name} {row['ap_30']:.3f}, {row['ap_50']:.3f} and {row['ap_70']:.3f}" for name, row in by_arm.items()]
     hidden = [f"{name} {number(row, 'hidden_50'):.0%}" for name, row in by_arm.items()]
     return (
         f"Without faults, AP at 0.3, 0.5 and 0.7: {'; '.join(listed)}.",
         f"Hidden objects that are found at 0.5: {', '.join(hidden)}.",
-        *(_limits(curves, axis) for axis in AXES if axis != POSE_AND_LATENCY),
-        _volume(volumes),
-        _sorting(arms),
+        *(_limits(result.curves, axis) for axis in AXES if axis != POSE_AND_LATENCY),
+        _volume(result.volumes),
+        _sorting(result.arms),
         *_departures(by_arm),
     )
 
@@ -195,17 +185,15 @@ def measured_cases(detectors: Sequence[str], study: Study) -> list[Case]:
 
 def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     """Return the report: protocol, results without faults, curves, hidden objects, volume, and shapes of the curves."""
-    measured = records(episodes)
-    curves, hidden = tuple(curve_rows(measured, STUDY)), tuple(hidden_rows(measured, STUDY))
-    arms, volumes = tuple(arm_rows(measured, STUDY)), tuple(volume_rows(measured, STUDY))
+    result = StudyResult(STUDY, records(episodes))
     sections = (
-        Section("Set-up", setup(measured, len({episode.seed for episode in episodes}), len(SCENES))),
+        Section("Set-up", setup(result, len({episode.seed for episode in episodes}))),
         Section("Protocol", protocol(STUDY)),
-        *result_sections(conclusions(arms, curves, volumes), arm_table(arms, STUDY)),
-        shape_section(STUDY, curves, volumes),
-        *curve_sections(curves, hidden, volumes, STUDY),
+        *result_sections(conclusions(result), result.arm_table()),
+        shape_section(result),
+        *result.curve_sections(),
         pose_errors.section(episodes),
-        *data_sections(curves, hidden, STUDY),
+        *result.data_sections(),
     )
     return PartReport(PART.title, sections)
 

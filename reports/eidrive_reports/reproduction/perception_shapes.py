@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from eidrive_reports.cooperative_perception.receivers import ARMS, AXES, POSE_AND_LATENCY, Study
 from eidrive_reports.reproduction.layout import DataTable, Row, Section, groups, number, plain, where
+from eidrive_reports.reproduction.perception_tables import StudyResult
 
 ALONE = "none"
 LATE, FILTERED = "average", "covariance_intersection"
@@ -38,10 +39,11 @@ FEATURE_NOTES = (
 SHAPE_COLUMNS = (plain("shape", "shape"), plain("holds", "holds"), plain("measured", "measured"))
 
 
-def shape_section(study: Study, curves: Sequence[Row], volumes: Sequence[Row]) -> Section:
+def shape_section(result: StudyResult) -> Section:
     """Return the section of the report about the shapes."""
+    study = result.study
     notes = (*SHAPE_NOTES, *(FEATURE_NOTES if "attention" in study.compared else ()))
-    table = DataTable(f"{study.name}_shapes", SHAPE_COLUMNS, shapes(study, curves, volumes))
+    table = DataTable(f"{study.name}_shapes", SHAPE_COLUMNS, shapes(study, result.curves, result.volumes))
     return Section("Shapes of the curves", notes, table)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -21,103 +23,11 @@ def records(episodes: Sequence[Episode]) -> list[PerceptionRecord]:
     return [episode.perception for episode in ordered if episode.perception is not None]
 
 
-def object_counts(measurements: Sequence[PerceptionRecord], study: Study) -> tuple[int, int, int, int]:
-    """Return the number of frames, of objects in the ranges of a study, of those that any lidar hits, and of those
-    hidden to the ego."""
-    reach = study.reach
-    counts = [
-        (record.frames, sum(record.objects[:reach]), sum(record.hit[:reach]), sum(record.hidden[:reach]))
-        for record in measurements
-    ]
-    frames, objects, hit, hidden = (sum(values) for values in zip(*counts, strict=True))
-    return frames, objects, hit, hidden
-
-
-def pool(measurements: Sequence[PerceptionRecord], study: Study, condition: Condition) -> Pool:
-    """Return the detections of a condition in the ranges of a study."""
-    return Pool(measurements, condition.name, study.reach)
-
-
 def range_name(range_class: int | None) -> str:
     """Return the name of a range class, such as `30 to 50 m`."""
     if range_class is None:
         return ALL_RANGES
     return f"{RANGES[range_class - 1] if range_class else 0.0:g} to {RANGES[range_class]:g} m"
-
-
-def curve_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
-    """Yield the average precision of each arm over each axis, by range and overlap."""
-    classes: tuple[int | None, ...] = (None, *range(study.reach))
-    for arm, axis in product(study.compared, study.axes):
-        for value in AXES[axis][2]:
-            pooled = pool(measurements, study, on_axis(arm, axis, value))
-            for range_class, (index, overlap) in product(classes, enumerate(OVERLAPS)):
-                precision = pooled.precision(index, range_class)
-                yield {
-                    "arm": arm,
-                    "axis": axis,
-                    "value": value,
-                    "range": range_name(range_class),
-                    "iou": overlap,
-                    "ap": finite(precision.value),
-                    **bounds(precision),
-                    "ap_local_sort": finite(precision.local),
-                    "objects": precision.objects,
-                }
-
-
-def hidden_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
-    """Yield the recall of objects that are hidden to the ego and that the lidar of another station hits."""
-    for arm, axis in product(study.compared, study.axes):
-        for value in AXES[axis][2]:
-            pooled = pool(measurements, study, on_axis(arm, axis, value))
-            for index, overlap in enumerate(OVERLAPS):
-                recall = pooled.hidden_recall(index)
-                yield {
-                    "arm": arm,
-                    "axis": axis,
-                    "value": value,
-                    "iou": overlap,
-                    "detected": recall.detected,
-                    "hidden": recall.objects,
-                    "recall": finite(recall.value),
-                    **bounds(recall),
-                }
-
-
-def arm_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
-    """Yield the results of each arm without faults, with both ways of sorting and both truths."""
-    for arm in study.arms:
-        pooled = pool(measurements, study, Condition(arm))
-        precisions = [pooled.precision(index) for index in range(len(OVERLAPS))]
-        fields: dict[str, Any] = {"arm": arm}
-        for overlap, precision in zip(OVERLAPS, precisions, strict=True):
-            values = {"ap": precision.value, **bounds(precision)}
-            fields |= {f"{name}_{_key(overlap)}": value for name, value in values.items()}
-        for range_class in range(study.reach):
-            fields[f"ap_50_range_{range_class}"] = finite(pooled.precision(1, range_class).value)
-        fields["ap_50_local_sort"] = precisions[1].local
-        fields["ap_50_hit"] = finite(pooled.precision_of_hit_objects().value)
-        fields["hidden_50"] = finite(pooled.hidden_recall(1).value)
-        yield fields
-
-
-def volume_rows(measurements: Sequence[PerceptionRecord], study: Study) -> Iterator[Row]:
-    """Yield the average precision beside the size of the messages, for the ego alone and for each way of sending.
-
-    share  of the cells of a map of features
-    """
-    for condition in (Condition(study.arms[0]), *study.volumes):
-        pooled, arm = pool(measurements, study, condition), ARMS[condition.arm]
-        fields: dict[str, Any] = {
-            "arm": condition.arm,
-            "messages_per_second": SCAN_RATE / condition.every if arm.cooperates else None,
-            "cell": condition.cell if arm.shares == "points" else None,
-            "share": arm.settings.get("share"),
-            "encoding": arm.settings.get("encoding"),
-            "megabytes_per_second": pooled.megabytes_per_second,
-        }
-        yield fields | {f"ap_{_key(overlap)}": pooled.precision(index).value for index, overlap in enumerate(OVERLAPS)}
 
 
 def _key(overlap: float) -> int:
@@ -130,6 +40,7 @@ def _precision(overlap: float) -> Column:
     return Column(f"AP {overlap:g} (95 %)", f"{{ap_{key}:.3f}} ({{low_{key}:.2f}} to {{high_{key}:.2f}})")
 
 
+AXIS_COLUMNS = (plain("axis", "axis"), plain("value", "value", "g"))
 VOLUME_COLUMNS = (
     plain("arm", "arm"),
     plain("messages per second", "messages_per_second", "g"),
@@ -141,82 +52,161 @@ VOLUME_COLUMNS = (
 )
 
 
-def arm_table(rows: Sequence[Row], study: Study) -> DataTable:
-    """Return the table of the arms without faults."""
-    columns = (
-        plain("arm", "arm"),
-        *(_precision(overlap) for overlap in OVERLAPS),
-        *(plain(f"AP 0.5, {range_name(number)}", f"ap_50_range_{number}", ".3f") for number in range(study.reach)),
-        plain("AP 0.5, local sort", "ap_50_local_sort", ".3f"),
-        plain("AP 0.5, hit objects", "ap_50_hit", ".3f"),
-        plain("recall of hidden objects, 0.5", "hidden_50", ".3f"),
-    )
-    return DataTable(f"{study.name}_arms", columns, tuple(rows))
+@dataclass(frozen=True)
+class StudyResult:
+    """Measurements of a study by scene and seed, with the rows of its tables."""
 
+    study: Study
+    measured: Sequence[PerceptionRecord]
 
-def volume_table(rows: Sequence[Row], study: Study) -> DataTable:
-    """Return the table of precision and volume, with the columns that differ between its rows."""
-    columns = [
-        column
-        for column in VOLUME_COLUMNS
-        for field in column.fields
-        if field in ("arm", "megabytes_per_second") or len({row[field] for row in rows} - {None}) > 1
-    ]
-    return DataTable(f"{study.name}_volume", tuple(columns), tuple(rows))
+    @property
+    def object_counts(self) -> tuple[int, int, int, int]:
+        """Number of frames, of objects in the ranges of the study, of those that any lidar hits, and of those hidden
+        to the ego."""
+        reach = self.study.reach
+        counts = [
+            (record.frames, sum(record.objects[:reach]), sum(record.hit[:reach]), sum(record.hidden[:reach]))
+            for record in self.measured
+        ]
+        frames, objects, hit, hidden = (sum(values) for values in zip(*counts, strict=True))
+        return frames, objects, hit, hidden
 
+    def _pool(self, condition: Condition) -> Pool:
+        """Return the detections of a condition in the ranges of the study."""
+        return Pool(self.measured, condition.name, self.study.reach)
 
-AXIS_COLUMNS = (plain("axis", "axis"), plain("value", "value", "g"))
+    def _pools_on_axes(self) -> Iterator[tuple[Row, Pool]]:
+        for arm, axis in product(self.study.compared, self.study.axes):
+            for value in AXES[axis][2]:
+                yield {"arm": arm, "axis": axis, "value": value}, self._pool(on_axis(arm, axis, value))
 
+    @cached_property
+    def curves(self) -> tuple[Row, ...]:
+        """Average precision of each arm over each axis, by range and overlap."""
+        return tuple(
+            {
+                **key,
+                "range": range_name(range_class),
+                "iou": overlap,
+                "ap": finite(precision.value),
+                **bounds(precision),
+                "ap_local_sort": finite(precision.local),
+                "objects": precision.objects,
+            }
+            for key, pool in self._pools_on_axes()
+            for range_class, (index, overlap) in product((None, *range(self.study.reach)), enumerate(OVERLAPS))
+            for precision in (pool.precision(index, range_class),)
+        )
 
-def curve_table(rows: Sequence[Row], study: Study) -> DataTable:
-    """Return the table of all ranges with one column per arm and overlap."""
-    lines = [
-        {"axis": axis, "value": value, **{f"{row['arm']}_{_key(row['iou'])}": row["ap"] for row in mine}}
-        for (axis, value), mine in groups(where(rows, range=ALL_RANGES), "axis", "value").items()
-    ]
-    columns = (
-        *AXIS_COLUMNS,
-        *(
-            plain(f"{arm}, AP {overlap:g}", f"{arm}_{_key(overlap)}", ".3f")
-            for overlap in OVERLAPS[1:]
-            for arm in study.compared
-        ),
-    )
-    return DataTable(f"{study.name}_curves", columns, tuple(lines))
+    @cached_property
+    def hidden(self) -> tuple[Row, ...]:
+        """Recall of objects that are hidden to the ego and that the lidar of another station hits."""
+        return tuple(
+            {
+                **key,
+                "iou": overlap,
+                "detected": recall.detected,
+                "hidden": recall.objects,
+                "recall": finite(recall.value),
+                **bounds(recall),
+            }
+            for key, pool in self._pools_on_axes()
+            for index, overlap in enumerate(OVERLAPS)
+            for recall in (pool.hidden_recall(index),)
+        )
 
+    @cached_property
+    def arms(self) -> tuple[Row, ...]:
+        """Results of each arm without faults, with both ways of sorting and both truths."""
+        rows = []
+        for arm in self.study.arms:
+            pool = self._pool(Condition(arm))
+            precisions = [pool.precision(index) for index in range(len(OVERLAPS))]
+            fields: dict[str, Any] = {"arm": arm}
+            for overlap, precision in zip(OVERLAPS, precisions, strict=True):
+                values = {"ap": precision.value, **bounds(precision)}
+                fields |= {f"{name}_{_key(overlap)}": value for name, value in values.items()}
+            for range_class in range(self.study.reach):
+                fields[f"ap_50_range_{range_class}"] = finite(pool.precision(1, range_class).value)
+            fields["ap_50_local_sort"] = precisions[1].local
+            fields["ap_50_hit"] = finite(pool.precision_of_hit_objects().value)
+            fields["hidden_50"] = finite(pool.hidden_recall(1).value)
+            rows.append(fields)
+        return tuple(rows)
 
-def hidden_table(rows: Sequence[Row], study: Study) -> DataTable:
-    """Return the table of the recall at the overlap 0.5 with one column per arm."""
-    lines = [
-        {"axis": axis, "value": value, **{row["arm"]: row["recall"] for row in mine}, "hidden": mine[0]["hidden"]}
-        for (axis, value), mine in groups(where(rows, iou=OVERLAPS[1]), "axis", "value").items()
-    ]
-    columns = (*AXIS_COLUMNS, *(plain(arm, arm, ".3f") for arm in study.compared), plain("objects", "hidden"))
-    return DataTable(f"{study.name}_hidden_curves", columns, tuple(lines))
+    @cached_property
+    def volumes(self) -> tuple[Row, ...]:
+        """Average precision beside the size of the messages, for the ego alone and for each way of sending.
 
+        share  of the cells of a map of features
+        """
+        rows = []
+        for condition in (Condition(self.study.arms[0]), *self.study.volumes):
+            pool, arm = self._pool(condition), ARMS[condition.arm]
+            fields = {
+                "arm": condition.arm,
+                "messages_per_second": SCAN_RATE / condition.every if arm.cooperates else None,
+                "cell": condition.cell if arm.shares == "points" else None,
+                "share": arm.settings.get("share"),
+                "encoding": arm.settings.get("encoding"),
+                "megabytes_per_second": pool.megabytes_per_second,
+            }
+            precisions = {f"ap_{_key(overlap)}": pool.precision(index).value for index, overlap in enumerate(OVERLAPS)}
+            rows.append({**fields, **precisions})
+        return tuple(rows)
 
-def curve_sections(
-    curves: Sequence[Row], hidden: Sequence[Row], volumes: Sequence[Row], study: Study
-) -> tuple[Section, ...]:
-    """Return the sections with the tables of curves, hidden objects and volume."""
-    return (
-        Section("Curves", ("Average precision over all ranges.",), curve_table(curves, study)),
-        Section("Objects hidden to the ego", ("Recall at the overlap 0.5.",), hidden_table(hidden, study)),
-        Section("Precision and volume", (), volume_table(volumes, study)),
-    )
+    def arm_table(self) -> DataTable:
+        """Return the table of the arms without faults."""
+        reach = range(self.study.reach)
+        columns = (
+            plain("arm", "arm"),
+            *(_precision(overlap) for overlap in OVERLAPS),
+            *(plain(f"AP 0.5, {range_name(number)}", f"ap_50_range_{number}", ".3f") for number in reach),
+            plain("AP 0.5, local sort", "ap_50_local_sort", ".3f"),
+            plain("AP 0.5, hit objects", "ap_50_hit", ".3f"),
+            plain("recall of hidden objects, 0.5", "hidden_50", ".3f"),
+        )
+        return DataTable(f"{self.study.name}_arms", columns, self.arms)
 
+    def curve_sections(self) -> tuple[Section, ...]:
+        """Return the sections with the tables of curves, hidden objects and volume."""
+        name, arms = self.study.name, self.study.compared
+        curves = [
+            {"axis": axis, "value": value, **{f"{row['arm']}_{_key(row['iou'])}": row["ap"] for row in mine}}
+            for (axis, value), mine in groups(where(self.curves, range=ALL_RANGES), "axis", "value").items()
+        ]
+        precisions = (
+            plain(f"{arm}, AP {overlap:g}", f"{arm}_{_key(overlap)}", ".3f") for overlap in OVERLAPS[1:] for arm in arms
+        )
+        hidden = [
+            {"axis": axis, "value": value, **{row["arm"]: row["recall"] for row in mine}, "hidden": mine[0]["hidden"]}
+            for (axis, value), mine in groups(where(self.hidden, iou=OVERLAPS[1]), "axis", "value").items()
+        ]
+        recalls = (*(plain(arm, arm, ".3f") for arm in arms), plain("objects", "hidden"))
+        # Volumes have the columns that differ between their rows
+        volumes = [
+            column
+            for column in VOLUME_COLUMNS
+            for field in column.fields
+            if field in ("arm", "megabytes_per_second") or len({row[field] for row in self.volumes} - {None}) > 1
+        ]
+        tables = (
+            DataTable(f"{name}_curves", (*AXIS_COLUMNS, *precisions), tuple(curves)),
+            DataTable(f"{name}_hidden_curves", (*AXIS_COLUMNS, *recalls), tuple(hidden)),
+            DataTable(f"{name}_volume", tuple(volumes), self.volumes),
+        )
+        return (
+            Section("Curves", ("Average precision over all ranges.",), tables[0]),
+            Section("Objects hidden to the ego", ("Recall at the overlap 0.5.",), tables[1]),
+            Section("Precision and volume", (), tables[2]),
+        )
 
-def data_sections(curves: Sequence[Row], hidden: Sequence[Row], study: Study) -> tuple[Section, ...]:
-    """Return the sections that name the files with all rows of curves and hidden objects."""
-    return (
-        Section(
-            "Data",
-            (f"By arm, axis, value, range and overlap, with interval and local sort: {study.name}.csv.",),
-            DataTable(study.name, (), tuple(curves)),
-        ),
-        Section(
-            "Data on hidden objects",
-            (f"Recall by arm, axis, value and overlap, with intervals: {study.name}_hidden.csv.",),
-            DataTable(f"{study.name}_hidden", (), tuple(hidden)),
-        ),
-    )
+    def data_sections(self) -> tuple[Section, ...]:
+        """Return the sections that name the files with all rows of curves and hidden objects."""
+        name = self.study.name
+        curves = f"By arm, axis, value, range and overlap, with interval and local sort: {name}.csv."
+        hidden = f"Recall by arm, axis, value and overlap, with intervals: {name}_hidden.csv."
+        return (
+            Section("Data", (curves,), DataTable(name, (), self.curves)),
+            Section("Data on hidden objects", (hidden,), DataTable(f"{name}_hidden", (), self.hidden)),
+        )
