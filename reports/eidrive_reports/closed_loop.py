@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from operator import attrgetter
@@ -18,7 +19,7 @@ from pathlib import Path
 from rich.console import Console
 
 from eidrive_reports.paper import EGO, HIDDEN, SCENARIOS
-from eidrive_reports.tables import grouped, markdown_table, publish, study_options
+from eidrive_reports.studies import command, grouped, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, resolve_scenario, run_jobs, wilson
 from eidrive_scenario.api.run import RunSettings, run_file
 
@@ -83,6 +84,7 @@ def table(runs: Sequence[ClosedLoopRun]) -> str:
     return markdown_table((*titles, "brakings without cause"), lines)
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("reports"))
@@ -107,4 +109,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

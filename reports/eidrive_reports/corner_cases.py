@@ -8,6 +8,7 @@ The output is corner_cases.md, the table of docs/corner_cases.md.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -17,7 +18,7 @@ from rich.console import Console
 from eidrive_reports.driven_runs import CONTACT
 from eidrive_reports.paper import EGO
 from eidrive_reports.planner_scenes import SceneRun, run_of
-from eidrive_reports.tables import grouped, markdown_table, publish, study_options
+from eidrive_reports.studies import command, grouped, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings
 
@@ -90,6 +91,7 @@ def _mean(values: Sequence[float]) -> str:
     return f"{sum(values) / len(values):.1f}".replace("-0.0", "0.0") if values else "-"
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     choices = [*ARMS, []]  # argparse compares an empty list of names with the choices, too
@@ -103,4 +105,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -33,9 +33,9 @@ from eidrive_reports.paper import (
     tabulate,
 )
 from eidrive_reports.street_view import driver_view, helper_view, street_image
-from eidrive_reports.tables import positive
+from eidrive_reports.studies import command, positive
 from eidrive_scenario.api.actions import is_agent_controller
-from eidrive_scenario.api.common import Array, EidriveError, InputError, RoadNetwork, Scenario, write_atomically
+from eidrive_scenario.api.common import Array, RoadNetwork, Scenario, write_atomically
 from eidrive_scenario.api.driving import agent_settings
 from eidrive_scenario.api.experiments import Job, as_json_text, jobs_of, resolve_scenario, run_jobs
 from eidrive_scenario.api.pages import road_drawing, run_of_result, write_replays
@@ -129,8 +129,8 @@ def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console)
     return links, own
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line. Exit codes: 0 completed, 2 invalid input, 3 aborted."""
+@command
+def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m eidrive_reports.demo", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("reports/demo.html"), help="file of the page")
     parser.add_argument("--seeds", type=positive, default=20, help="runs of each arm, with seeds from 1")
@@ -140,12 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--out: not a path of a file (got {given.out}; expected, for example, reports/demo.html)")
     if given.out.suffix == ".json":
         parser.error(f"--out: the page would be overwritten by its numbers (got {given.out}; expected a .html file)")
-    try:
-        demo(given.out, range(1, given.seeds + 1), given.workers, Console())
-    except EidriveError as error:
-        Console(stderr=True).print(Text(str(error), style="red"))
-        return 2 if isinstance(error, InputError) else 3
-    return 0
+    demo(given.out, range(1, given.seeds + 1), given.workers, Console())
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from rich.console import Console
 
 from eidrive_reports.driven_files import table, worse_runs
 from eidrive_reports.driven_runs import DEFAULT, STACK, DrivenRun, jobs_of_file, run_recorded
-from eidrive_reports.tables import markdown_table, positive, study_options
+from eidrive_reports.studies import markdown_table, positive, study_options
 from eidrive_scenario.api.common import SettingError, write_atomically
 
 CORPORA, MAPS = "EIDRIVE_CORPORA", "EIDRIVE_MAPS"

@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 
 from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, jobs_of_file, run_recorded
-from eidrive_reports.tables import grouped, markdown_table, positive, publish, study_options
+from eidrive_reports.studies import grouped, markdown_table, positive, publish, study_options
 from eidrive_scenario.api.actions import is_agent_controller
 from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted, registry, suggestion
 from eidrive_scenario.api.experiments import definition

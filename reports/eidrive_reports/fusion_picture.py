@@ -25,7 +25,8 @@ from eidrive_reports.cooperative_perception.scores import Truth
 from eidrive_reports.cooperative_perception.trial import Measurement, run_trial
 from eidrive_reports.paper import EGO
 from eidrive_reports.reproduction.learned import STUDY
-from eidrive_scenario.api.common import Array, Floats, InputError, Integers, footprint
+from eidrive_reports.studies import command
+from eidrive_scenario.api.common import Array, Floats, Integers, footprint
 from eidrive_scenario.api.driving import Detections
 from eidrive_scenario.api.pages import ImageCanvas, RoadDrawing, Window, road_drawing, write_figure
 from eidrive_scenario.api.perception import FeatureMap
@@ -85,16 +86,11 @@ class Panel(ImageCanvas):
     def cells(self, reception: Reception, colors: Mapping[str, str]) -> None:
         """Draw the cells that were sent: those that have arrived in the color of their sender, above the others."""
         arrived = {(held.message.sender, held.message.number) for held in reception.arrived}
-        lost: list[tuple[FeatureFrame, str]] = []
-        received: list[tuple[FeatureFrame, str]] = []
-        for message in reception.sent:
-            if message.features is not None:
-                is_arrived = (message.sender, message.number) in arrived
-                drawn, color = (received, colors[message.sender]) if is_arrived else (lost, LOST)
-                drawn.append((message.features, color))
-        for frame, color in lost + received:
-            for cell in cell_corners(frame.indices, frame, frame.shape):
-                self.fill(cell, color)
+        for message in sorted(reception.sent, key=lambda message: (message.sender, message.number) in arrived):
+            if (frame := message.features) is not None:
+                color = colors[message.sender] if (message.sender, message.number) in arrived else LOST
+                for cell in cell_corners(frame.indices, frame, frame.shape):
+                    self.fill(cell, color)
 
     def outlines(self, boxes: Array, color: str, width: float) -> None:
         """Draw outlines of boxes (N, 7) with a width [m]."""
@@ -162,20 +158,16 @@ def fusion_figure(measurement: Measurement, arms: Mapping[str, Condition]) -> Fi
     return figure
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the scenario and draw the picture. Return 0, or 2 if a file cannot be written."""
+@command
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the scenario and draw the picture."""
     parser = argparse.ArgumentParser(description="Draw features, transmitted cells and fused objects of one run.")
     parser.add_argument("--out", type=Path, default=Path("docs/figures/feature_fusion.png"))
     options = parser.parse_args(arguments)
     settings = RunSettings(detector="pillars", time_limit=TIME)
-    try:
-        _, measurement = run_trial(SCENARIO, SEED, settings, EGO, tuple(ARMS.values()))
-        write_figure(fusion_figure(measurement, ARMS), options.out, 100)
-    except InputError as error:
-        typer.echo(str(error), err=True)
-        return 2
+    _, measurement = run_trial(SCENARIO, SEED, settings, EGO, tuple(ARMS.values()))
+    write_figure(fusion_figure(measurement, ARMS), options.out, 100)
     typer.echo(f"wrote {options.out}")
-    return 0
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from eidrive_reports.tables import study_options
-from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted
+from eidrive_reports.studies import command, study_options
+from eidrive_scenario.api.common import Diagnostic, SettingError, quoted
 from eidrive_scenario.api.experiments import Job, from_library, run_jobs
 from eidrive_scenario.api.pages import heat_cells, write_figure
 from eidrive_scenario.api.run import ConcreteRun, RunSettings, load_distribution, run_file
@@ -149,8 +149,9 @@ def _draw(axes: Axes, cells: Sequence[GridCell], scale: Normalize) -> None:
     heat_cells(axes, xs, ys, speeds, colors=COLLISION, scale=scale)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the distributions and draw their heat maps into a folder. Return 0, or 2 if an input is invalid."""
+@command
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the distributions and draw their heat maps into a folder."""
     parser = argparse.ArgumentParser(description="Draw outcomes over two parameters, by cooperation and latency.")
     parser.add_argument("distributions", nargs="*", default=DISTRIBUTIONS, help="files, or names in the library")
     parser.add_argument("--out", type=Path, default=Path("reports/heat_maps"))
@@ -162,23 +163,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--param: not NAME=VALUE (got {invalid[0]!r})")
     parameters = dict(text.split("=", 1) for text in options.param)
     for name in options.distributions:
-        try:
-            grid = run_outcome_grid(
-                from_library(name),
-                parameters=parameters,
-                seed=options.seed,
-                workers=options.workers,
-                console=Console(stderr=True),
-            )
-            path = options.out / f"{grid.name}.png"
-            figure = heat_map(grid)
-            for suffix in (".png", ".pdf"):
-                write_figure(figure, path.with_suffix(suffix), 130)
-        except InputError as error:
-            typer.echo(str(error), err=True)
-            return 2
+        grid = run_outcome_grid(
+            from_library(name),
+            parameters=parameters,
+            seed=options.seed,
+            workers=options.workers,
+            console=Console(stderr=True),
+        )
+        path = options.out / f"{grid.name}.png"
+        figure = heat_map(grid)
+        for suffix in (".png", ".pdf"):
+            write_figure(figure, path.with_suffix(suffix), 130)
         typer.echo(f"wrote {path}")
-    return 0
 
 
 if __name__ == "__main__":

@@ -17,7 +17,8 @@ import numpy as np
 import typer
 
 from eidrive_reports.paper import EGO
-from eidrive_scenario.api.common import InputError, write_atomically
+from eidrive_reports.studies import command
+from eidrive_scenario.api.common import write_atomically
 from eidrive_scenario.api.experiments import LibraryScenario, describe_scenarios
 from eidrive_scenario.api.pages import Image, ImageCanvas, RoadDrawing, Window, house_outline, road_drawing
 from eidrive_scenario.api.run import Simulation, buildings
@@ -139,8 +140,9 @@ def library_page(scenarios: Sequence[LibraryScenario]) -> str:
     return "\n".join(lines)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the pictures and the page. Return 0, or 2 if an input is invalid or a file cannot be written."""
+@command
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the pictures and the page."""
     parser = argparse.ArgumentParser(description="Draw the scenarios of the library, and write their page.")
     parser.add_argument("names", nargs="*", help="scenarios to draw, such as coop/scenario_1 (default: all)")
     parser.add_argument("--root", type=Path, default=Path(), help="folder of the checkout")
@@ -149,21 +151,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     unknown = set(options.names) - {scenario.name for scenario in scenarios}
     if unknown:
         parser.error(f"no scenario {min(unknown)!r} in the library")
-    try:
-        for scenario in scenarios:
-            if options.names and scenario.name not in options.names:
-                continue
-            path = options.root / FOLDER / file_name(scenario)
-            _, encoded = cv2.imencode(".png", picture(scenario.name), [cv2.IMWRITE_PNG_COMPRESSION, 9])
-            with write_atomically(path) as stream:
-                stream.write(encoded.tobytes())
-            typer.echo(f"wrote {path}")
-        with write_atomically(options.root / PAGE) as stream:
-            stream.write(library_page(scenarios).encode())
-    except (InputError, OSError) as error:
-        typer.echo(str(error), err=True)
-        return 2
-    return 0
+    for scenario in scenarios:
+        if options.names and scenario.name not in options.names:
+            continue
+        path = options.root / FOLDER / file_name(scenario)
+        _, encoded = cv2.imencode(".png", picture(scenario.name), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        with write_atomically(path) as stream:
+            stream.write(encoded.tobytes())
+        typer.echo(f"wrote {path}")
+    with write_atomically(options.root / PAGE) as stream:
+        stream.write(library_page(scenarios).encode())
 
 
 if __name__ == "__main__":

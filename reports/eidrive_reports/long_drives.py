@@ -21,7 +21,7 @@ from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, Stop, observed_run
 from eidrive_reports.paper import EGO
-from eidrive_reports.tables import markdown_table, publish, study_options
+from eidrive_reports.studies import markdown_table, publish, study_options
 from eidrive_scenario.api.common import (
     Diagnostic,
     EidriveError,

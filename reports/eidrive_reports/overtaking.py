@@ -10,6 +10,7 @@ sensors; they are repeated with other detectors. The output is overtaking.md and
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
@@ -22,7 +23,7 @@ from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, HARD, STANDING, DrivenMotion
 from eidrive_reports.paper import EGO
-from eidrive_reports.tables import grouped, markdown_table, publish, study_options
+from eidrive_reports.studies import command, grouped, markdown_table, publish, study_options
 from eidrive_scenario.api.common import generator, write_atomically
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings, Simulation
@@ -346,6 +347,7 @@ def draw(runs: Sequence[OvertakingRun], path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("reports"))
@@ -383,4 +385,4 @@ def _settings(detector: str) -> RunSettings:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

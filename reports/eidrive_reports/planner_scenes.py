@@ -8,6 +8,7 @@ The output is planner_scenes.md, the table of docs/planners.md.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, WINDOW
 from eidrive_reports.paper import EGO
-from eidrive_reports.tables import markdown_table, publish, study_options
+from eidrive_reports.studies import command, markdown_table, publish, study_options
 from eidrive_scenario.api.common import Array
 from eidrive_scenario.api.experiments import Job, describe_scenarios, jobs_of, resolve_scenario, run_jobs
 from eidrive_scenario.api.run import RunResult, RunSettings, Simulation
@@ -109,6 +110,7 @@ def scenes() -> list[str]:
     return [entry.name for entry in describe_scenarios() if entry.name.split("/")[0] in FAMILIES]
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("reports"))
@@ -123,4 +125,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -19,7 +19,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.special import ndtr
 
-from eidrive_scenario.api.common import ActorSpec, Array, InputError, Placement, iou_bev, write_atomically
+from eidrive_reports.studies import command
+from eidrive_scenario.api.common import ActorSpec, Array, Placement, iou_bev, write_atomically
 from eidrive_scenario.api.driving import Detections, line_of_sight_states
 from eidrive_scenario.api.experiments import average_precision, match_by_share
 from eidrive_scenario.api.fusion import AverageFusion, CovarianceIntersectionFusion, FusionMethod, Report
@@ -272,21 +273,17 @@ FIGURES = {
 }
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw all figures into a folder. Return 0, or 2 if the folder cannot be written."""
+@command
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Draw all figures into a folder."""
     parser = argparse.ArgumentParser(description="Draw known trends, measured and expected.")
     parser.add_argument("--out", type=Path, default=Path("reports/trends"))
     folder: Path = parser.parse_args(arguments).out
     for name, figure in FIGURES.items():
         path = folder / f"{name}.png"
-        try:
-            with write_atomically(path) as stream:
-                figure().savefig(stream, format="png", dpi=130)
-        except InputError as error:
-            typer.echo(str(error), err=True)
-            return 2
+        with write_atomically(path) as stream:
+            figure().savefig(stream, format="png", dpi=130)
         typer.echo(f"wrote {path}")
-    return 0
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from operator import itemgetter
 from string import Formatter
 from typing import Any
 
-from eidrive_reports.tables import grouped, markdown_table
+from eidrive_reports.studies import grouped, markdown_table
 
 Row = Mapping[str, Any]
 """Texts, numbers, booleans and None by the name of their field."""

@@ -10,7 +10,7 @@ from eidrive_reports.cooperative_perception.receivers import Condition
 from eidrive_reports.reproduction.episodes import Episode, EpisodeJob
 from eidrive_reports.reproduction.layout import PartReport
 from eidrive_reports.reproduction.provenance import job_digest
-from eidrive_reports.tables import grouped
+from eidrive_reports.studies import grouped
 from eidrive_scenario.api.run import RunSettings
 
 

@@ -1,4 +1,4 @@
-"""Tables and options of the studies."""
+"""Tables, options and errors of the studies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import importlib
 from pathlib import Path
 
 import pytest
-from eidrive_reports.tables import markdown_table, publish
+from eidrive_reports.studies import markdown_table, publish
 
 STUDIES = ("closed_loop", "corner_cases", "demo", "driven_corpora", "heat_maps", "overtaking", "planner_scenes")
 
@@ -33,3 +33,14 @@ def test_number_of_processes_of_each_study_is_positive(
     assert ended.value.code == 2
     assert "argument --workers: not a positive number (got 0)" in capsys.readouterr().err
     assert not any(tmp_path.iterdir()), "an invalid call writes nothing"
+
+
+@pytest.mark.parametrize("study", ["closed_loop", "corner_cases", "overtaking", "planner_scenes"])
+def test_error_of_an_output_is_a_message_and_exit_code_2(
+    study: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The name of the table is that of a folder."""
+    (tmp_path / f"{study}.md").mkdir()
+    none = ["--seeds", "0", *(["--drives", "0"] if study == "overtaking" else [])]
+    assert importlib.import_module(f"eidrive_reports.{study}").main(["--out", str(tmp_path), *none]) == 2
+    assert f"{study}.md: cannot write" in capsys.readouterr().err

@@ -1,14 +1,15 @@
-"""Tables of the studies as Markdown, and the options that all studies have."""
+"""Tables of the studies as Markdown, and what their commands have in common."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
-from eidrive_scenario.api.common import write_atomically
+from eidrive_scenario.api.common import EidriveError, InputError, write_atomically
 
 T = TypeVar("T")
 
@@ -39,6 +40,21 @@ def positive(text: str) -> int:
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"not a positive number (got {text})")
     return int(text)
+
+
+def command(main: Callable[[Sequence[str] | None], None]) -> Callable[[Sequence[str] | None], int]:
+    """Return a command that prints errors. Exit codes: 0 completed, 2 invalid input, 3 aborted."""
+
+    @wraps(main)
+    def run(arguments: Sequence[str] | None = None) -> int:
+        try:
+            main(arguments)
+        except EidriveError as error:
+            sys.stderr.write(f"{error}\n")
+            return 2 if isinstance(error, InputError) else 3
+        return 0
+
+    return run
 
 
 def study_options(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> argparse.Namespace:
