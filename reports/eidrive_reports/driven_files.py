@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, case_of, jobs_of_file, run_recorded
 from eidrive_reports.studies import grouped, markdown_table, positive, publish, study_options
 from eidrive_scenario.api.actions import is_agent_controller
 from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted, registry, suggestion
@@ -72,8 +72,8 @@ def table(runs: Iterable[DrivenRun], *, has_reference: bool) -> str:
 def worse_runs(runs: Iterable[DrivenRun]) -> list[DrivenRun]:
     """Return the runs of the stack with a contact by own fault in which the reference driver has none."""
     runs = tuple(runs)
-    avoided = {run.case for run in runs if run.arm == REFERENCE and not run.collided and not run.error}
-    return [run for run in runs if run.arm == STACK and run.at_fault and run.case in avoided]
+    avoided = {case_of(run) for run in runs if run.arm == REFERENCE and not run.collided and not run.error}
+    return [run for run in runs if run.arm == STACK and run.at_fault and case_of(run) in avoided]
 
 
 def wrong_reference(files: Iterable[Path], name: str, model: str) -> Diagnostic | None:

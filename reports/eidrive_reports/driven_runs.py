@@ -7,13 +7,17 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 
+import msgspec
 import numpy as np
+from msgspec.structs import replace
 from rich.console import Console
 
-from eidrive_scenario.api.common import Array, ConstraintError, Diagnostic, EidriveError, InputError, SettingError
+from eidrive_reports.run_record import RunRecord
+from eidrive_scenario.api.common import Array, ConstraintError, EidriveError, InputError
 from eidrive_scenario.api.criteria import Criterion, Frame
 from eidrive_scenario.api.experiments import Job, definition, run_jobs
 from eidrive_scenario.api.run import (
@@ -171,8 +175,8 @@ def observed_run(
     return result, motion
 
 
-Case = tuple[str, str, int, int, str]
-"""Group, file, number of the run in its distribution, seed and planner."""
+case_of = attrgetter("group", "file", "number", "seed", "planner")
+"""Function that returns the identity of a run, or of its job, except for its arm."""
 STACK, REFERENCE = "stack", "reference"
 DEFAULT = "behavior"
 """Planner of the stack if none is given."""
@@ -194,14 +198,8 @@ class DrivenJob(Job):
     group: str = ""
     planner: str = DEFAULT
 
-    @property
-    def case(self) -> Case:
-        """Identity of the run except for its arm."""
-        return self.group, self.file, self.number, self.seed, self.planner
 
-
-@dataclass(frozen=True)
-class DrivenRun:
+class DrivenRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Outcome of one run of an arm: `stack` or `reference`.
 
     file, number  file, and number of the run in its distribution
@@ -219,7 +217,7 @@ class DrivenRun:
     number: int
     arm: str
     seed: int
-    parameters: dict[str, str] = field(default_factory=dict)
+    parameters: dict[str, str] = {}
     collided: bool = False
     at_fault: bool = False
     failed: tuple[str, ...] = ()
@@ -233,11 +231,6 @@ class DrivenRun:
     excluded: bool = False
     group: str = ""
     planner: str = DEFAULT
-
-    @property
-    def case(self) -> Case:
-        """Identity of the run except for its arm."""
-        return self.group, self.file, self.number, self.seed, self.planner
 
 
 def jobs_of_file(
@@ -313,25 +306,15 @@ def run_of(job: DrivenJob) -> DrivenRun:
     )
 
 
-def read_record(record: Path) -> list[DrivenRun]:
-    """Return the runs of a record; none if it does not exist.
+class DrivenRecord(RunRecord[DrivenRun]):
+    """Record of driven runs."""
 
-    An incomplete last line, as a killed process leaves it, is none. Raise SettingError if any other line is invalid.
-    """
-    runs = []
-    for number, line in enumerate(_complete_lines(record).splitlines(), 1):
-        try:
-            row = json.loads(line)
-            runs.append(DrivenRun(**{**row, **{key: tuple(row[key]) for key in ("failed", "unstarted")}}))
-        except (ValueError, TypeError, KeyError) as error:
-            hint = "remove the line, or start again without --resume"
-            raise SettingError(Diagnostic(f"the record is damaged: {error}", hint, str(record), number)) from error
-    return runs
+    kind = DrivenRun
+    key = attrgetter("group", "file", "number", "seed", "planner", "arm")
+    hint = "remove the line, or start again without --resume"
 
-
-def _complete_lines(record: Path) -> bytes:
-    content = record.read_bytes() if record.is_file() else b""
-    return content[: content.rfind(b"\n") + 1]
+    def encode(self, run: DrivenRun) -> bytes:
+        return json.dumps(msgspec.to_builtins(run), ensure_ascii=False).encode()
 
 
 def run_recorded(
@@ -341,32 +324,15 @@ def run_recorded(
 
     Runs of the record are not repeated; new ones are added to it. Raise SettingError if the record is damaged.
     """
-    runs = {(*run.case, run.arm): run for run in read_record(record)}
     stacks = [job for job in jobs if job.arm == STACK]
-    _add_runs(stacks, runs, record, workers=workers, console=console, title=title)
-    compared = {job.case for job in stacks if runs[(*job.case, STACK)].at_fault}
-    references = [job for job in jobs if job.arm == REFERENCE and job.case in compared]
-    _add_runs(references, runs, record, workers=workers, console=console, title=f"{title}, reference")
-    return [run for job in jobs if (run := runs.get((*job.case, job.arm))) is not None]
+    with DrivenRecord.open(record) as driven:
+        runs = driven.runs
 
+        def add_runs(jobs: Sequence[DrivenJob], title: str) -> None:
+            left = [job for job in jobs if driven.key(job) not in runs]
+            run_jobs(left, run_of, workers=workers, console=console, title=title, finished=driven.add)
 
-def _add_runs(
-    jobs: Sequence[DrivenJob],
-    runs: dict[tuple[*Case, str], DrivenRun],
-    record: Path,
-    *,
-    workers: int | None,
-    console: Console,
-    title: str,
-) -> None:
-    """Add the runs of jobs that are missing to `runs` and to the record."""
-    left = [job for job in jobs if (*job.case, job.arm) not in runs]
-    with record.open("ab") as lines:
-        lines.truncate(len(_complete_lines(record)))
-
-        def add(run: DrivenRun) -> None:
-            lines.write(json.dumps(asdict(run), ensure_ascii=False).encode() + b"\n")
-            lines.flush()
-            runs[(*run.case, run.arm)] = run
-
-        run_jobs(left, run_of, workers=workers, console=console, title=title, finished=add)
+        add_runs(stacks, title)
+        compared = {case_of(job) for job in stacks if runs[driven.key(job)].at_fault}
+        add_runs([job for job in jobs if job.arm == REFERENCE and case_of(job) in compared], f"{title}, reference")
+    return [runs[key] for key in map(DrivenRecord.key, jobs) if key in runs]

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from eidrive_scenario.api.common import EidriveError, InputError, write_atomically
 
@@ -42,7 +42,11 @@ def positive(text: str) -> int:
     return int(text)
 
 
-def command(main: Callable[[Sequence[str] | None], None]) -> Callable[[Sequence[str] | None], int]:
+class Command(Protocol):
+    def __call__(self, arguments: Sequence[str] | None = None) -> int: ...
+
+
+def command(main: Callable[[Sequence[str] | None], None]) -> Command:
     """Return a command that prints errors. Exit codes: 0 completed, 2 invalid input, 3 aborted."""
 
     @wraps(main)

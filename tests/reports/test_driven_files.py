@@ -13,9 +13,9 @@ from eidrive_reports.driven_runs import (
     REFERENCE,
     STACK,
     DrivenJob,
+    DrivenRecord,
     DrivenRun,
     jobs_of_file,
-    read_record,
     run_recorded,
 )
 from opendrive_xml import lanes_xml, map_xml, road_xml
@@ -34,6 +34,11 @@ from storyboard_xml import end_xml, init_xml, lane_position_xml, speed_xml, tele
 from eidrive_scenario.errors import ConstraintError, Diagnostic
 from eidrive_scenario.openscenario import load_distribution
 from eidrive_scenario.simulation import RunSettings
+
+
+def read(record: Path) -> list[DrivenRun]:
+    with DrivenRecord.open(record) as driven:
+        return list(driven.runs.values())
 
 
 def run(arm: str = STACK, number: int = 0, *, file: str = "a.xosc", **given: object) -> DrivenRun:
@@ -108,7 +113,7 @@ def test_main_drives_a_file_and_resumes_from_its_record(tmp_path: Path, capsys: 
     """With 10 m/s the vehicle stops before a car 70 m ahead: the distance is shorter than the gap of the bodies."""
     arguments = [str(write(tmp_path, 70.0)), "--out", str(tmp_path), "--workers", "1"]
     driven_files.main(arguments)
-    (only,) = read_record(tmp_path / "driven_files.jsonl")
+    (only,) = read(tmp_path / "driven_files.jsonl")
     assert (only.collided, only.error, only.arm) == (False, "", STACK)
     assert 40.0 < only.distance < 70.0 - 4.5
     assert only.duration == pytest.approx(8.0, abs=0.1)
@@ -236,9 +241,9 @@ def test_record_of_samples_is_continued(tmp_path: Path) -> None:
     path = write_variation(tmp_path, 2, 30)
     arguments = [str(path), "--out", str(tmp_path), "--workers", "1", "--planner", "route", "--samples"]
     driven_files.main([*arguments, "1"])
-    (first,) = read_record(tmp_path / "driven_files.jsonl")
+    (first,) = read(tmp_path / "driven_files.jsonl")
     driven_files.main([*arguments, "2", "--resume"])
-    both = read_record(tmp_path / "driven_files.jsonl")
+    both = read(tmp_path / "driven_files.jsonl")
     assert both[0] == first
     assert [run.excluded for run in both] == [False, False]
     assert len({run.number for run in both}) == 2

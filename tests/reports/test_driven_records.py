@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from eidrive_reports import driven_files, driven_runs
-from eidrive_reports.driven_runs import STACK, DrivenJob, DrivenRun, read_record, run_recorded
+from eidrive_reports.driven_runs import STACK, DrivenJob, DrivenRecord, DrivenRun, run_recorded
 from rich.console import Console
 
 from eidrive_scenario.errors import SettingError
@@ -35,14 +35,19 @@ def recorded(jobs: list[DrivenJob], record: Path) -> list[DrivenRun]:
     return run_recorded(jobs, record, workers=1, console=Console(quiet=True), title="x")
 
 
+def read(record: Path) -> list[DrivenRun]:
+    with DrivenRecord.open(record) as driven:
+        return list(driven.runs.values())
+
+
 def test_interrupted_record_is_continued(tmp_path: Path, done: list[DrivenJob]) -> None:
     record = tmp_path / "record.jsonl"
     runs = recorded([job(0), job(1)], record)
     record.write_bytes(record.read_bytes()[:-20])
-    assert read_record(record) == runs[:1]
+    assert read(record) == runs[:1]
     assert recorded([job(0), job(1)], record) == runs
     assert [one.number for one in done] == [0, 1, 1]
-    assert read_record(record) == runs
+    assert read(record) == runs
 
 
 @pytest.mark.parametrize("line", ["{}", "[]", "damaged", '{"file": "a.xosc", "failed": [], "unstarted": [], "x": 1}'])

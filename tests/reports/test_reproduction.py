@@ -27,13 +27,13 @@ def test_record_returns_the_episodes_of_earlier_calls(tmp_path: Path) -> None:
     path = tmp_path / "new" / "part.jsonl"
     added = [episode(seed=seed, center=1.0 / 3.0) for seed in (1, 2)]
     with Record.open(path) as record:
-        assert record.episodes == {}
+        assert record.runs == {}
         for one in added:
             record.add(one)
     with Record.open(path) as record:
-        assert list(record.episodes.values()) == added
+        assert list(record.runs.values()) == added
     with Record.open(path, restart=True) as record:
-        assert record.episodes == {}
+        assert record.runs == {}
     assert path.read_bytes() == b""
 
 
@@ -45,7 +45,7 @@ def test_incomplete_last_line_of_a_killed_process_is_removed(tmp_path: Path) -> 
     complete = path.read_bytes()
     path.write_bytes(complete[:-20])
     with Record.open(path) as record:
-        assert [one.seed for one in record.episodes.values()] == [1]
+        assert [one.seed for one in record.runs.values()] == [1]
         record.add(episode(seed=2))
     assert path.read_bytes() == complete
 
@@ -59,7 +59,7 @@ def test_damaged_record_is_an_error_with_its_line(tmp_path: Path, line: bytes) -
     with pytest.raises(SettingError, match=r"part\.jsonl:2: the record is damaged: .*--restart"), Record.open(path):
         pass
     with Record.open(path, restart=True) as record:
-        assert record.episodes == {}
+        assert record.runs == {}
 
 
 def test_record_of_another_process_and_unwritable_folders_are_errors(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_detectors_are_those_of_the_part() -> None:
 @pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.name)
 def test_jobs_are_distinct_and_ordered_by_seed(part: Part) -> None:
     jobs = part.jobs(2, part.detectors)
-    assert len({job.key for job in jobs}) == len({(job.scenario, job.arm, job.seed) for job in jobs}) == len(jobs)
+    assert len(set(map(Record.key, jobs))) == len({(job.scenario, job.arm, job.seed) for job in jobs}) == len(jobs)
     episodes = [job.seed % 1000 for job in jobs]
     assert episodes == sorted(episodes)
     assert set(episodes) == {1, 2}

@@ -11,6 +11,7 @@ from eidrive_reports.reproduction.channel_load import CLEAR, INNER, OUTER, place
 from eidrive_reports.reproduction.episodes import Episode, EpisodeJob, run_episode
 from eidrive_reports.reproduction.part import Case
 from eidrive_reports.reproduction.provenance import job_digest
+from eidrive_reports.reproduction.reproduce import Record
 from known_episodes import episode
 
 from eidrive_scenario.extensions.library import resolve_scenario
@@ -62,7 +63,7 @@ def test_runs_of_one_arm_have_different_seeds() -> None:
     jobs = channels.PART.jobs(2, channels.DETECTORS)
     latency = [job for job in jobs if job.arm.startswith("oracle behavior latency 0.3 ")]
     assert sorted(job.seed for job in latency) == [1, 2, 1001, 1002]
-    assert len({job.key for job in jobs}) == len(jobs)
+    assert len(set(map(Record.key, jobs))) == len(jobs)
 
 
 def test_added_stations_are_beside_the_roads_and_nested() -> None:

@@ -44,11 +44,6 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     perception: PerceptionRecord | None = None
     passed: bool | None = None
 
-    @property
-    def key(self) -> tuple[str, str, int, str]:
-        """Identity of the run in the record of a part."""
-        return self.scenario, self.arm, self.seed, self.digest
-
 
 @dataclass(frozen=True)
 class EpisodeJob(Job):
@@ -64,11 +59,6 @@ class EpisodeJob(Job):
     counted: str = ""
     load: int = 0
     conditions: tuple[Condition, ...] = ()
-
-    @property
-    def key(self) -> tuple[str, str, int, str]:
-        """Identity of the run in the record of a part."""
-        return self.scenario, self.arm, self.seed, self.digest
 
 
 class ObjectCounter:

@@ -4,72 +4,28 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
-from typing import BinaryIO, Self
 
-import msgspec
 from rich.console import Console
 
 from eidrive_reports.reproduction.episodes import Episode, run_episode
 from eidrive_reports.reproduction.layout import PartReport, Section, as_csv
 from eidrive_reports.reproduction.part import Part
 from eidrive_reports.reproduction.provenance import read_provenance, write_provenance
-from eidrive_scenario.api.common import Diagnostic, SettingError, exclusive, write_atomically
+from eidrive_reports.run_record import RunRecord
+from eidrive_scenario.api.common import write_atomically
 from eidrive_scenario.api.experiments import cores, run_jobs
 
 
-class Record:
-    """Episodes of a record file, and the open file to which further ones are added."""
+class Record(RunRecord[Episode]):
+    """Record of the episodes of a part."""
 
-    def __init__(self, stream: BinaryIO, episodes: dict[tuple[str, str, int, str], Episode]) -> None:
-        self._stream = stream
-        self.episodes = episodes
-        """Episodes by their key."""
-
-    def add(self, episode: Episode) -> None:
-        """Add an episode to the file. It is complete on the disk after the return, so that a kill loses no other."""
-        self._stream.write(msgspec.json.encode(episode) + b"\n")
-        self._stream.flush()
-        self.episodes[episode.key] = episode
-
-    @classmethod
-    @contextmanager
-    def open(cls, path: Path, *, restart: bool = False) -> Iterator[Self]:
-        """Open a record and lock it against other processes; `restart` discards its episodes.
-
-        An incomplete last line, as a killed process leaves it, is removed. Raise SettingError if any other line is
-        invalid, if the file cannot be written, or if another process writes it.
-        """
-        if path.exists() and not path.is_file():
-            raise SettingError(Diagnostic("cannot write: not a regular file", "choose another folder", str(path)))
-        with ExitStack() as stack:
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(exclusive(path))
-                stream = stack.enter_context(path.open("ab"))
-                content = b"" if restart else path.read_bytes()
-            except OSError as error:
-                message = f"cannot write: {error.strerror}"
-                raise SettingError(Diagnostic(message, "choose another folder", str(path))) from error
-            complete = content[: content.rfind(b"\n") + 1]
-            episodes = _parse(path, complete)
-            stream.truncate(len(complete))
-            yield cls(stream, episodes)
-
-
-def _parse(path: Path, content: bytes) -> dict[tuple[str, str, int, str], Episode]:
-    episodes = {}
-    for number, line in enumerate(content.splitlines(), 1):
-        try:
-            episode = msgspec.json.decode(line, type=Episode)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            hint = "remove the line, or start again with --restart"
-            raise SettingError(Diagnostic(f"the record is damaged: {error}", hint, str(path), number)) from error
-        episodes[episode.key] = episode
-    return episodes
+    kind = Episode
+    key = attrgetter("scenario", "arm", "seed", "digest")
+    hint = "remove the line, or start again with --restart"
 
 
 @dataclass(frozen=True)
@@ -114,11 +70,11 @@ def reproduce(
     read_provenance(out)  # a damaged file is an error before the runs, not after them
     jobs = part.jobs(episodes, detectors)
     with Record.open(out / f"{part.name}.jsonl", restart=restart) as record:
-        recorded = len(record.episodes)
-        left = [job for job in jobs if job.key not in record.episodes]
+        recorded = len(record.runs)
+        left = [job for job in jobs if record.key(job) not in record.runs]
         if left:
             run_jobs(left, run_episode, workers=workers, console=console, title=part.name, finished=record.add)
-        used = tuple(record.episodes[job.key] for job in jobs)
+        used = tuple(record.runs[record.key(job)] for job in jobs)
     report = part.report(used, detectors)
     report = replace(report, sections=(Section("Question", (part.question,)), *report.sections))
     _write_report(part, out, report)
