@@ -21,8 +21,8 @@ from rich.console import Console
 
 from eidrive_reports.driven_files import table, worse_runs
 from eidrive_reports.driven_runs import DEFAULT, STACK, DrivenRun, jobs_of_file, run_recorded
-from eidrive_reports.studies import markdown_table, positive, study_options
-from eidrive_scenario.api.common import SettingError, write_atomically
+from eidrive_reports.studies import command, markdown_table, positive, study_options
+from eidrive_scenario.api.common import write_atomically
 
 CORPORA, MAPS = "EIDRIVE_CORPORA", "EIDRIVE_MAPS"
 """Environment variables with the folders of the corpora and of the maps."""
@@ -146,6 +146,7 @@ def selected(names: Iterable[str]) -> list[Group]:
     return [group for group in GROUPS if not names or group.name in names]
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = ", ".join(group.name for group in GROUPS)
@@ -171,10 +172,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for path in group.files(corpora)
             for job in jobs_of_file(path, group.drive, options.planner, options.samples, reference, group=group.name)
         ]
-        try:
-            runs = run_recorded(jobs, record, workers=options.workers, console=console, title=group.name)
-        except SettingError as error:
-            parser.error(str(error))
+        runs = run_recorded(jobs, record, workers=options.workers, console=console, title=group.name)
         results.append((group, runs))
         with write_atomically(options.out / "driven_corpora.md") as stream:
             stream.write(report(results).encode())
@@ -182,4 +180,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

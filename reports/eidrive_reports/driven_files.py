@@ -12,6 +12,7 @@ one line per run; `--resume` repeats no run of that file.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -20,9 +21,9 @@ import numpy as np
 from rich.console import Console
 
 from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, case_of, jobs_of_file, run_recorded
-from eidrive_reports.studies import grouped, markdown_table, positive, publish, study_options
+from eidrive_reports.studies import command, grouped, markdown_table, positive, publish, study_options
 from eidrive_scenario.api.actions import is_agent_controller
-from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, quoted, registry, suggestion
+from eidrive_scenario.api.common import Diagnostic, InputError, quoted, registry, suggestion
 from eidrive_scenario.api.experiments import definition
 from eidrive_scenario.api.run import Controller, load_distribution, load_scenario
 
@@ -102,6 +103,7 @@ def _controller_names(path: Path) -> list[str]:
     return list(dict.fromkeys(element.name for element in controllers if not is_agent_controller(element)))
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", type=Path, nargs="+", help="scenarios and parameter value distributions")
@@ -130,12 +132,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not options.resume:
         record.unlink(missing_ok=True)
     console = Console(stderr=True)
-    try:
-        runs = run_recorded(jobs, record, workers=options.workers, console=console, title="driven files")
-    except SettingError as error:
-        parser.error(str(error))
+    runs = run_recorded(jobs, record, workers=options.workers, console=console, title="driven files")
     publish(table(runs, has_reference=reference is not None), options.out / "driven_files.md")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -54,6 +54,14 @@ class Stop:
     reason: str
 
 
+def decelerations(times: Sequence[float], speeds: Sequence[float]) -> Array:
+    """Return the mean decelerations over `WINDOW` (N,) [m/s²]; none of a drive that is shorter."""
+    steps = round(WINDOW / (times[1] - times[0])) if len(times) > 1 else 0
+    if not 0 < steps < len(speeds):
+        return np.empty(0)
+    return np.subtract(speeds[:-steps], speeds[steps:]) / WINDOW
+
+
 class DrivenMotion:
     """Motion of one vehicle, from frames in order.
 
@@ -141,7 +149,7 @@ class DrivenMotion:
     @property
     def hardest_braking(self) -> float:
         """Maximum mean deceleration over `WINDOW` before the first contact [m/s²]."""
-        return float(max(self._braking().max(initial=0.0), 0.0))
+        return float(self._braking().max(initial=0.0))
 
     @property
     def hard_brakings(self) -> int:
@@ -151,13 +159,9 @@ class DrivenMotion:
 
     def _braking(self) -> Array:
         """Return the mean decelerations over `WINDOW` before the first contact (N,) [m/s²]."""
-        times, speeds = np.array(self._times), np.array(self._speeds)
-        if self.contacts:
-            speeds = speeds[times < self.contacts[0][0]]
-        steps = round(WINDOW / (times[1] - times[0])) if len(times) > 1 else 0
-        if not 0 < steps < len(speeds):
-            return np.empty(0)
-        return np.asarray((speeds[:-steps] - speeds[steps:]) / WINDOW)
+        end = self.contacts[0][0] if self.contacts else np.inf
+        speeds = [speed for time, speed in zip(self._times, self._speeds, strict=True) if time < end]
+        return decelerations(self._times, speeds)
 
 
 def observed_run(

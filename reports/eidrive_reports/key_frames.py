@@ -128,31 +128,21 @@ class KeyFrames:
 
     def _find_events(self, frame: Frame, snapshot: StationSnapshot) -> None:
         step = snapshot.step
+        titles = {}
         if not self._shows(snapshot.own):
-            if "hidden" not in self._events:
-                others = [name for name, at in frame.steps.items() if name != self.ego and self._shows(at.detections)]
-                if others:
-                    title = (
-                        f"{' and '.join(others)} {'sees' if len(others) == 1 else 'see'} {self.hidden}, "
-                        f"{self.ego} does not"
-                    )
-                    self._events["hidden"] = (title, snapshot)
-            if "received" not in self._events:
-                senders = [held.message.sender for held in snapshot.received if self._shows(held.message.detections)]
-                if senders:
-                    title = f"{self.ego} receives {self.hidden} only from {' and '.join(dict.fromkeys(senders))}"
-                    self._events["received"] = (title, snapshot)
-        if "entered" not in self._events and self.areas:
-            at = snapshot.view.centers[snapshot.view.row(self.hidden), :2]
-            if any(points_in_polygon(at, area) for area in self.areas):
-                self._events["entered"] = (f"{self.hidden} enters the conflict area", snapshot)
-        if (
-            "braked" not in self._events
-            and step is not None
-            and step.plan is not None
-            and step.plan.braking is not None
-        ):
-            self._events["braked"] = (f"{self.ego} brakes", snapshot)
+            if others := [name for name, at in frame.steps.items() if name != self.ego and self._shows(at.detections)]:
+                sees = "sees" if len(others) == 1 else "see"
+                titles["hidden"] = f"{' and '.join(others)} {sees} {self.hidden}, {self.ego} does not"
+            if senders := [held.message.sender for held in snapshot.received if self._shows(held.message.detections)]:
+                names = " and ".join(dict.fromkeys(senders))
+                titles["received"] = f"{self.ego} receives {self.hidden} only from {names}"
+        at = snapshot.view.centers[snapshot.view.row(self.hidden), :2]
+        if any(points_in_polygon(at, area) for area in self.areas):
+            titles["entered"] = f"{self.hidden} enters the conflict area"
+        if step is not None and step.plan is not None and step.plan.braking is not None:
+            titles["braked"] = f"{self.ego} brakes"
+        for kind, title in titles.items():
+            self._events.setdefault(kind, (title, snapshot))
 
     def _shows(self, detections: Detections) -> bool:
         """True if a detection is near the position of the occluded car at the time of measurement."""

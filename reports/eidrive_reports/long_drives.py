@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +22,9 @@ from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, Stop, observed_run
 from eidrive_reports.paper import EGO
-from eidrive_reports.studies import markdown_table, publish, study_options
+from eidrive_reports.studies import command, markdown_table, publish, study_options
 from eidrive_scenario.api.common import (
     Diagnostic,
-    EidriveError,
     LaneKey,
     LaneLocation,
     RoadNetwork,
@@ -407,6 +407,7 @@ def _jobs(options: argparse.Namespace, folder: Path) -> list[Job]:
     return jobs
 
 
+@command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("maps", type=Path, nargs="+", help="OpenDRIVE files with closed ways")
@@ -416,13 +417,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--planner", default="behavior")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     options = study_options(parser, arguments)
-    try:
-        jobs = _jobs(options, options.out / "long_drives")
-        drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
-    except EidriveError as error:
-        parser.error(str(error))
+    jobs = _jobs(options, options.out / "long_drives")
+    drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
     publish(table(drives[::2], drives[1::2]), options.out / "long_drives.md")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

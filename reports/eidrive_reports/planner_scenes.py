@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 
-from eidrive_reports.driven_runs import CONTACT, WINDOW
+from eidrive_reports.driven_runs import CONTACT, decelerations
 from eidrive_reports.paper import EGO
 from eidrive_reports.studies import command, markdown_table, publish, study_options
-from eidrive_scenario.api.common import Array
 from eidrive_scenario.api.experiments import Job, describe_scenarios, jobs_of, resolve_scenario, run_jobs
 from eidrive_scenario.api.run import RunResult, RunSettings, Simulation
 
@@ -72,7 +70,7 @@ def run_of(job: Job) -> SceneRun:
         at_fault=result.metrics.get(f"{CONTACT}.at_fault", 0.0) > 0.0,
         arrived=_passed(result, "reach_position"),
         lost=times[-1] - times[0] - sum(speeds) * dt / max(target, 1.0),
-        braking=_hardest_braking(np.array(speeds), dt),
+        braking=float(decelerations(times, speeds).max(initial=0.0)),
         detected=next((verdict.value for verdict in result.criteria if verdict.name == "first_detection"), None),
     )
 
@@ -80,13 +78,6 @@ def run_of(job: Job) -> SceneRun:
 def _passed(result: RunResult, name: str) -> bool:
     """Whether the run has a criterion of this name, and it passed."""
     return [verdict.passed for verdict in result.criteria if verdict.name == name] == [True]
-
-
-def _hardest_braking(speeds: Array, dt: float) -> float:
-    steps = round(WINDOW / dt) if dt else len(speeds)
-    if len(speeds) <= steps:
-        return 0.0
-    return float(max((speeds[:-steps] - speeds[steps:]).max() / (steps * dt), 0.0))
 
 
 def table(runs: Sequence[SceneRun]) -> str:

@@ -146,18 +146,12 @@ AXES: Mapping[str, tuple[str, Mapping[str, float], tuple[float, ...]]] = {
     POSE_AND_LATENCY: ("deviation", {"latency": 0.1}, (0.0, 0.2)),
 }
 """Axes of the curves: varied field, other fields, and values. The value 0 is the condition without faults."""
-SCANS_PER_MESSAGE = (1, 2, 5)
 
 
 def on_axis(arm: str, axis: str, value: float) -> Condition:
     """Return the condition of an arm at a value of an axis."""
     varied, others, _ = AXES[axis]
     return Condition(arm, **{varied: value, **(others if value else {})})  # type: ignore[arg-type]
-
-
-def fewer_messages(arms: Sequence[str]) -> list[Condition]:
-    """Return the conditions of arms with messages of every scan, and of fewer scans."""
-    return [Condition(arm, every=every) for arm in arms for every in SCANS_PER_MESSAGE]
 
 
 @dataclass(frozen=True)

@@ -211,20 +211,17 @@ MEASURED = (
 )
 RANK_COLUMNS = (
     plain("channel", "channel_title"),
-    plain("rank", "rank"),
-    plain("method", "method"),
+    *map(plain, ("rank", "method")),
     *SUCCESS,
     Column("gain, 95 %", "{gain:+.0%} ({gain_low:+.0%} to {gain_high:+.0%})"),
     *MEASURED,
 )
 CELL_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("channel", "channel"),
-    plain("method", "method"),
+    *map(plain, ("scenario", "channel", "method")),
     *SUCCESS,
-    plain("collisions", "collisions"),
+    plain("collisions"),
     *MEASURED,
-    plain("traces", "traces"),
+    plain("traces"),
 )
 
 

@@ -6,8 +6,10 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
+from eidrive_reports.studies import grouped
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, registry
 from eidrive_scenario.api.experiments import describe_scenarios, library_path, resolve_scenario
 from eidrive_scenario.api.run import RunSettings
@@ -190,13 +192,11 @@ def scenarios_of(texts: Sequence[str]) -> tuple[str, ...]:
     Raise SettingError for an unknown one, or for a file that is not a scenario.
     """
     scenarios: dict[str, None] = {}
-    families: dict[str, list[str]] = {}
-    for entry in describe_scenarios():
-        families.setdefault(entry.family, []).append(entry.name)
+    families = grouped(describe_scenarios(), attrgetter("family"))
     for text in texts:
         if text not in families:
             resolve_scenario(text)
-        scenarios |= dict.fromkeys(families.get(text, [text]))
+        scenarios |= dict.fromkeys(entry.name for entry in families[text]) if text in families else {text: None}
     return tuple(scenarios)
 
 

@@ -270,15 +270,13 @@ SUCCESS = (
     plain("mean age [s]", "age", ".3f"),
 )
 FAULT_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("planner", "planner"),
-    plain("fault", "fault"),
+    *map(plain, ("scenario", "planner", "fault")),
     plain("value", "value", "g"),
     *SUCCESS,
 )
 LOAD_COLUMNS = (
     plain("medium access", "access"),
-    plain("stations", "stations"),
+    plain("stations"),
     plain("busy", "busy", ".0%"),
     *SUCCESS,
     plain("95 % of the time below [s]", "p95_age", ".3f"),

@@ -123,9 +123,7 @@ def series(runs: Runs, detectors: Sequence[str]) -> Iterator[Row]:
 
 
 CELL_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("detector", "detector"),
-    plain("arm", "arm"),
+    *map(plain, ("scenario", "detector", "arm")),
     Column("objects", "{mean:.1f} ± {sd:.1f}"),
     Column("95 %", "{low:.1f} to {high:.1f}"),
     Column("range", "{least} to {most}"),
@@ -133,9 +131,7 @@ CELL_COLUMNS = (
     plain("different vehicles", "actors", ".1f"),
 )
 RATIO_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("senders", "senders"),
-    plain("detector", "detector"),
+    *map(plain, ("scenario", "senders", "detector")),
     plain("ratio", "ratio", ".2f"),
     Column("95 %", "{low:.2f} to {high:.2f}"),
     plain("paper", "paper_ratio", ".2f"),

@@ -60,7 +60,7 @@ def drive_fields(episodes: Sequence[Episode]) -> Row:
 DRIVE_COLUMNS = (
     Column("completed", "{passed} of {episodes}"),
     Column("95 %", "{low:.0%} to {high:.0%}"),
-    plain("collisions", "collisions"),
+    plain("collisions"),
     plain("duration [s]", "duration", ".1f"),
 )
 
@@ -103,9 +103,7 @@ def pipeline_cases(detectors: Sequence[str]) -> list[Case]:
 
 
 PIPELINE_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("task", "task"),
-    plain("detector", "detector"),
+    *map(plain, ("scenario", "task", "detector")),
     *DRIVE_COLUMNS,
     plain("least gap [m]", "gap", ".2f"),
 )
@@ -156,7 +154,7 @@ def ei_cases(detectors: Sequence[str]) -> list[Case]:
     ]
 
 
-EI_COLUMNS = (plain("scenario", "scenario"), plain("task", "task"), plain("planner", "planner"), *DRIVE_COLUMNS)
+EI_COLUMNS = (plain("scenario"), plain("task"), plain("planner"), *DRIVE_COLUMNS)
 
 
 def ei_report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:

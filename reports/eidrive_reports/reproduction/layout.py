@@ -136,9 +136,9 @@ class PartReport:
         return "\n".join([f"# {self.title}\n", *(section.markdown() for section in self.sections)])
 
 
-def plain(title: str, field: str, form: str = "") -> Column:
-    """Return a column of one field with a format specification such as `.2f`."""
-    return Column(title, f"{{{field}:{form}}}")
+def plain(title: str, field: str = "", form: str = "") -> Column:
+    """Return a column of one field, of the name of the title by default, with a format specification such as `.2f`."""
+    return Column(title, f"{{{field or title}:{form}}}")
 
 
 def number(row: Row, name: str) -> float:

@@ -134,7 +134,7 @@ def gain_table(gains: Sequence[Row], late: str) -> DataTable:
         for (fault, value), mine in groups(shown, "fault", "value").items()
     ]
     intervals = (_gain_column(f"{arm} (95 %)", f"{arm} ") for arm in INTERMEDIATE)
-    columns = (plain("fault", "fault"), plain("value", "value", "g"), *intervals)
+    columns = (plain("fault"), plain("value", "value", "g"), *intervals)
     return DataTable("learned_gain_curves", columns, tuple(lines))
 
 

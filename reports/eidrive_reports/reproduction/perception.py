@@ -14,7 +14,6 @@ from eidrive_reports.cooperative_perception.receivers import (
     YAW_PER_POSITION,
     Condition,
     Study,
-    fewer_messages,
 )
 from eidrive_reports.cooperative_perception.scores import RANGES
 from eidrive_reports.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
@@ -32,7 +31,7 @@ STUDY = Study(
     ("none", "none, filtered", *SENDING),
     ("none", *SENDING),
     tuple(AXES),
-    (*fewer_messages(SENDING), Condition("early", cell=0.2)),
+    (*(Condition(arm, every=scans) for arm in SENDING for scans in (1, 2, 5)), Condition("early", cell=0.2)),
     len(RANGES),
 )
 

@@ -36,7 +36,7 @@ FEATURE_NOTES = (
     f"`{FEATURES_ONLY}`, as boxes replace features that are not sent.",
 )
 """Paragraphs about the shapes of all studies, and about those of features."""
-SHAPE_COLUMNS = (plain("shape", "shape"), plain("holds", "holds"), plain("measured", "measured"))
+SHAPE_COLUMNS = (plain("shape"), plain("holds"), plain("measured"))
 
 
 def shape_section(result: StudyResult) -> Section:

@@ -40,13 +40,13 @@ def _precision(overlap: float) -> Column:
     return Column(f"AP {overlap:g} (95 %)", f"{{ap_{key}:.3f}} ({{low_{key}:.2f}} to {{high_{key}:.2f}})")
 
 
-AXIS_COLUMNS = (plain("axis", "axis"), plain("value", "value", "g"))
+AXIS_COLUMNS = (plain("axis"), plain("value", "value", "g"))
 VOLUME_COLUMNS = (
-    plain("arm", "arm"),
+    plain("arm"),
     plain("messages per second", "messages_per_second", "g"),
     plain("grid [m]", "cell", "g"),
     plain("share of the cells", "share", "g"),
-    plain("encoding", "encoding"),
+    plain("encoding"),
     plain("MB/s", "megabytes_per_second", ".4f"),
     *(plain(f"AP {overlap:g}", f"ap_{_key(overlap)}", ".3f") for overlap in OVERLAPS),
 )
@@ -159,7 +159,7 @@ class StudyResult:
         """Return the table of the arms without faults."""
         reach = range(self.study.reach)
         columns = (
-            plain("arm", "arm"),
+            plain("arm"),
             *(_precision(overlap) for overlap in OVERLAPS),
             *(plain(f"AP 0.5, {range_name(number)}", f"ap_50_range_{number}", ".3f") for number in reach),
             plain("AP 0.5, local sort", "ap_50_local_sort", ".3f"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from eidrive_reports.cooperative_perception.receivers import DRIFT_TIME, YAW_PER_POSITION
 from eidrive_reports.paper import EGO
@@ -61,11 +62,9 @@ class PoseErrorArm:
 
 def arms() -> Iterator[PoseErrorArm]:
     """Yield all arms: drift only of the oracle, and not without an error, where both processes are the same."""
-    for detector, tracker, fusion in STACKS:
-        for process in PROCESSES:
-            for deviation in DEVIATIONS:
-                if process == "independent" or (detector == "oracle" and deviation > 0.0):
-                    yield PoseErrorArm(detector, tracker, fusion, process, deviation)
+    for stack, process, deviation in product(STACKS, PROCESSES, DEVIATIONS):
+        if process == "independent" or (stack[0] == "oracle" and deviation > 0.0):
+            yield PoseErrorArm(*stack, process, deviation)
 
 
 def cases(detectors: Sequence[str]) -> list[Case]:
@@ -98,16 +97,13 @@ def rows(episodes: Sequence[Episode]) -> Iterator[Row]:
 
 
 COLUMNS = (
-    plain("detector", "detector"),
-    plain("tracker", "tracker"),
-    plain("fusion", "fusion"),
+    *map(plain, ("detector", "tracker", "fusion")),
     plain("error", "process"),
     plain("deviation [m]", "deviation", "g"),
-    plain("runs", "runs"),
+    plain("runs"),
     plain("least speed [m/s]", "least_speed", ".2f"),
     plain("mean of least speeds [m/s]", "mean_least_speed", ".2f"),
-    plain("brakings", "brakings"),
-    plain("collisions", "collisions"),
+    *map(plain, ("brakings", "collisions")),
 )
 
 

@@ -221,17 +221,14 @@ def effects(rows: Sequence[Row]) -> Iterator[Row]:
 
 
 EFFECT_COLUMNS = (
-    plain("planner", "planner"),
-    plain("scenario", "scenario"),
-    plain("arm", "arm"),
+    *map(plain, ("planner", "scenario", "arm")),
     Column("collisions", "{collisions} of {episodes}"),
     Column("cells with fewer than without cooperation", "{helps} of {cells}"),
     plain("as many", "nothing"),
     plain("more", "harms"),
 )
 CURVE_COLUMNS = (
-    plain("planner", "planner"),
-    plain("scenario", "scenario"),
+    *map(plain, ("planner", "scenario")),
     plain("latency [s]", "latency", ".2f"),
     Column("collisions", "{collisions} of {episodes}"),
     Column("95 %", "{low:.0%} to {high:.0%}"),

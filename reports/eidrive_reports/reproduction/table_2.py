@@ -67,9 +67,7 @@ def setup(episodes: int) -> tuple[str, ...]:
 
 
 SUMMARY_COLUMNS = (
-    plain("planner", "planner"),
-    plain("channel", "channel"),
-    plain("statement", "statement"),
+    *map(plain, ("planner", "channel", "statement")),
     Column("holds", "{holds} of {columns}"),
     Column("95 % interval above 0", "{certain} of {columns}"),
     Column("paper", "{paper} of {columns}"),
@@ -262,20 +260,14 @@ def column_rows(
 
 
 CELL_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("detector", "detector"),
-    plain("arm", "arm"),
+    *map(plain, ("scenario", "detector", "arm")),
     *DISTANCE_COLUMNS,
     Column("paper [m]", "{paper_mean:.2f} ± {paper_sd:.2f}"),
     Column("collisions", "{collisions} of {episodes} ({collision_low:.2f} to {collision_high:.2f})"),
     *GAP_COLUMNS,
 )
 COMPARISON_COLUMNS = (
-    plain("statement", "statement"),
-    plain("scenario", "scenario"),
-    plain("detector", "detector"),
-    plain("planner", "planner"),
-    plain("channel", "channel"),
+    *map(plain, ("statement", "scenario", "detector", "planner", "channel")),
     Column("difference [m]", "{difference:+.2f}"),
     Column("95 %", "{low:+.2f} to {high:+.2f}"),
     Column("paper [m]", "{paper_difference:+.2f}"),

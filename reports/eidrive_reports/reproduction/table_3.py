@@ -99,8 +99,7 @@ def compare(runs: Runs, scenario: str, detector: str) -> Iterator[Row]:
 
 
 CELL_COLUMNS = (
-    plain("scenario", "scenario"),
-    plain("senders", "senders"),
+    *map(plain, ("scenario", "senders")),
     Column("success", "{free} of {episodes} = {rate:.0%}"),
     Column("95 %", "{rate_low:.0%} to {rate_high:.0%}"),
     Column("paper", "{paper_rate:.0%} ± {paper_rate_sd:.0%}"),
@@ -109,9 +108,7 @@ CELL_COLUMNS = (
     *GAP_COLUMNS,
 )
 COMPARISON_COLUMNS = (
-    plain("statement", "statement"),
-    plain("scenario", "scenario"),
-    plain("detector", "detector"),
+    *map(plain, ("statement", "scenario", "detector")),
     Column("difference", "{difference:+.0%}"),
     Column("95 %", "{low:+.0%} to {high:+.0%}"),
     Column("paper", "{paper_difference:+.0%}"),
