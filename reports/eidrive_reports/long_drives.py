@@ -263,13 +263,12 @@ def _signals(roads: RoadNetwork) -> str:
     controllers = []
     for junction in roads.junctions.values():
         groups = [
-            [signal for signal in roads.controllers[number].signals if roads.signals[signal].dynamic]
+            dict.fromkeys(signal for signal in roads.controllers[number].signals if roads.signals[signal].dynamic)
             for number in junction.controllers
             if number in roads.controllers
         ]
-        groups = [list(dict.fromkeys(group)) for group in groups if group]
-        if groups:
-            controllers.append(_controller(f"Junction{junction.id}", groups))
+        if any(groups):
+            controllers.append(_controller(f"Junction{junction.id}", [list(group) for group in groups if group]))
     return f"\n      <TrafficSignals>\n{''.join(controllers)}      </TrafficSignals>" if controllers else ""
 
 
