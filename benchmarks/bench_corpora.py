@@ -213,12 +213,11 @@ def compare(esmini: str, pairs: list[tuple[ScenarioRun, float, float]]) -> None:
         f"  one process per file on both sides (aim: within 3):                      "
         f"{processes:8.2f} s and {esmini_total:8.2f} s, ratio {processes / esmini_total:.2f}"
     )
-    ratios = {run.name: run.wall / esmini_time for run, _, esmini_time in pairs}
-    worst = sorted(ratios, key=lambda name: -ratios[name])[:5]
-    largest = ", ".join(f"{name} {ratios[name]:.1f}" for name in worst)
+    ratios = sorted(((run.wall / esmini_time, run.name) for run, _, esmini_time in pairs), reverse=True)
+    largest = ", ".join(f"{name} {ratio:.1f}" for ratio, name in ratios[:5])
     print(
-        f"  by file: geometric mean {geometric_mean(ratios.values()):.2f} (aim: at most 1; 0.1.0: 1.64), maximum "
-        f"{ratios[worst[0]]:.1f} (aim: at most 6; 0.1.0: 19); largest: {largest}"
+        f"  by file: geometric mean {geometric_mean(ratio for ratio, _ in ratios):.2f} (aim: at most 1; 0.1.0: 1.64), "
+        f"maximum {ratios[0][0]:.1f} (aim: at most 6; 0.1.0: 19); largest: {largest}"
     )
     print(f"  start of a process: {own_start:.3f} s with imports, esmini {esmini_start:.3f} s")
 

@@ -25,7 +25,7 @@ from statistics import geometric_mean
 from typing import NamedTuple
 
 from compare import checkout
-from figures import COMMAND, SINGLE_THREAD, children_time
+from figures import COMMAND, children_time, variables
 
 STEP = 0.01
 
@@ -38,13 +38,6 @@ class Times(NamedTuple):
     head: float
     base_process: float | None = None
     head_process: float | None = None
-
-
-def variables(side: Path) -> dict[str, str]:
-    """Return the environment in which the package of a checkout is imported, with byte code."""
-    paths = os.pathsep.join(str(side / folder) for folder in ("", "behaviors", "criteria"))
-    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    return {**kept, **SINGLE_THREAD, "PYTHONPATH": paths}
 
 
 class Runner:

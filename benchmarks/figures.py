@@ -108,12 +108,9 @@ def sweep_rate(runs: int = 300) -> float:
 def command_time(*arguments: str) -> float:
     """Return the processor time of a command, without its compilation [s]: the first of four writes byte code."""
     times = []
-    variables = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     for _ in range(4):
         before = children_time()
-        subprocess.run(
-            (*COMMAND, *arguments), check=True, stdout=subprocess.DEVNULL, cwd=tempfile.gettempdir(), env=variables
-        )
+        subprocess.run((*COMMAND, *arguments), check=True, stdout=subprocess.DEVNULL, cwd=tempfile.gettempdir())
         times.append(children_time() - before)
     return min(times[1:])
 
@@ -178,13 +175,18 @@ def available(names: Iterable[str] = ()) -> list[str]:
     return chosen or [name for name, figure in FIGURES.items() if os.environ.get("EIDRIVE_MAPS") or not figure.maps]
 
 
+def variables(checkout: Path) -> dict[str, str]:
+    """Return the environment in which the package of a checkout is imported, with byte code."""
+    paths = [*(str(checkout / folder) for folder in ("", "behaviors", "criteria")), str(HERE)]
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**kept, **SINGLE_THREAD, "PYTHONPATH": os.pathsep.join(paths)}
+
+
 def measure(name: str, checkout: Path = ROOT) -> float | None:
     """Return a figure of the package of a checkout, measured in a separate process; None if it fails there."""
-    paths = [str(checkout / folder) for folder in ("", "behaviors", "criteria")]
-    environment = {**os.environ, **SINGLE_THREAD, "PYTHONPATH": os.pathsep.join([*paths, str(HERE)])}
     try:
         done = subprocess.run(
-            (sys.executable, __file__, name, "--here"), check=True, env=environment, timeout=TIMEOUT,
+            (sys.executable, __file__, name, "--here"), check=True, env=variables(checkout), timeout=TIMEOUT,
             capture_output=True, text=True,
         )  # fmt: skip
     except subprocess.CalledProcessError as error:

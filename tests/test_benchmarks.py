@@ -101,6 +101,19 @@ def test_committed_history_has_the_columns_of_the_figures() -> None:
     assert all(len(row) == len(header) for row in rows)
 
 
+def test_comparison_with_esmini_counts_files_of_the_same_name(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The geometric mean of the ratios 1 and 4 is 2."""
+    import bench_corpora
+
+    monkeypatch.setattr(bench_corpora, "start_seconds", lambda command: 0.5)
+    runs = [bench_corpora.ScenarioRun("cut_in", 10.0, 0.5, running, "stop trigger") for running in (0.5, 3.5)]
+    bench_corpora.compare("esmini", [(run, 2.0, 1.0) for run in runs])
+    assert "geometric mean 2.00" in (text := capsys.readouterr().out)
+    assert "largest: cut_in 4.0, cut_in 1.0" in text
+
+
 def worktrees() -> str:
     command = ("git", "worktree", "list", "--porcelain")
     return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
