@@ -19,7 +19,7 @@ from pathlib import Path
 from rich.console import Console
 
 from eidrive_reports.paper import EGO, HIDDEN, SCENARIOS
-from eidrive_reports.studies import command, grouped, markdown_table, publish, study_options
+from eidrive_reports.studies import command, group_by, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, resolve_scenario, run_jobs, wilson
 from eidrive_scenario.api.run import RunSettings, run_file
 
@@ -74,7 +74,7 @@ def table(runs: Sequence[ClosedLoopRun]) -> str:
     """Return the runs as a Markdown table, one line per detector, scenario and channel in their order of appearance."""
     titles = ("detector", "scenario", "channel", "collision-free", "95 % interval", "false tracks per minute")
     lines = []
-    for (detector, scenario, channel), mine in grouped(runs, attrgetter("detector", "scenario", "channel")).items():
+    for (detector, scenario, channel), mine in group_by(runs, attrgetter("detector", "scenario", "channel")).items():
         free = wilson(sum(run.collisions == 0 for run in mine), len(mine))
         false = sum(run.false_tracks for run in mine) / len(mine)
         without_cause, brakings = sum(run.without_cause for run in mine), sum(run.brakings for run in mine)

@@ -18,7 +18,7 @@ from rich.console import Console
 from eidrive_reports.driven_runs import CONTACT
 from eidrive_reports.paper import EGO
 from eidrive_reports.planner_scenes import SceneRun, run_of
-from eidrive_reports.studies import command, grouped, markdown_table, publish, study_options
+from eidrive_reports.studies import command, group_by, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings
 
@@ -71,7 +71,7 @@ def table(runs: Sequence[SceneRun]) -> str:
     titles = ("scenario", "senders", "collisions", "arrived", "known after [s]", "time lost [s]")
     lines = []
     before = ""
-    for (scenario, arm), mine in grouped(runs, attrgetter("scenario", "planner")).items():
+    for (scenario, arm), mine in group_by(runs, attrgetter("scenario", "planner")).items():
         free = [run for run in mine if not run.collided]
         cells = (
             "" if scenario == before else f"`{scenario.split('/')[-1]}`",

@@ -21,7 +21,7 @@ import numpy as np
 from rich.console import Console
 
 from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, case_of, jobs_of_file, run_recorded
-from eidrive_reports.studies import command, grouped, markdown_table, positive, publish, study_options
+from eidrive_reports.studies import command, group_by, markdown_table, positive, publish, study_options
 from eidrive_scenario.api.actions import is_agent_controller
 from eidrive_scenario.api.common import Diagnostic, InputError, quoted, registry, suggestion
 from eidrive_scenario.api.experiments import definition
@@ -48,7 +48,7 @@ def table(runs: Iterable[DrivenRun], *, has_reference: bool) -> str:
     """
     lines: list[Sequence[object]] = []
     evaluated = [run for run in runs if not run.excluded]
-    for file, mine in grouped(evaluated, attrgetter("file")).items():
+    for file, mine in group_by(evaluated, attrgetter("file")).items():
         stacks = [run for run in mine if run.arm == STACK]
         errors = sorted({run.error for run in stacks if run.error})
         if errors:

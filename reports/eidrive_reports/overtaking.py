@@ -23,7 +23,7 @@ from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, HARD, STANDING, DrivenMotion
 from eidrive_reports.paper import EGO
-from eidrive_reports.studies import command, grouped, markdown_table, publish, study_options
+from eidrive_reports.studies import command, group_by, markdown_table, publish, study_options
 from eidrive_scenario.api.common import generator, write_atomically
 from eidrive_scenario.api.experiments import Job, run_jobs
 from eidrive_scenario.api.run import RunSettings, Simulation
@@ -316,7 +316,7 @@ def drive_table(runs: Sequence[OvertakingRun]) -> str:
         "hardest braking [m/s²]",
     )
     lines = []
-    for detector, mine in grouped(runs, attrgetter("arm")).items():
+    for detector, mine in group_by(runs, attrgetter("arm")).items():
         cells = (
             f"`{detector}`",
             len(mine),

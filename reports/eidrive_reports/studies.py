@@ -20,7 +20,7 @@ def markdown_table(titles: Sequence[str], lines: Iterable[Iterable[object]]) -> 
     return "".join([header, "|---" * len(titles) + "|\n", *rest])
 
 
-def grouped(runs: Iterable[T], key: Callable[[T], Any]) -> dict[Any, list[T]]:
+def group_by(runs: Iterable[T], key: Callable[[T], Any]) -> dict[Any, list[T]]:
     """Return runs by their key, in the order of the first ones."""
     groups: dict[Any, list[T]] = {}
     for run in runs:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any
 
-from eidrive_reports.studies import grouped
+from eidrive_reports.studies import group_by
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, registry
 from eidrive_scenario.api.experiments import describe_scenarios, library_path, resolve_scenario
 from eidrive_scenario.api.run import RunSettings
@@ -192,7 +192,7 @@ def scenarios_of(texts: Sequence[str]) -> tuple[str, ...]:
     Raise SettingError for an unknown one, or for a file that is not a scenario.
     """
     scenarios: dict[str, None] = {}
-    families = grouped(describe_scenarios(), attrgetter("family"))
+    families = group_by(describe_scenarios(), attrgetter("family"))
     for text in texts:
         if text not in families:
             resolve_scenario(text)

@@ -12,7 +12,7 @@ from operator import itemgetter
 from string import Formatter
 from typing import Any
 
-from eidrive_reports.studies import grouped, markdown_table
+from eidrive_reports.studies import group_by, markdown_table
 
 Row = Mapping[str, Any]
 """Texts, numbers, booleans and None by the name of their field."""
@@ -174,7 +174,7 @@ def limits(rows: Sequence[Row], name: str) -> tuple[list[float], list[float]]:
 
 def groups(rows: Iterable[Row], *names: str) -> dict[Any, list[Row]]:
     """Return rows by the value of a field, or by the tuple of those of several, in the order of their first rows."""
-    return grouped(rows, itemgetter(*names))
+    return group_by(rows, itemgetter(*names))
 
 
 def scenario_title(scenario: str) -> str:

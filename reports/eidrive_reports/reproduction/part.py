@@ -10,7 +10,7 @@ from eidrive_reports.cooperative_perception.receivers import Condition
 from eidrive_reports.reproduction.episodes import Episode, EpisodeJob
 from eidrive_reports.reproduction.layout import PartReport
 from eidrive_reports.reproduction.provenance import job_digest
-from eidrive_reports.studies import grouped
+from eidrive_reports.studies import group_by
 from eidrive_scenario.api.run import RunSettings
 
 
@@ -82,4 +82,4 @@ Runs = Mapping[tuple[str, str], Sequence[Episode]]
 
 def by_case(episodes: Sequence[Episode]) -> Runs:
     """Return the episodes of each case."""
-    return grouped(sorted(episodes, key=attrgetter("seed")), attrgetter("scenario", "arm"))
+    return group_by(sorted(episodes, key=attrgetter("seed")), attrgetter("scenario", "arm"))
