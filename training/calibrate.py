@@ -8,34 +8,28 @@ seem to be a quarter nearer than it is.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array, Bytes
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.learned.detector import LearnedDetector
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.perception.learned.weights import DESCRIPTION
 from eidrive_scenario.sensing.camera import ImageSensor
-from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label, actor_labels
-from training.random_roads import random_place
-from training.random_scene import LanePositions, random_actor
+from training.random_roads import LanePositions, random_place
+from training.random_scene import centered_placement, random_actor, view_of_carrier
 from training.render_data import PER_WORLD
-
-Array = NDArray[np.float64]
+from training.weight_files import update_card, update_description
 
 NEAREST, FARTHEST = 20.0, 110.0
 """Distances of the vehicles from the camera [m]."""
@@ -54,7 +48,7 @@ LEAST = 30
 class Distant(NamedTuple):
     """Image of distant vehicles with their labels."""
 
-    pixels: NDArray[np.uint8]
+    pixels: Bytes
     labels: list[Label]
 
 
@@ -62,41 +56,33 @@ def distant_vehicles(camera: CameraSettings, worlds: int) -> Iterator[Distant]:
     """Yield images of a camera on a car in clear weather, of vehicles ahead on and beside the lanes."""
     for number in range(worlds):
         rng = generator(1, "calibration of edges", number)
-        site = random_place(rng)
-        positions = LanePositions.of(site.roads)
-        with site.world() as world:
+        place = random_place(rng)
+        with place.world() as world:
             world.set_weather(Weather(name="clear"))
             for _ in range(PER_WORLD):
-                yield _image(world, positions, camera, rng)
+                yield _image(world, place.positions, camera, rng)
 
 
 def _image(world: World, positions: LanePositions, camera: CameraSettings, rng: np.random.Generator) -> Distant:
-    for name in list(world.names):
-        world.remove(name)
-    x, y, z, heading = positions.poses[int(rng.choice(np.flatnonzero(positions.kinds == "driving")))].tolist()
+    x, y, z, heading = positions.draw(rng)
     carrier = random_actor(rng, "Carrier", "car")
-    world.add(carrier, _centered(carrier.offset[0], x, y, z, heading))
-    pose = mounting(camera, carrier, "front").camera_pose(world.view(), 0)
+    view = view_of_carrier(world, camera, (carrier, centered_placement(carrier, x, y, z, heading)))
     offset = positions.poses[:, :2] - (x, y)
     distance = np.hypot(*offset.T)
     ahead = offset @ (math.cos(heading), math.sin(heading)) > 0.75 * distance
     rows = np.flatnonzero(ahead & (distance > NEAREST) & (distance < FARTHEST))
     specs = {}
-    taken: list[tuple[float, float]] = []
+    occupied: list[tuple[float, float]] = []
     for row in rng.choice(rows, MOST_VEHICLES).tolist() if len(rows) else ():
         x, y, z, heading = positions.poses[row].tolist()
-        if all(math.hypot(x - a, y - b) >= APART for a, b in taken):
-            taken.append((x, y))
-            spec = random_actor(rng, f"Vehicle{len(taken)}", str(rng.choice(SHAPES)))
+        if all(math.hypot(x - a, y - b) >= APART for a, b in occupied):
+            occupied.append((x, y))
+            spec = random_actor(rng, f"Vehicle{len(occupied)}", str(rng.choice(SHAPES)))
             heading += float(rng.choice([0.0, 0.0, 0.0, math.pi]) + rng.normal(0.0, 0.05))
-            world.add(spec, _centered(spec.offset[0], x, y, z, heading))
+            world.add(spec, centered_placement(spec, x, y, z, heading))
             specs[spec.name] = spec
-    reading = ImageSensor(camera).capture(world, pose, rng)
+    reading = ImageSensor(camera).capture(world, view.pose, rng)
     return Distant(reading.rgb, actor_labels(reading, world.view(), specs, ("Carrier",)))
-
-
-def _centered(ahead: float, x: float, y: float, z: float, heading: float) -> Placement:
-    return Placement(x - math.cos(heading) * ahead, y - math.sin(heading) * ahead, z, heading)
 
 
 def edge_errors(network: ImageNetwork, images: list[Distant]) -> Array:
@@ -145,24 +131,14 @@ def main() -> None:
     images = list(distant_vehicles(camera, options.worlds))
     for name in options.networks:
         path = SHIPPED / f"{name}.npz"
-        write_description(path, outward=[])
+        update_description(path, outward=[])
         errors = edge_errors(build_network(name, LearnedSettings()), images)
         rows = outward_rows(errors)
-        write_description(path, outward=rows)
-        card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-        card["outward"] = {"script": "training/calibrate.py", "boxes": len(errors), "rows": rows}
-        path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+        update_description(path, outward=rows)
+        update_card(path, outward={"script": "training/calibrate.py", "boxes": len(errors), "rows": rows})
         print(f"{name}: {len(errors)} boxes in {len(images)} images")
         for height, *outward in rows:
             print(f"{height:6.1f} px high: {', '.join(f'{value:+.2f}' for value in outward)} px outwards")
-
-
-def write_description(path: Path, **entries: object) -> None:
-    """Set entries of the description in a weight file."""
-    with np.load(path) as stored:
-        arrays = {key: stored[key] for key in stored.files}
-    description = {**json.loads(str(arrays[DESCRIPTION])), **entries}
-    np.savez_compressed(path, **{**arrays, DESCRIPTION: np.array(json.dumps(description))})
 
 
 if __name__ == "__main__":

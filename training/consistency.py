@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
@@ -24,8 +23,6 @@ from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Sen
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label
 from training.scenes import StationScene, random_scenes
-
-Array = NDArray[np.float64]
 
 SENSORS: dict[str, SensorSettings] = {
     "camera": CameraSettings(width=512, height=384),
@@ -51,6 +48,8 @@ def errors(scenes: Iterable[StationScene]) -> dict[tuple[str, str], Array]:
         height, width = camera.rgb.shape[:2]
         boxes = np.array([label.box for label in labels], dtype=float)
         cut = (boxes[:, :2] <= BORDER).any(axis=1) | (boxes[:, 2] >= width - BORDER)
+        complete = [label.visible_pixels >= COMPLETE * label.silhouette_pixels for label in labels]
+        views = np.where(cut, "cut off", np.where(complete, "whole", "hidden")).tolist()
         blurred = np.clip(boxes + rng.normal(0.0, 1.0, boxes.shape), 0.0, (width, height, width, height))
         for sensors, cloud in (("camera and lidar", lidar), ("camera alone", None)):
             lifted = lift(
@@ -64,16 +63,9 @@ def errors(scenes: Iterable[StationScene]) -> dict[tuple[str, str], Array]:
                 surroundings=MapContext(scene.context.roads),
                 pattern=pattern_from_settings(SENSORS["lidar"]),  # type: ignore[arg-type]
             )
-            for index, label in enumerate(labels):
-                off = lifted.boxes[index, :2] - label.world_box[:2]
-                nees = float(off @ np.linalg.solve(lifted.covariance[index], off))
-                view = (
-                    "cut off"
-                    if cut[index]
-                    else "whole"
-                    if label.visible_pixels >= COMPLETE * label.silhouette_pixels
-                    else "hidden"
-                )
+            for label, view, box, covariance in zip(labels, views, lifted.boxes, lifted.covariance, strict=True):
+                off = box[:2] - label.world_box[:2]
+                nees = float(off @ np.linalg.solve(covariance, off))
                 errors_by_view.setdefault((sensors, view), []).append((math.hypot(*off.tolist()), nees))
     return {key: np.array(values) for key, values in errors_by_view.items()}
 
@@ -105,7 +97,7 @@ def main() -> None:
         error, nees = (np.percentile(column, [50, 90]) for column in values.T)
         cells = f"{error[0]:.2f} m | {error[1]:.1f} m | {nees[0]:.2f} | {nees[1]:.1f}"
         lines.append(f"| {sensors} | {view} | {len(values)} | {cells} |")
-    sys.stdout.write("\n".join(lines) + "\n")
+    print("\n".join(lines))
 
 
 if __name__ == "__main__":

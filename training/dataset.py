@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from eidrive_scenario.base.arrays import Bools, Bytes, Integers
 
 IMAGES, LABELS = "pictures.bin", "labels.npz"
 
@@ -44,28 +47,25 @@ class Dataset:
         with np.load(folder / LABELS) as stored:
             return cls(folder, {name: stored[name] for name in stored.files})
 
-    def images(self, rows: Sequence[int] | None = None) -> Iterator[NDArray[np.uint8]]:
-        """Yield the images, red green blue, all or those of `rows`."""
-        begin = self.columns["begin"]
+    def images(self, numbers: Sequence[int]) -> Iterator[Bytes]:
+        """Yield the images with these numbers, red green blue."""
         with (self.folder / IMAGES).open("rb") as stream:
-            for row in range(len(self)) if rows is None else rows:
-                stream.seek(int(begin[row]))
-                yield decode(stream.read(int(begin[row + 1] - begin[row])))
+            for number in numbers:
+                stream.seek(int(self.begin[number]))
+                yield decode(stream.read(int(self.begin[number + 1] - self.begin[number])))
 
-    def objects(self, image: int) -> NDArray[np.int64]:
+    def objects(self, image: int) -> Integers:
         """Return the rows of the objects in an image."""
-        return np.flatnonzero(self.columns["picture"] == image)
+        return np.flatnonzero(self.picture == image)
 
-    def to_find(self) -> NDArray[np.bool_]:
+    def to_find(self) -> Bools:
         """Return whether each object (N,) is required; the others are ignored, detected or not."""
-        enough = shows_enough(self.columns["height"], self.columns["seen"], self.columns["whole"])
-        return np.asarray(enough & self.columns["readable"], dtype=bool)
+        return np.asarray(shows_enough(self.height, self.seen, self.whole) & self.readable)
 
 
-def shows_enough(height: NDArray[Any], visible: NDArray[Any], silhouette: NDArray[Any]) -> NDArray[np.bool_]:
+def shows_enough(height: NDArray[Any], visible: NDArray[Any], silhouette: NDArray[Any]) -> Bools:
     """Return whether objects (N,) are at least 8 pixels high, with 30 pixels and a fifth of the silhouette visible."""
-    enough: NDArray[np.bool_] = (height >= 8.0) & (visible >= 30) & (visible / np.maximum(silhouette, 1) >= 0.2)
-    return enough
+    return np.asarray((height >= 8.0) & (visible >= 30) & (visible / np.maximum(silhouette, 1) >= 0.2))
 
 
 def write(folder: Path, images: Sequence[bytes], columns: dict[str, NDArray[Any]]) -> None:
@@ -78,27 +78,17 @@ def write(folder: Path, images: Sequence[bytes], columns: dict[str, NDArray[Any]
     np.savez_compressed(folder / LABELS, begin=begin, **columns)  # type: ignore[arg-type]
 
 
-def encode(image: NDArray[np.uint8], quality: int) -> bytes:
+def encode(image: Bytes, quality: int) -> bytes:
     """Return an image, red green blue, as WebP."""
-    import cv2
-
-    done, data = cv2.imencode(".webp", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, quality])
+    done, content = cv2.imencode(".webp", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, quality])
     if not done:
         raise ValueError("OpenCV does not support WebP")
-    return bytes(data)
+    return bytes(content)
 
 
-def decode(data: bytes) -> NDArray[np.uint8]:
-    """Return the image of WebP data, by OpenCV, or by Pillow if OpenCV is missing."""
-    try:
-        import cv2
-    except ImportError:
-        import io
-
-        from PIL import Image
-
-        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=np.uint8)
-    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+def decode(content: bytes) -> Bytes:
+    """Return the image of WebP data, red green blue."""
+    image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         raise ValueError("the data is not a WebP image")
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)

@@ -29,17 +29,18 @@ from training.image_evaluation import (
     evaluate_scenes,
     milliseconds,
     parameters,
-    rendered,
 )
 from training.light_scenes import light_scenes
 from training.light_scores import light_table, readings
 from training.misses import misses
 from training.realism import realism_tables
+from training.render_data import rendered
 from training.runtime_scores import runtime_table
 from training.scenes import StationScene, library_scenes, random_scenes
 from training.scoring import EvaluatedImage, Part, score
 from training.sweeps import plot_sweeps, sweeps
 from training.tables import WEATHERS, Table, as_markdown, error_table, tables_of
+from training.weight_files import update_card
 
 DETECTORS: dict[str, type[LearnedDetector]] = {"yolov5": YoloDetector, "ssd": SsdDetector}
 LOW = 0.01
@@ -60,7 +61,7 @@ def evaluate(options: argparse.Namespace) -> None:
     names = [name for name in DETECTORS if (SHIPPED / f"{name}.npz").is_file()]
     networks = {name: build_network(name, LearnedSettings()) for name in names}
     sensitive_networks = {name: build_network(name, LearnedSettings(confidence=LOW)) for name in names}
-    dataset = rendered("held_out", options.data / "held_out", options.seed, options.pictures, options.processes)
+    dataset = rendered(options.data, options.seed, "held_out", options.pictures, options.processes)
     clear = Weather(name="clear")
     fog = load_weather("foggy_morning").model_copy(update={"name": "fog"})
     scenes = list(library_scenes([clear, fog]))
@@ -103,18 +104,16 @@ def _size_and_time(networks: Mapping[str, ImageNetwork], scene: StationScene) ->
 
 def _lifting(of: str, scenes: Sequence[StationScene], names: Sequence[str]) -> list[Table]:
     """Return errors of lifted centers, with and without the lidar."""
-    tables = []
-    for sensors, use_lidar in (("camera and lidar", True), ("camera alone", False)):
-        errors = {name: center_errors(DETECTORS[name], scenes, use_lidar) for name in names}
-        tables.append(error_table(errors, f"{of}, {sensors}"))
-    return tables
+    return [
+        error_table({name: center_errors(DETECTORS[name], scenes, lidar) for name in names}, f"{of}, {sensors}")
+        for sensors, lidar in (("camera and lidar", True), ("camera alone", False))
+    ]
 
 
 def write_report(out: Path, tables: Sequence[Table], curves: Mapping[str, Any]) -> None:
     """Write the report as text and as data, and its curves."""
-    text = as_markdown(tables)
     out.mkdir(parents=True, exist_ok=True)
-    (out / "detection.md").write_text(f"{INTRODUCTION}\n{text}\n", encoding="utf-8")
+    (out / "detection.md").write_text(f"{INTRODUCTION}\n{as_markdown(tables)}\n", encoding="utf-8")
     record: dict[str, Any] = {
         "tables": [{"title": title, "head": head, "rows": rows} for title, head, rows in tables],
         "recall_against_weather": curves,
@@ -126,16 +125,14 @@ def write_report(out: Path, tables: Sequence[Table], curves: Mapping[str, Any]) 
 
 def add_to_metadata(name: str, evaluated: Sequence[EvaluatedImage], pictures: int) -> None:
     """Write the results on the held-out images into the metadata of the shipped weights."""
-    path = SHIPPED / f"{name}.json"
-    metadata = json.loads(path.read_text(encoding="utf-8"))
-    metadata["held_out"] = {"script": "training/evaluate.py", "images": pictures}
-    for weather in WEATHERS:
-        part = Part(VEHICLES, farthest=40.0, height=15.0, weather=weather)
-        metadata["held_out"][f"vehicles_within_40_m_ap50_{weather}"] = round(score(evaluated, part).precision, 4)
-    for each in IMAGE_CLASSES:
-        precision = score(evaluated, Part((each,), weather="clear")).precision
-        metadata["held_out"][f"{each.replace(' ', '_')}_ap50_clear"] = round(precision, 4)
-    path.write_text(json.dumps(metadata, indent=1) + "\n", encoding="utf-8")
+    parts = {
+        f"vehicles_within_40_m_ap50_{weather}": Part(VEHICLES, farthest=40.0, height=15.0, weather=weather)
+        for weather in WEATHERS
+    }
+    parts |= {f"{each.replace(' ', '_')}_ap50_clear": Part((each,), weather="clear") for each in IMAGE_CLASSES}
+    precisions = {key: round(score(evaluated, part).precision, 4) for key, part in parts.items()}
+    held_out = {"script": "training/evaluate.py", "images": pictures, **precisions}
+    update_card(SHIPPED / f"{name}.npz", held_out=held_out)
 
 
 def main() -> None:

@@ -7,34 +7,19 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array, Bytes
 from eidrive_scenario.perception.learned.detector import LearnedDetector
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES, ImageNetwork
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from training.dataset import Dataset, shows_enough, write
+from eidrive_scenario.sensing.readings import Readings
+from training.dataset import Dataset, shows_enough
 from training.labels import Label
-from training.render_data import PER_WORLD, Shot, render, table
 from training.scenes import StationScene
 from training.scoring import EvaluatedImage, Objects
 
-Array = NDArray[np.float64]
-
 MATCHED_WITHIN = 4.0
 """Maximum distance of a lifted box from the center of its object [m]."""
-
-
-def rendered(split: str, folder: Path, seed: int, images: int, processes: int) -> Dataset:
-    """Return the images of a split, rendered if they are missing."""
-    if not (folder / "labels.npz").is_file():
-        shots: list[Shot] = []
-        worlds = -(-images // PER_WORLD)
-        for number, world_shots in enumerate(render(seed, split, worlds, 0, processes)):
-            shots += world_shots
-            print(f"\rrendering images of {split}: {(number + 1) * PER_WORLD}/{worlds * PER_WORLD}", end="", flush=True)
-        print()
-        write(folder, [entry.data for entry in shots], table(shots))
-    return Dataset.load(folder)
 
 
 def evaluate_dataset(
@@ -59,28 +44,25 @@ def evaluate_dataset(
 
 def evaluate_scenes(network: ImageNetwork, scenes: Sequence[StationScene], confidence: float) -> list[EvaluatedImage]:
     """Return the detections of a network in scenes."""
-    return [
-        EvaluatedImage(
-            objects_of(scene.labels), network.find(scene.readings.cameras["camera"].rgb), scene.weather, confidence
-        )
-        for scene in scenes
-    ]
+    evaluated = []
+    for scene in scenes:
+        detections = network.find(scene.readings.cameras["camera"].rgb)
+        evaluated.append(EvaluatedImage(objects_of(scene.labels), detections, scene.weather, confidence))
+    return evaluated
 
 
 def objects_of(labels: Sequence[Label]) -> Objects:
     """Return the objects of the labels of one image."""
     boxes = np.array([label.box for label in labels], dtype=float).reshape(-1, 4)
     height = boxes[:, 3] - boxes[:, 1]
-    visible_pixels, silhouette_pixels = (
-        np.array([getattr(label, key) for label in labels], dtype=float)
-        for key in ("visible_pixels", "silhouette_pixels")
-    )
+    visible = np.array([label.visible_pixels for label in labels], dtype=float)
+    silhouette = np.array([label.silhouette_pixels for label in labels], dtype=float)
     return Objects(
         boxes=boxes,
         names=tuple(IMAGE_CLASSES[label.number] for label in labels),
         height=height,
         distance=np.array([label.distance for label in labels], dtype=float),
-        to_find=shows_enough(height, visible_pixels, silhouette_pixels),
+        to_find=shows_enough(height, visible, silhouette),
     )
 
 
@@ -91,31 +73,28 @@ def center_errors(kind: type[LearnedDetector], scenes: Iterable[StationScene], u
     for scene in scenes:
         readings = scene.readings
         if not use_lidar:
-            readings = type(readings)(readings.time, readings.ego, cameras=readings.cameras)
+            readings = Readings(readings.time, readings.ego, cameras=readings.cameras)
         detector.setup(scene.context)
         detections = detector.detect(readings)
-        objects = objects_of(scene.labels)
         vehicles = [
             label
-            for label, enough in zip(scene.labels, objects.to_find, strict=True)
+            for label, enough in zip(scene.labels, objects_of(scene.labels).to_find, strict=True)
             if enough and IMAGE_CLASSES[label.number] in VEHICLES
         ]
         centers = np.array([label.world_box[:2] for label in vehicles], dtype=float).reshape(-1, 2)
-        free = np.ones(len(vehicles), dtype=bool)
         for detection in np.argsort(-detections.scores, kind="stable"):
             distances = np.linalg.norm(centers - detections.boxes[detection, :2], axis=1)
-            distances[~free] = np.inf
-            if len(distances) and distances.min() <= MATCHED_WITHIN:
+            if distances.min(initial=np.inf) <= MATCHED_WITHIN:
                 nearest = int(np.argmin(distances))
-                free[nearest] = False
                 errors.append((vehicles[nearest].distance, float(distances[nearest])))
+                centers[nearest] = np.inf  # each vehicle is matched once
     return np.array(errors).reshape(-1, 2)
 
 
-def milliseconds(network: ImageNetwork, image: NDArray[np.uint8], repeats: int = 40) -> float:
+def milliseconds(network: ImageNetwork, image: Bytes) -> float:
     """Return the minimum processor time for one image [ms], which excludes the load of the machine."""
     times = []
-    for _ in range(repeats):
+    for _ in range(40):
         started = time.process_time()
         network.find(image)
         times.append(time.process_time() - started)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, STOP_SIGN
 from eidrive_scenario.rendering.meshes import actor_mesh
@@ -21,8 +22,6 @@ from eidrive_scenario.world.camera import FIRST_SIGNAL_LABEL
 from eidrive_scenario.world.road_objects import SignalHead
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
-
-Array = NDArray[np.float64]
 
 NEAREST = 0.3
 """Distance to the camera below which bodies are labeled without a silhouette [m]."""
@@ -57,30 +56,25 @@ def actor_labels(
 ) -> list[Label]:
     """Return the visible actors of the image classes, except those in `skip`."""
     skipped = set(skip)
-    segmentation = reading.segmentation
-    counts = np.bincount(segmentation[segmentation >= 0], minlength=len(view.names))
     labels = []
-    for index in np.flatnonzero(counts).tolist():
+    for index in np.unique(reading.segmentation[reading.segmentation >= 0]).tolist():
         name = view.categories[index].replace("van", "car")  # the networks do not distinguish them
         if view.names[index] in skipped or name not in IMAGE_CLASSES:
             continue
-        lines, columns = np.nonzero(segmentation == index)
-        box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
-        visible_pixels = int(counts[index])
-        silhouette_pixels = silhouette(reading, view, index, specs[view.names[index]])
+        box, visible_pixels = _extent(reading, index)
+        silhouette_pixels = max(silhouette(reading, view, index, specs[view.names[index]]), visible_pixels)
         world_box = view.boxes[index]
         distance = float(np.linalg.norm(world_box[:3] - reading.pose[:3, 3]))
-        labels.append(
-            Label(
-                IMAGE_CLASSES.index(name),
-                box,
-                visible_pixels,
-                max(silhouette_pixels or visible_pixels, visible_pixels),
-                distance,
-                tuple(world_box.tolist()),
-            )
-        )
+        number, body = IMAGE_CLASSES.index(name), tuple(world_box.tolist())
+        labels.append(Label(number, box, visible_pixels, silhouette_pixels, distance, body))
     return labels
+
+
+def _extent(reading: CameraReading, label: int) -> tuple[tuple[float, float, float, float], int]:
+    """Return the box x1 y1 x2 y2 [px] around the pixels with this label of the segmentation, and their number."""
+    lines, columns = np.nonzero(reading.segmentation == label)
+    box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
+    return box, len(lines)
 
 
 def mark_readable(labels: Iterable[Label], reading: CameraReading, weather: Weather) -> list[Label]:
@@ -95,15 +89,15 @@ def mark_readable(labels: Iterable[Label], reading: CameraReading, weather: Weat
     return marked
 
 
-def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpec) -> int | None:
-    """Return the pixels of the actor without occlusion; None if it extends behind the camera."""
+def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpec) -> int:
+    """Return the pixels of the actor without occlusion; 0 if it extends behind the camera."""
     triangles = np.concatenate(list(actor_mesh(spec).values()))
     body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
     foot = np.array(spec.offset) - (0.0, 0.0, spec.size[2] / 2.0)
     world = view.position[row] + (triangles.reshape(-1, 3) + foot) @ body.T
     points = to_camera(world, reading.pose)
     if points[:, 2].min() < NEAREST:
-        return None
+        return 0
     pixels = project(points, reading).reshape(-1, 3, 2)
     edge_a, edge_b = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
     towards = edge_a[:, 0] * edge_b[:, 1] - edge_a[:, 1] * edge_b[:, 0] < 0.0
@@ -113,10 +107,14 @@ def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpe
     if (high <= low).any():
         return 0
     canvas = np.zeros((high[1] - low[1], high[0] - low[0]), dtype=np.uint8)
-    corners_of_faces = np.rint((pixels[towards] - low - 0.5) * 16.0).clip(-(2**26), 2**26).astype(np.int32)
-    for corners in corners_of_faces:
+    for corners in _sixteenths(pixels[towards] - low):
         cv2.fillConvexPoly(canvas, corners, 1, shift=4)
     return int(canvas.sum())
+
+
+def _sixteenths(corners: NDArray[Any]) -> NDArray[np.int32]:
+    """Return pixel coordinates in sixteenths, from the center of a pixel as OpenCV counts."""
+    return np.rint((corners - 0.5) * 16.0).clip(-(2**26), 2**26).astype(np.int32)
 
 
 def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: Mapping[str, str]) -> list[Label]:
@@ -128,20 +126,18 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
         name = signal_class(head, states.get(head.signal.id, ""))
         if name is None:
             continue
-        lines, columns = np.nonzero(segmentation == number)
-        box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
+        box, visible_pixels = _extent(reading, number)
         pose = head.pose
         corners, center = head_box(head)
         to_camera_center = reading.pose[:3, 3] - center
-        facing = (math.cos(pose.h) * to_camera_center[0] + math.sin(pose.h) * to_camera_center[1]) / float(
-            np.hypot(to_camera_center[0], to_camera_center[1])
-        )
+        towards_camera = math.cos(pose.h) * to_camera_center[0] + math.sin(pose.h) * to_camera_center[1]
+        facing = towards_camera / float(np.hypot(*to_camera_center[:2]))
         labels.append(
             Label(
                 IMAGE_CLASSES.index(name),
                 box,
-                len(lines),
-                max(_outline(reading, corners), len(lines)),
+                visible_pixels,
+                max(_outline(reading, corners), visible_pixels),
                 float(np.linalg.norm(to_camera_center)),
                 (*center.tolist(), 0.0, head.width, head.height, pose.h),
                 readable=facing > LEAST_FACING,
@@ -182,7 +178,7 @@ def _outline(reading: CameraReading, corners: Array) -> int:
         return 0
     hull = cv2.convexHull(project(points, reading).astype(np.float32)).reshape(-1, 2)
     canvas = np.zeros(reading.segmentation.shape, dtype=np.uint8)
-    cv2.fillConvexPoly(canvas, np.rint((hull - 0.5) * 16.0).clip(-(2**26), 2**26).astype(np.int32), 1, shift=4)
+    cv2.fillConvexPoly(canvas, _sixteenths(hull), 1, shift=4)
     return int(canvas.sum())
 
 

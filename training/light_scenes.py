@@ -5,38 +5,33 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from multiprocessing import get_context
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Integers
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading
-from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.road_objects import SignalHead, signal_heads
 from training.dataset import shows_enough
 from training.labels import Label, head_box, mark_readable, signal_labels
-from training.random_roads import Place, random_place
+from training.random_roads import Place, map_worlds, random_place
 from training.random_scene import (
-    LanePositions,
-    View,
+    put,
     random_actor,
     random_appearances,
     random_signals,
     random_traffic,
     random_weather,
     rows_before,
+    view_of_carrier,
 )
-
-Array = NDArray[np.float64]
 
 PER_WORLD = 6
 NEAREST, LEAST_PIXELS = 6.0, 8.0
@@ -73,68 +68,49 @@ class LightScene:
     weather: str
 
 
-def light_scenes(seed: int, split: str, worlds: int, processes: int = 1, first: int = 0) -> Iterator[LightScene]:
-    """Yield images of successive worlds from number `first` on; equal for any number of processes."""
-    tasks = [(seed, split, number) for number in range(first, first + worlds)]
-    if processes == 1:
-        for task in tasks:
-            yield from _scenes(task)
-        return
-    with get_context("spawn").Pool(processes) as pool:
-        for scenes in pool.imap(_scenes, tasks):
-            yield from scenes
+def light_scenes(seed: int, split: str, worlds: int, processes: int) -> Iterator[LightScene]:
+    """Yield images of successive worlds; equal for any number of processes."""
+    for scenes in map_worlds(_scenes, seed, split, worlds, processes):
+        yield from scenes
 
 
-def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
-    cv2.setNumThreads(1)
-    seed, split, number = task
+def _scenes(seed: int, split: str, number: int) -> list[LightScene]:
     rng = generator(seed, "training data", split, number)
     while True:
         place = random_place(rng)
-        positions = LanePositions.of(place.roads)
         heads = signal_heads(place.roads)
-        candidates = [head for head in heads if head.signal.dynamic and len(_before(positions, head, CAMERAS[0]))]
+        candidates = [head for head in heads if head.signal.dynamic and len(_before(place, head, CAMERAS[0]))]
         if candidates:
             break
     with place.world() as world:
-        return [_scene(world, place, positions, heads, candidates, rng) for _ in range(PER_WORLD)]
+        return [_scene(world, place, heads, candidates, rng) for _ in range(PER_WORLD)]
 
 
 def _scene(
-    world: World,
-    place: Place,
-    positions: LanePositions,
-    heads: list[SignalHead],
-    candidates: list[SignalHead],
-    rng: np.random.Generator,
+    world: World, place: Place, heads: list[SignalHead], candidates: list[SignalHead], rng: np.random.Generator
 ) -> LightScene:
-    for name in list(world.names):
-        world.remove(name)
     camera = CAMERAS[int(rng.integers(len(CAMERAS)))]
-    rows = _before(positions, candidates[int(rng.integers(len(candidates)))], camera)
-    x, y, z, heading = positions.poses[int(rng.choice(rows))].tolist()
+    rows = _before(place, candidates[int(rng.integers(len(candidates)))], camera)
+    x, y, z, heading = place.positions.poses[int(rng.choice(rows))].tolist()
     spec = random_actor(rng, "Carrier", "car")
-    heading += float(rng.normal(0.0, 0.05))
-    carrier = (spec, Placement(x, y, z, heading))
-    world.add(*carrier)
-    pose = mounting(camera, spec, "front").camera_pose(world.view(), 0)
-    actors = random_traffic(rng, positions, View(camera, pose, carrier))
-    for other, placement in actors:
-        world.add(other, placement)
+    carrier = (spec, Placement(x, y, z, heading + float(rng.normal(0.0, 0.05))))
+    view = view_of_carrier(world, camera, carrier)
+    actors = [carrier, *random_traffic(rng, place.positions, view)]
+    put(world, actors)
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)
-    world.set_display_state(states, random_appearances(rng, [carrier, *actors], weather))
-    reading = ImageSensor(camera).capture(world, pose, rng, ignore=(spec.name,))
+    world.set_display_state(states, random_appearances(rng, actors, weather))
+    reading = ImageSensor(camera).capture(world, view.pose, rng, ignore=(spec.name,))
     labels = mark_readable(signal_labels(reading, heads, states), reading, weather)
     return LightScene(reading, place.roads, tuple(_lights(reading, heads, labels, states)), weather.name)
 
 
-def _before(positions: LanePositions, head: SignalHead, camera: CameraSettings) -> NDArray[np.int64]:
+def _before(place: Place, head: SignalHead, camera: CameraSettings) -> Integers:
     """Return the lane positions from which a driver approaches this signal, near enough for this camera."""
     focal = camera.width / 2.0 / math.tan(math.radians(camera.fov) / 2.0)
     farthest = focal * USUAL_HEIGHT / LEAST_PIXELS
-    return rows_before(positions, head, nearest=NEAREST, farthest=farthest)
+    return rows_before(place.positions, head, nearest=NEAREST, farthest=farthest)
 
 
 def _lights(
@@ -160,5 +136,5 @@ def _lights(
 
 
 def _shows_enough(label: Label) -> bool:
-    high = np.array([label.box[3] - label.box[1]])
-    return bool(shows_enough(high, np.array([label.visible_pixels]), np.array([label.silhouette_pixels]))[0])
+    height = label.box[3] - label.box[1]
+    return bool(shows_enough(*np.array([height, label.visible_pixels, label.silhouette_pixels])))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy, smooth_l1_loss
 
 from eidrive_scenario.perception.learned.networks import ssd_sizes, yolov5_sizes
@@ -40,10 +41,7 @@ def default_boxes(height: int, width: int) -> Tensor:
         sizes = [(side * math.sqrt(aspect), side / math.sqrt(aspect)) for aspect in ssd_sizes.ASPECTS]
         between = math.sqrt(side * ssd_sizes.SIDES[level + 1])
         sizes.append((between, between))
-        lines, columns = torch.meshgrid(
-            torch.arange(math.ceil(height / stride)), torch.arange(math.ceil(width / stride)), indexing="ij"
-        )
-        centers = (torch.stack([columns, lines], dim=-1).float() + 0.5) * stride
+        centers = (cell_corners(math.ceil(height / stride), math.ceil(width / stride)) + 0.5) * stride
         each = torch.tensor(sizes).expand(*centers.shape[:2], -1, -1)
         boxes.append(torch.cat([centers[:, :, None, :].expand_as(each), each], dim=-1).reshape(-1, 4))
     return torch.cat(boxes)
@@ -84,29 +82,22 @@ def match(targets: Targets, defaults: Tensor) -> tuple[Tensor, Tensor]:
     return row, label
 
 
-class SsdLoss:
-    """Smooth L1 loss of the encoded boxes and cross entropy of the classes, per assigned default box.
+def ssd_loss(outputs: list[Tensor], targets: Targets, defaults: Tensor) -> dict[str, Tensor]:
+    """Return the terms of the loss of outputs of `Ssd` per assigned default box (N, 4): smooth L1 loss of the encoded
+    boxes, and cross entropy of the classes.
 
     Hard negative mining: the cross entropy includes the three background boxes with the largest loss for each assigned
     one.
     """
-
-    def __init__(self, defaults: Tensor) -> None:
-        self._defaults = defaults
-
-    def __call__(self, outputs: list[Tensor], targets: Targets) -> tuple[Tensor, dict[str, float]]:
-        """Return the loss of outputs of `Ssd`, and its terms."""
-        encoded, logits = (output.float() for output in ssd_rows(outputs))
-        row, label = match(targets, self._defaults)
-        positive = label > BACKGROUND
-        count = positive.sum().clamp(min=1)
-        expected = encode(targets.boxes.gather(1, row[..., None].expand(-1, -1, 4)), self._defaults)
-        box_loss = smooth_l1_loss(encoded[positive], expected[positive], reduction="sum") / count
-        each = cross_entropy(logits.flatten(0, 1), label.clamp(min=0).flatten(), reduction="none").view_as(label)
-        hard = hardest(each.detach(), label)
-        class_loss = (each * (positive | hard)).sum() / count
-        parts = {"box": box_loss, "class": class_loss}
-        return box_loss + class_loss, {name: float(value.detach()) for name, value in parts.items()}
+    encoded, logits = (output.float() for output in ssd_rows(outputs))
+    row, label = match(targets, defaults)
+    positive = label > BACKGROUND
+    count = positive.sum().clamp(min=1)
+    expected = encode(targets.boxes.gather(1, row[..., None].expand(-1, -1, 4)), defaults)
+    box_loss = smooth_l1_loss(encoded[positive], expected[positive], reduction="sum") / count
+    each = cross_entropy(logits.flatten(0, 1), label.clamp(min=0).flatten(), reduction="none").view_as(label)
+    hard = hardest(each.detach(), label)
+    return {"box": box_loss, "class": (each * (positive | hard)).sum() / count}
 
 
 def hardest(loss: Tensor, label: Tensor) -> Tensor:
@@ -137,7 +128,7 @@ def state_rare_objects(network: YoloV5) -> None:
         bias[:, 5:] = math.log(0.6 / (classes - 0.99))
 
 
-def cell_corners(height: int, width: int, device: torch.device) -> Tensor:
+def cell_corners(height: int, width: int, device: torch.device | None = None) -> Tensor:
     """Return column and row of each cell as (H, W, 2)."""
     lines, columns = torch.meshgrid(
         torch.arange(height, device=device), torch.arange(width, device=device), indexing="ij"
@@ -177,15 +168,8 @@ def assign(targets: Targets, anchors: Tensor, stride: int, height: int, width: i
     center = boxes[row, :2] / stride
     cell = center.floor()
     beside = torch.where(center - cell < 0.5, -1.0, 1.0)
-    none = torch.zeros_like(cell[:, 0])
-    shifts = torch.stack(
-        [
-            torch.stack([none, none], dim=1),
-            torch.stack([beside[:, 0], none], dim=1),
-            torch.stack([none, beside[:, 1]], dim=1),
-        ]
-    )
-    cells = (cell[None] + shifts).long().reshape(-1, 2)
+    neighbors = beside.new_tensor([[[0.0, 0.0]], [[1.0, 0.0]], [[0.0, 1.0]]])
+    cells = (cell + neighbors * beside).long().reshape(-1, 2)
     row, anchor = row.repeat(3), anchor.repeat(3)
     column, line = cells.unbind(dim=1)
     inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
@@ -193,52 +177,41 @@ def assign(targets: Targets, anchors: Tensor, stride: int, height: int, width: i
     return Assignment(image[row], anchor, line, column, boxes[row], classes[row])
 
 
-class YoloLoss:
-    """CIoU of boxes, binary cross entropy of objectness and classes, each averaged.
+def yolo_loss(outputs: list[Tensor], targets: Targets, anchors: Tensor) -> dict[str, Tensor]:
+    """Return the terms of the loss of outputs of `YoloV5` with anchors (3, A, 2) [px]: CIoU of boxes, and binary cross
+    entropy of objectness and classes, each averaged.
 
     The target objectness of an assigned cell is the CIoU of its box. Cells in ignored objects are excluded.
     """
-
-    def __init__(self, network: YoloV5) -> None:
-        self._anchors = network.anchors
-
-    def __call__(self, outputs: list[Tensor], targets: Targets) -> tuple[Tensor, dict[str, float]]:
-        """Return the loss of outputs of `YoloV5`, and its terms."""
-        device = outputs[0].device
-        box_loss, object_loss, class_loss = (torch.zeros((), device=device) for _ in range(3))
-        assigned = 0
-        for scale, (raw, stride) in enumerate(zip(yolo_cells(outputs), yolov5_sizes.STRIDES, strict=True)):
-            raw = raw.float()
-            height, width = raw.shape[2:4]
-            assignment = assign(targets, self._anchors[scale], stride, height, width)
-            expected = torch.zeros(raw.shape[:4], device=device)
-            count = len(assignment.classes)
-            if count:
-                assigned += count
-                predictions = raw[assignment.image, assignment.anchor, assignment.line, assignment.column]
-                share = predictions[:, :4].sigmoid()
-                cells = torch.stack([assignment.column, assignment.line], dim=1)
-                center = (2.0 * share[:, :2] - 0.5 + cells) * stride
-                size = (2.0 * share[:, 2:]).square() * self._anchors[scale][assignment.anchor]
-                fit = complete_iou(torch.cat([center, size], dim=1), assignment.boxes)
-                box_loss = box_loss + (1.0 - fit).sum()
-                expected.index_put_(
-                    (assignment.image, assignment.anchor, assignment.line, assignment.column),
-                    fit.detach().clamp(min=0.0),
-                )
-                one_hot = torch.zeros_like(predictions[:, 5:])
-                one_hot[torch.arange(count, device=device), assignment.classes] = 1.0
-                class_loss = class_loss + binary_cross_entropy_with_logits(predictions[:, 5:], one_hot, reduction="sum")
-            # Cells in an ignored object do not count.
-            centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
-            free = ~targets.in_ignored(centers).view(-1, 1, height, width)
-            considered = free.expand(-1, yolov5_sizes.ANCHORS_PER_SCALE, -1, -1) | (expected > 0.0)
-            each = binary_cross_entropy_with_logits(raw[..., 4], expected, reduction="none")
-            object_loss = object_loss + SCALE_WEIGHTS[scale] * (each * considered).mean()
-        inverse_count = 1.0 / max(assigned, 1)
-        parts = {
-            "box": BOX_WEIGHT * inverse_count * box_loss,
-            "object": OBJECT_WEIGHT * object_loss,
-            "class": CLASS_WEIGHT * inverse_count * class_loss,
-        }
-        return sum(parts.values(), torch.zeros((), device=device)), {k: float(v.detach()) for k, v in parts.items()}
+    device = outputs[0].device
+    box_loss, object_loss, class_loss = (torch.zeros((), device=device) for _ in range(3))
+    assigned = 0
+    for scale, (raw, stride) in enumerate(zip(yolo_cells(outputs), yolov5_sizes.STRIDES, strict=True)):
+        raw = raw.float()
+        height, width = raw.shape[2:4]
+        assignment = assign(targets, anchors[scale], stride, height, width)
+        assigned += len(assignment.classes)
+        at = (assignment.image, assignment.anchor, assignment.line, assignment.column)
+        predictions = raw[at]
+        share = predictions[:, :4].sigmoid()
+        cells = torch.stack([assignment.column, assignment.line], dim=1)
+        center = (2.0 * share[:, :2] - 0.5 + cells) * stride
+        size = (2.0 * share[:, 2:]).square() * anchors[scale][assignment.anchor]
+        fit = complete_iou(torch.cat([center, size], dim=1), assignment.boxes)
+        box_loss = box_loss + (1.0 - fit).sum()
+        expected = torch.zeros(raw.shape[:4], device=device).index_put_(at, fit.detach().clamp(min=0.0))
+        logits = predictions[:, 5:]
+        one_hot = functional.one_hot(assignment.classes, logits.shape[1]).to(logits)
+        class_loss = class_loss + binary_cross_entropy_with_logits(logits, one_hot, reduction="sum")
+        # Cells in an ignored object do not count.
+        centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
+        free = ~targets.in_ignored(centers).view(-1, 1, height, width)
+        considered = free.expand(-1, yolov5_sizes.ANCHORS_PER_SCALE, -1, -1) | (expected > 0.0)
+        each = binary_cross_entropy_with_logits(raw[..., 4], expected, reduction="none")
+        object_loss = object_loss + SCALE_WEIGHTS[scale] * (each * considered).mean()
+    inverse_count = 1.0 / max(assigned, 1)
+    return {
+        "box": BOX_WEIGHT * inverse_count * box_loss,
+        "object": OBJECT_WEIGHT * object_loss,
+        "class": CLASS_WEIGHT * inverse_count * class_loss,
+    }

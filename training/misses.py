@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.experiments.average_precision import match
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, VEHICLES
 from eidrive_scenario.perception.learned.networks.suppression import overlap
 from training.dataset import Dataset
 from training.scoring import EvaluatedImage
 from training.tables import Table, number
-
-Bools = NDArray[np.bool_]
 
 SMALL = 15.0
 """Height in the image below which a vehicle is small [px]."""
@@ -44,22 +42,22 @@ def misses(evaluated: Mapping[str, list[EvaluatedImage]], dataset: Dataset) -> T
     cause, required = causes(dataset), _required(dataset)
     detected_vehicles = {name: _detected_vehicles(entries, dataset) for name, entries in evaluated.items()}
     rows = []
-    names = (*CAUSES, "none of these")
-    for index, name in enumerate(names):
+    for index, name in enumerate((*CAUSES, "none of these")):
         part = required & (cause == index)
-        rows.append([name, str(int(part.sum()))])
+        cells = [name, str(int(part.sum()))]
         for detected in detected_vehicles.values():
             missed = int((part & ~detected).sum())
             share = missed / max(int((required & ~detected).sum()), 1)
             recall = float(detected[part].mean()) if part.any() else float("nan")
-            rows[-1] += [str(missed), f"{share:.0%}", number(recall)]
+            cells += [str(missed), f"{share:.0%}", number(recall)]
+        rows.append(cells)
     head = ["cause", "vehicles"]
     for name in detected_vehicles:
         head += [f"{name} missed", "of all misses", "recall"]
     return "Held-out images, all weathers: causes of missed vehicles", head, rows
 
 
-def causes(dataset: Dataset) -> NDArray[np.int64]:
+def causes(dataset: Dataset) -> Integers:
     """Return the index (N,) of the first of CAUSES for each object, len(CAUSES) if none applies."""
     contrast = np.exp(-KOSCHMIEDER * dataset.distance / dataset.visual_range[dataset.picture])
     share = dataset.seen / np.maximum(dataset.whole, 1)
@@ -77,7 +75,7 @@ def _required(dataset: Dataset) -> Bools:
     return np.asarray(vehicle & dataset.to_find())
 
 
-def _crowding(dataset: Dataset) -> NDArray[np.float64]:
+def _crowding(dataset: Dataset) -> Array:
     """Return the maximum overlap (N,) of each object with the box of another vehicle."""
     shares = np.zeros(len(dataset.number))
     vehicles = _required(dataset)

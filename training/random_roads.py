@@ -7,14 +7,20 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
+from typing import TypeVar
 
+import cv2
 import numpy as np
 from lxml import etree
+from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model import curves
@@ -26,6 +32,7 @@ from xosc.roads.opendrive import add, add_lane, add_mark, add_road
 from xosc.roads.streets import LANE
 
 Element = etree._Element
+T = TypeVar("T")
 
 LIGHT = ("1000001", "-1", 0.3, 0.86)
 STOP = ("206", "-1", 0.75, 0.75)
@@ -40,6 +47,43 @@ _ROAD_OBJECTS = {
 """Length, width and height of road objects, and their spacing [m]."""
 
 
+LANE_KINDS = ("driving", "parking", "shoulder", "sidewalk")
+"""Types of lanes with traffic; bidirectional ones are driving lanes."""
+STEP = 1.5
+"""Distance between lane positions along the road [m]."""
+
+
+@dataclass(frozen=True)
+class LanePositions:
+    """Lane positions: x y z [m] and driving direction [rad] (N, 4), type of the lane, its width [m]."""
+
+    poses: Array
+    kinds: NDArray[np.str_]
+    widths: Array
+
+    @classmethod
+    def of(cls, roads: RoadNetwork) -> LanePositions:
+        """Return all positions on lanes with traffic that are wide enough."""
+        poses, kinds, widths = [], [], []
+        for road in roads.roads.values():
+            for s in np.arange(STEP / 2, road.length, STEP).tolist():
+                for lane in roads.lane_ids(road.id, s):
+                    kind, width = roads.lane_type(road.id, lane, s), roads.lane_width(road.id, lane, s)
+                    kind = "driving" if kind == "bidirectional" else kind
+                    if kind in LANE_KINDS and width > (0.4 if kind == "shoulder" else 1.2):
+                        pose = roads.lane_pose_at(road.id, lane, s)
+                        turn = 0.0 if roads.driving_direction(road.id, lane) > 0 else math.pi
+                        poses.append((pose.x, pose.y, pose.z, pose.h + turn))
+                        kinds.append(kind)
+                        widths.append(width)
+        return cls(np.array(poses), np.array(kinds), np.array(widths))
+
+    def draw(self, rng: np.random.Generator) -> tuple[float, float, float, float]:
+        """Return x, y, z [m] and direction [rad] of a random position on a driving lane."""
+        x, y, z, heading = self.poses[int(rng.choice(np.flatnonzero(self.kinds == "driving")))].tolist()
+        return x, y, z, heading
+
+
 @dataclass(frozen=True)
 class House:
     """Box beside the road: center [m], length, width, height [m], heading [rad], color."""
@@ -52,9 +96,10 @@ class House:
 
 @dataclass(frozen=True)
 class Place:
-    """Road network and the houses along it."""
+    """Road network, the positions on its lanes, and the houses along it."""
 
     roads: RoadNetwork
+    positions: LanePositions
     houses: tuple[House, ...]
 
     @contextmanager
@@ -70,7 +115,16 @@ def random_place(rng: np.random.Generator) -> Place:
     """Return a place for this generator state."""
     with tempfile.TemporaryDirectory() as folder:
         roads = _random_roads(rng, Path(folder) / "place.xodr")
-    return Place(roads, tuple(random_houses(roads, rng)))
+    return Place(roads, LanePositions.of(roads), tuple(random_houses(roads, rng)))
+
+
+def map_worlds(
+    images: Callable[[int, str, int], list[T]], seed: int, split: str, worlds: int, processes: int, first: int = 0
+) -> Iterator[list[T]]:
+    """Yield the images of successive worlds from number `first` on; equal for any number of processes."""
+    # Each process renders one world: threads of OpenCV would only compete.
+    with get_context("spawn").Pool(processes, cv2.setNumThreads, (1,)) as pool:
+        yield from pool.imap(partial(images, seed, split), range(first, first + worlds))
 
 
 def _random_roads(rng: np.random.Generator, path: Path) -> RoadNetwork:
@@ -271,8 +325,7 @@ def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
     """Write a smooth elevation profile of cubic segments with continuous height and slope."""
     profile = road.find("elevationProfile")
     assert profile is not None
-    for old in list(profile):
-        profile.remove(old)
+    profile.clear()
     height, slope, s = 0.0, 0.0, 0.0
     step = 40.0
     steep = float(rng.choice([0.0, 0.02, 0.06]))
@@ -306,9 +359,9 @@ def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
                 pose = roads.road_pose_at(road.id, min(s + length / 2, road.length), t)
                 if _clear_of_roads(roads, pose.x, pose.y, pose.h, length, depth):
                     tone = rng.uniform(0.25, 0.9)
-                    color = tuple(float(c) for c in (tone * rng.uniform(0.75, 1.1, 3)).clip(0.05, 0.95))
+                    red, green, blue = (tone * rng.uniform(0.75, 1.1, 3)).clip(0.05, 0.95).tolist()
                     center = (pose.x, pose.y, pose.z + height / 2)
-                    houses.append(House(center, (length, depth, height), pose.h, (color[0], color[1], color[2])))
+                    houses.append(House(center, (length, depth, height), pose.h, (red, green, blue)))
                 s += length + gap + rng.uniform(0.0, 10.0)
     return houses
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import overlap, rotation_matrix
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState
 from eidrive_scenario.world.road_objects import SignalHead
 from eidrive_scenario.world.weather import Weather
-
-Array = NDArray[np.float64]
+from training.random_roads import LanePositions
 
 OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Camera axes (x right, y down, z forward) as columns in a frame of x forward, y left, z up."""
@@ -55,32 +57,6 @@ _LIGHTS: Mapping[str, float] = {
 """Probability that a vehicle has a light switched on."""
 _MOTIONS = ("walking", "walking", "standing", "running", "reeling")
 _IMAGE_SIZES = ((640, 480), (800, 600), (640, 384), (960, 540))
-
-
-@dataclass(frozen=True)
-class LanePositions:
-    """Lane positions: x y z [m] and driving direction [rad] (N, 4), type of the lane, its width [m]."""
-
-    poses: Array
-    kinds: NDArray[np.str_]
-    widths: Array
-
-    @classmethod
-    def of(cls, roads: RoadNetwork, step: float = 1.5) -> LanePositions:
-        """Return all positions, every `step` [m] of each lane."""
-        poses, kinds, widths = [], [], []
-        for road in roads.roads.values():
-            for s in np.arange(step / 2, road.length, step).tolist():
-                for lane in roads.lane_ids(road.id, s):
-                    kind, width = roads.lane_type(road.id, lane, s), roads.lane_width(road.id, lane, s)
-                    kind = "driving" if kind == "bidirectional" else kind
-                    if kind in _ON_LANES and width > (0.4 if kind == "shoulder" else 1.2):
-                        pose = roads.lane_pose_at(road.id, lane, s)
-                        turn = 0.0 if roads.driving_direction(road.id, lane) > 0 else math.pi
-                        poses.append((pose.x, pose.y, pose.z, pose.h + turn))
-                        kinds.append(kind)
-                        widths.append(width)
-        return cls(np.array(poses), np.array(kinds), np.array(widths))
 
 
 @dataclass(frozen=True)
@@ -123,8 +99,27 @@ def random_view(rng: np.random.Generator, positions: LanePositions, heads: Seque
     cos, sin = math.cos(heading), math.sin(heading)
     position = (x + cos * mount[0] - sin * mount[1], y + sin * mount[0] + cos * mount[1], z + mount[2])
     pose = _camera_pose(position, heading + lateral, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
+    return View(settings, pose, (spec, centered_placement(spec, x, y, z, heading)))
+
+
+def centered_placement(spec: ActorSpec, x: float, y: float, z: float, heading: float) -> Placement:
+    """Return the placement of a body whose center is above a point; its reference point is at the rear axle."""
     ahead, _, _ = spec.offset
-    return View(settings, pose, (spec, Placement(x - cos * ahead, y - sin * ahead, z, heading)))
+    return Placement(x - math.cos(heading) * ahead, y - math.sin(heading) * ahead, z, heading)
+
+
+def put(world: World, actors: Iterable[tuple[ActorSpec, Placement]]) -> None:
+    """Replace all actors of a world."""
+    for name in world.names:
+        world.remove(name)
+    for spec, placement in actors:
+        world.add(spec, placement)
+
+
+def view_of_carrier(world: World, settings: CameraSettings, carrier: tuple[ActorSpec, Placement]) -> View:
+    """Put a body alone into the world, and return the view of a camera at its front."""
+    put(world, [carrier])
+    return View(settings, mounting(settings, carrier[0], "front").camera_pose(world.view(), 0), carrier)
 
 
 ASIDE = 0.7
@@ -133,7 +128,7 @@ ASIDE = 0.7
 
 def rows_before(
     positions: LanePositions, head: SignalHead, *, nearest: float = 4.0, farthest: float = 30.0
-) -> NDArray[np.int64]:
+) -> Integers:
     """Return the lane positions from which a driver approaches this signal, between two distances ahead [m]."""
     rows = np.flatnonzero(positions.kinds == "driving")
     x, y, heading = positions.poses[rows, 0], positions.poses[rows, 1], positions.poses[rows, 3]
@@ -142,7 +137,7 @@ def rows_before(
     lateral = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
     against = np.cos(heading - head.pose.h) < -0.8
     near = (ahead > nearest) & (ahead < farthest) & (lateral < ASIDE * ahead)
-    return np.asarray(rows[near & against], dtype=np.int64)
+    return np.asarray(rows[near & against])
 
 
 def _roadside(rng: np.random.Generator, positions: LanePositions) -> Array:
@@ -168,8 +163,7 @@ def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
     length, width, height = sizes[int(rng.integers(len(sizes)))]
     scale = rng.uniform(0.93, 1.07, 3) * rng.uniform(0.95, 1.05)
     size = (length * float(scale[0]), width * float(scale[1]), height * float(scale[2]))
-    wheels = shape in _WHEELED
-    wheelbase = 0.58 * size[0] if wheels else 0.0
+    wheelbase = 0.58 * size[0] if shape in _WHEELED else 0.0
     radius = {"motorbike": 0.31, "bicycle": 0.34}.get(shape, 0.33 if size[2] < 2.2 else 0.45)
     color = None
     if rng.random() < 0.6:
@@ -188,9 +182,7 @@ def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
     )
 
 
-def random_traffic(
-    rng: np.random.Generator, positions: LanePositions, view: View, occupied: Sequence[tuple[float, ...]] = ()
-) -> list[tuple[ActorSpec, Placement]]:
+def random_traffic(rng: np.random.Generator, positions: LanePositions, view: View) -> list[tuple[ActorSpec, Placement]]:
     """Return up to 30 actors that do not touch, most of them in front of the camera."""
     axis, origin = view.pose[:3, 2], view.pose[:3, 3]
     away = positions.poses[:, :2] - origin[:2]
@@ -199,9 +191,7 @@ def random_traffic(
     inside = (cosine > math.cos(math.radians(view.settings.fov) / 2)) & (distance > 3.0) & (distance < 95.0)
     weight = np.where(inside, np.exp(-distance / 30.0), 1e-4)
     weight *= np.where(positions.kinds == "driving", 1.0, 0.6)
-    boxes = list(occupied)
-    if view.carrier is not None:
-        boxes.append(_box(*view.carrier))
+    boxes = [] if view.carrier is None else [_box(*view.carrier)]
     actors = []
     for number in range(int(rng.integers(3, 31))):
         index = int(rng.choice(len(weight), p=weight / weight.sum()))
@@ -264,47 +254,38 @@ def _box(spec: ActorSpec, placement: Placement) -> tuple[float, ...]:
 
 def random_weather(rng: np.random.Generator) -> Weather:
     """Return a weather: half of them clear days; otherwise overcast, fog, rain, snow, dusk and night."""
-    kind = str(
-        rng.choice(
-            ["clear", "overcast", "fog", "rain", "snow", "dusk", "night"],
-            p=[0.45, 0.12, 0.14, 0.09, 0.02, 0.06, 0.12],
-        )
-    )
-    azimuth = float(rng.uniform(0.0, 360.0))
-    day = float(rng.uniform(10.0, 75.0))
-    if kind == "clear":
-        return Weather(name=kind, sun_azimuth=azimuth, sun_elevation=day, cloud_cover=float(rng.uniform(0.0, 0.4)))
-    if kind == "overcast":
-        return Weather(
-            name=kind,
-            sun_azimuth=azimuth,
-            sun_elevation=day,
-            cloud_cover=float(rng.uniform(0.7, 1.0)),
-            visual_range=8000.0,
-        )
-    if kind == "fog":
-        return Weather(
-            name=kind,
-            sun_azimuth=azimuth,
-            sun_elevation=float(rng.uniform(3.0, 45.0)),
-            cloud_cover=float(rng.uniform(0.2, 1.0)),
-            visual_range=float(np.exp(rng.uniform(math.log(40.0), math.log(500.0)))),
-            wetness=0.25,
-        )
-    if kind in ("rain", "snow"):
-        return Weather(
-            name=kind,
-            sun_azimuth=azimuth,
-            sun_elevation=day,
-            cloud_cover=1.0,
-            visual_range=float(rng.uniform(1500.0, 6000.0)),
-            precipitation="rain" if kind == "rain" else "snow",
-            precipitation_intensity=float(rng.uniform(2.0, 50.0 if kind == "rain" else 4.0)),
-            wetness=float(rng.uniform(0.3, 0.9)),
-            wind_direction=azimuth,
-            wind_speed=float(rng.uniform(0.0, 12.0)),
-        )
-    if kind == "dusk":
-        return Weather(name=kind, sun_azimuth=azimuth, sun_elevation=float(rng.uniform(-6.0, 8.0)), street_lighting=4.0)
+
+    def uniform(low: float, high: float) -> float:
+        return float(rng.uniform(low, high))
+
+    kinds = ("clear", "overcast", "fog", "rain", "snow", "dusk", "night")
+    kind = str(rng.choice(kinds, p=[0.45, 0.12, 0.14, 0.09, 0.02, 0.06, 0.12]))
+    azimuth, day = uniform(0.0, 360.0), uniform(10.0, 75.0)
+    weather = partial(Weather, name=kind, sun_azimuth=azimuth)
+    match kind:
+        case "clear":
+            return weather(sun_elevation=day, cloud_cover=uniform(0.0, 0.4))
+        case "overcast":
+            return weather(sun_elevation=day, cloud_cover=uniform(0.7, 1.0), visual_range=8000.0)
+        case "fog":
+            return weather(
+                sun_elevation=uniform(3.0, 45.0),
+                cloud_cover=uniform(0.2, 1.0),
+                visual_range=float(np.exp(uniform(math.log(40.0), math.log(500.0)))),
+                wetness=0.25,
+            )
+        case "rain" | "snow":
+            return weather(
+                sun_elevation=day,
+                cloud_cover=1.0,
+                visual_range=uniform(1500.0, 6000.0),
+                precipitation=kind,
+                precipitation_intensity=uniform(2.0, 50.0 if kind == "rain" else 4.0),
+                wetness=uniform(0.3, 0.9),
+                wind_direction=azimuth,
+                wind_speed=uniform(0.0, 12.0),
+            )
+        case "dusk":
+            return weather(sun_elevation=uniform(-6.0, 8.0), street_lighting=4.0)
     lamps = float(rng.choice([0.0, 5.0, 15.0], p=[0.25, 0.5, 0.25]))
-    return Weather(name=kind, sun_azimuth=azimuth, sun_elevation=float(rng.uniform(-50.0, -8.0)), street_lighting=lamps)
+    return weather(sun_elevation=uniform(-50.0, -8.0), street_lighting=lamps)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -48,6 +48,10 @@ class Kind(NamedTuple):
     title: str
     names: tuple[str, ...]
     detected_as: tuple[str, ...]
+
+    def part(self, **limits: Any) -> Part:
+        """Return the objects of these classes within limits of `Part`."""
+        return Part(self.names, detected_as=self.detected_as, **limits)
 
 
 KINDS = (
@@ -87,23 +91,18 @@ def realism_tables(
 
 
 def _by_distance(images: Sequence[EvaluatedImage]) -> Table:
-    rows = []
-    for kind in KINDS:
-        cells = [kind.title]
-        for near, far in DISTANCES:
-            cells += _cells(images, Part(kind.names, near, far, weather="clear", detected_as=kind.detected_as))
-        rows.append(cells)
+    rows = [
+        _row(kind.title, images, [kind.part(nearest=near, farthest=far, weather="clear") for near, far in DISTANCES])
+        for kind in KINDS
+    ]
     head = ["class"] + [f"{what} {near:.0f} to {far:.0f} m" for near, far in DISTANCES for what in ("recall", "n")]
     return "Held-out images, clear: recall of ssd_openimages by class and distance", head, rows
 
 
 def _by_weather(images: Sequence[EvaluatedImage]) -> Table:
-    rows = []
-    for weather in WEATHERS:
-        cells = [weather]
-        for kind in KINDS:
-            cells += _cells(images, Part(kind.names, farthest=30.0, weather=weather, detected_as=kind.detected_as))
-        rows.append(cells)
+    rows = [
+        _row(weather, images, [kind.part(farthest=30.0, weather=weather) for kind in KINDS]) for weather in WEATHERS
+    ]
     head = ["weather"] + [f"{kind.title} {what}" for kind in KINDS for what in ("recall", "n")]
     return "Held-out images: recall of ssd_openimages within 30 m by weather", head, rows
 
@@ -114,11 +113,12 @@ def _by_height(rendered: Sequence[EvaluatedImage], photographs: Mapping[str, lis
     rows = []
     for kind in KINDS:
         for low, high in HEIGHTS:
-            part = Part(kind.names, height=low, max_height=high, detected_as=kind.detected_as)
-            cells = [_cells(images, part) for images in (clear, *photographs.values())]
-            if cells[-1][1] != "0":
+            part = kind.part(height=low, max_height=high)
+            (recall, count), *marked = (_cells(images, part) for images in (clear, *photographs.values()))
+            if marked[-1][1] != "0":
                 heights = f"{low:.0f} px and more" if high == np.inf else f"{low:.0f} to {high:.0f} px"
-                rows.append([f"{kind.title}, {heights}", *cells[0], *(recall for recall, _ in cells[1:]), cells[-1][1]])
+                recalls = [recall for recall, _ in marked]
+                rows.append([f"{kind.title}, {heights}", recall, count, *recalls, marked[-1][1]])
     others = [str(_unmarked(images)) for images in photographs.values()]
     rows.append(["detections of nothing marked", "", "", *others, ""])
     head = ["class and height", "ssd_openimages, rendered", "n", *(f"{name}, photographs" for name in photographs), "n"]
@@ -129,14 +129,18 @@ def _unmarked(images: Sequence[EvaluatedImage]) -> int:
     """Return the number of detections that match no marked object."""
     matched = 0.0
     for kind in KINDS:
-        result = score(images, Part(kind.names, detected_as=kind.detected_as))
-        matched += result.recall * result.objects if result.objects else 0.0
+        of_kind = score(images, kind.part())
+        matched += of_kind.recall * of_kind.objects if of_kind.objects else 0.0
     return sum(len(image.detections) for image in images) - round(matched)
 
 
 def _cells(images: Sequence[EvaluatedImage], part: Part) -> list[str]:
-    result = score(images, part)
-    return [number(result.recall if result.objects else float("nan")), str(result.objects)]
+    scored = score(images, part)
+    return [number(scored.recall if scored.objects else float("nan")), str(scored.objects)]
+
+
+def _row(title: str, images: Sequence[EvaluatedImage], parts: Sequence[Part]) -> list[str]:
+    return [title, *(cell for part in parts for cell in _cells(images, part))]
 
 
 def _at_input_size(image: EvaluatedImage, rows: int) -> EvaluatedImage:

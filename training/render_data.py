@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from rich.progress import Progress
 
@@ -24,12 +21,12 @@ from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.world import World
 from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.weather import Weather
-from training.dataset import encode, write
+from training.dataset import LABELS, Dataset, encode, write
 from training.labels import Label, actor_labels, mark_readable, signal_labels
-from training.random_roads import Place, random_place
+from training.random_roads import Place, map_worlds, random_place
 from training.random_scene import (
-    LanePositions,
     View,
+    put,
     random_appearances,
     random_signals,
     random_traffic,
@@ -57,33 +54,27 @@ def shots(seed: int, split: str, number: int) -> list[Shot]:
     """Return the images of one world."""
     rng = generator(seed, "training data", split, number)
     place = random_place(rng)
-    positions = LanePositions.of(place.roads)
     with place.world() as world:
-        return [shot(world, place, positions, rng) for _ in range(PER_WORLD)]
+        return [shot(world, place, rng) for _ in range(PER_WORLD)]
 
 
-def shot(world: World, place: Place, positions: LanePositions, rng: np.random.Generator) -> Shot:
+def shot(world: World, place: Place, rng: np.random.Generator) -> Shot:
     """Return one image with new traffic; cameras inside a house are drawn again."""
-    for name in list(world.names):
-        world.remove(name)
     heads = signal_heads(place.roads)
-    view = random_view(rng, positions, heads)
+    view = random_view(rng, place.positions, heads)
     while _inside(view, place):
-        view = random_view(rng, positions, heads)
-    actors = random_traffic(rng, positions, view)
-    if view.carrier is not None:
-        actors.append(view.carrier)
-    for spec, placement in actors:
-        world.add(spec, placement)
+        view = random_view(rng, place.positions, heads)
+    carriers = [] if view.carrier is None else [view.carrier]
+    actors = [*random_traffic(rng, place.positions, view), *carriers]
+    put(world, actors)
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)
     world.set_display_state(states, random_appearances(rng, actors, weather))
     reading = ImageSensor(view.settings).capture(world, view.pose, rng)
-    carrier = (view.carrier[0].name,) if view.carrier is not None else ()
-    labels = actor_labels(reading, world.view(), {spec.name: spec for spec, _ in actors}, carrier)
-    labels += signal_labels(reading, heads, states)
-    labels = mark_readable(labels, reading, weather)
+    specs = {spec.name: spec for spec, _ in actors}
+    labels = actor_labels(reading, world.view(), specs, [spec.name for spec, _ in carriers])
+    labels = mark_readable([*labels, *signal_labels(reading, heads, states)], reading, weather)
     settings = view.settings
     camera = (float(settings.width), float(settings.height), settings.fov, float(view.pose[2, 3]))
     return Shot(encode(resized(reading.rgb, STORED), QUALITY), camera, weather, labels)
@@ -124,19 +115,24 @@ def table(images: list[Shot]) -> dict[str, Any]:
     }
 
 
-def _shots(task: tuple[int, str, int]) -> list[Shot]:
-    cv2.setNumThreads(1)
-    return shots(*task)
+def render(folder: Path, seed: int, split: str, worlds: int, processes: int, first: int = 0) -> list[Shot]:
+    """Write the images of successive worlds from number `first` on into a folder, and return them."""
+    images: list[Shot] = []
+    with Progress() as progress:
+        bar = progress.add_task(f"rendering {split}", total=worlds)
+        for world_shots in map_worlds(shots, seed, split, worlds, processes, first):
+            images += world_shots
+            progress.advance(bar)
+    write(folder, [image.data for image in images], table(images))
+    return images
 
 
-def render(seed: int, split: str, worlds: int, first: int, processes: int) -> Iterator[list[Shot]]:
-    """Yield the images of successive worlds."""
-    tasks = [(seed, split, number) for number in range(first, first + worlds)]
-    if processes == 1:
-        yield from map(_shots, tasks)
-        return
-    with get_context("spawn").Pool(processes) as pool:
-        yield from pool.imap(_shots, tasks)
+def rendered(data: Path, seed: int, split: str, images: int, processes: int) -> Dataset:
+    """Return the images of a split in a folder of all splits, rendered if they are missing."""
+    folder = data / split
+    if not (folder / LABELS).is_file():
+        render(folder, seed, split, -(-images // PER_WORLD), processes)
+    return Dataset.load(folder)
 
 
 def main() -> None:
@@ -149,13 +145,8 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
     started = time.perf_counter()
-    images: list[Shot] = []
-    with Progress() as progress:
-        bar = progress.add_task(options.split, total=options.worlds)
-        for world_shots in render(options.seed, options.split, options.worlds, options.first, options.processes):
-            images += world_shots
-            progress.advance(bar)
-    write(options.out / options.split, [image.data for image in images], table(images))
+    folder = options.out / options.split
+    images = render(folder, options.seed, options.split, options.worlds, options.processes, options.first)
     size = sum(len(image.data) for image in images) / 2**20
     objects = sum(len(image.labels) for image in images)
     elapsed = time.perf_counter() - started

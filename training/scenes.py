@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.extensions.library import resolve_scenario
@@ -15,17 +13,17 @@ from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
-from eidrive_scenario.sensing.sensor import mounting
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
-from training.random_scene import LanePositions, View, random_actor, random_traffic
+from training.random_scene import put, random_actor, random_traffic, view_of_carrier
 
 LIBRARY = ("coop/scenario_1", "coop/scenario_2")
+SENSORS: dict[str, SensorSettings] = {"camera": CameraSettings(), "lidar": LidarSettings()}
 EVERY = 10
 """Ticks between images of a scenario: half a second."""
 
@@ -44,15 +42,10 @@ class StationScene:
     context: DetectorContext
 
 
-def default_sensors() -> dict[str, SensorSettings]:
-    """Return a camera of 800 x 600 pixels and a lidar, both with default settings."""
-    return {"camera": CameraSettings(), "lidar": LidarSettings()}
-
-
-def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRARY) -> Iterator[StationScene]:
+def library_scenes(weathers: Sequence[Weather]) -> Iterator[StationScene]:
     """Yield the readings of every station of the library scenarios, each half second, in each weather; driven by the
     oracle."""
-    for name in scenarios:
+    for name in LIBRARY:
         for weather in weathers:
             scenario = load_for_seed(resolve_scenario(name), 1, {})
             with Simulation(scenario, seed=1, settings=RunSettings(channel="ideal")) as simulation:
@@ -67,11 +60,10 @@ def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRA
                 while end is None:
                     world.set_weather(weather)
                     if tick % EVERY == 0:
-                        specs = {actor: world.spec(actor) for actor in world.names}
                         for actor in stations:
-                            if actor in specs and actor not in rigs:
-                                rigs[actor] = Rig(specs[actor], default_sensors(), seed=1)
-                        yield from _read(world, rigs, specs, simulation.roads, weather.name)
+                            if actor in world.names and actor not in rigs:
+                                rigs[actor] = Rig(world.spec(actor), SENSORS, seed=1)
+                        yield from _read(world, rigs, simulation.roads, weather.name, SENSORS)
                     _, end = simulation.tick()
                     tick += 1
 
@@ -82,49 +74,31 @@ def random_scenes(
     worlds: int,
     weather: Weather,
     each: int = 2,
-    sensors: Mapping[str, SensorSettings] | None = None,
+    sensors: Mapping[str, SensorSettings] = SENSORS,
 ) -> Iterator[StationScene]:
-    """Yield readings of a car with default sensors, or others named `camera` and `lidar`, in random traffic."""
-    sensors = sensors or default_sensors()
+    """Yield readings of a car with sensors named `camera` and `lidar`, in random traffic."""
     for number in range(worlds):
         rng = generator(seed, "training data", split, number)
         place = random_place(rng)
-        positions = LanePositions.of(place.roads)
         with place.world() as world:
             world.set_weather(weather)
             for _ in range(each):
-                for name in list(world.names):
-                    world.remove(name)
-                spec, placement = _carrier(rng, positions)
-                world.add(spec, placement)
-                pose = mounting(CameraSettings(), spec, "front").camera_pose(world.view(), 0)
-                for other, other_placement in random_traffic(
-                    rng, positions, View(CameraSettings(), pose, (spec, placement))
-                ):
-                    world.add(other, other_placement)
-                specs = {actor: world.spec(actor) for actor in world.names}
-                rig = Rig(spec, dict(sensors), seed=seed)
-                yield from _read(world, {spec.name: rig}, specs, place.roads, weather.name, sensors)
-
-
-def _carrier(rng: np.random.Generator, positions: LanePositions) -> tuple[ActorSpec, Placement]:
-    row = int(rng.choice(np.flatnonzero(positions.kinds == "driving")))
-    x, y, z, heading = positions.poses[row].tolist()
-    return random_actor(rng, "Carrier", "car"), Placement(x, y, z, heading)
+                placement = Placement(*place.positions.draw(rng))
+                carrier = (random_actor(rng, "Carrier", "car"), placement)
+                view = view_of_carrier(world, CameraSettings(), carrier)
+                put(world, [carrier, *random_traffic(rng, place.positions, view)])
+                rig = Rig(carrier[0], sensors, seed=seed)
+                yield from _read(world, {"Carrier": rig}, place.roads, weather.name, sensors)
 
 
 def _read(
-    world: World,
-    rigs: dict[str, Rig],
-    specs: dict[str, ActorSpec],
-    roads: RoadNetwork | None,
-    weather: str,
-    sensors: Mapping[str, SensorSettings] | None = None,
+    world: World, rigs: dict[str, Rig], roads: RoadNetwork | None, weather: str, sensors: Mapping[str, SensorSettings]
 ) -> Iterator[StationScene]:
     view = world.view()
+    specs = {name: world.spec(name) for name in world.names}
     for name, readings in read_all(list(rigs.values()), world, view).items():
         labels = actor_labels(readings.cameras["camera"], view, specs, (name,))
         rows = [row for other, row in view.rows.items() if other != name]
-        context = DetectorContext(specs[name], dict(sensors or default_sensors()), roads, 1)
+        context = DetectorContext(specs[name], dict(sensors), roads, 1)
         categories = tuple(view.categories[row] for row in rows)
         yield StationScene(view.boxes[rows].reshape(-1, 7), categories, readings, labels, weather, context)

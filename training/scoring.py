@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, match, recall_at
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, light_state
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -112,21 +109,13 @@ def as_one_light(images: Sequence[EvaluatedImage]) -> list[EvaluatedImage]:
     def merge_lights(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(LIGHT if light_state(name) else name for name in names)
 
-    return [
-        EvaluatedImage(
-            Objects(
-                image.objects.boxes,
-                merge_lights(image.objects.names),
-                image.objects.height,
-                image.objects.distance,
-                image.objects.to_find,
-            ),
-            ImageDetections(image.detections.boxes, image.detections.scores, merge_lights(image.detections.classes)),
-            image.weather,
-            image.confidence,
-        )
-        for image in images
-    ]
+    merged = []
+    for image in images:
+        objects = replace(image.objects, names=merge_lights(image.objects.names))
+        boxes, scores, classes = image.detections.boxes, image.detections.scores, image.detections.classes
+        detections = ImageDetections(boxes, scores, merge_lights(classes))
+        merged.append(replace(image, objects=objects, detections=detections))
+    return merged
 
 
 ROAD_USERS = IMAGE_CLASSES[:6]

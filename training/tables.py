@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, LIGHT, VEHICLES
 from training.scoring import ROAD_USERS, EvaluatedImage, Part, as_one_light, mean_precision, score
 
-Array = NDArray[np.float64]
 Table = tuple[str, list[str], list[list[str]]]
 """Title, head and rows."""
 
@@ -26,37 +26,28 @@ def number(value: float) -> str:
 def tables_of(evaluated: Mapping[str, list[EvaluatedImage]], of: str) -> list[Table]:
     """Return average precision and recall by weather, class and distance."""
 
-    def row(name: str, part: Part, images: Callable[[str], list[EvaluatedImage]]) -> list[str]:
-        cells = [name]
-        for detector in evaluated:
-            result = score(images(detector), part)
-            cells += [number(result.precision), number(result.recall)]
-        return [*cells, str(result.objects)]
+    def row(name: str, part: Part, by_detector: Mapping[str, list[EvaluatedImage]] = evaluated) -> list[str]:
+        scores = [score(images, part) for images in by_detector.values()]
+        cells = [number(value) for each in scores for value in (each.precision, each.recall)]
+        return [name, *cells, str(scores[-1].objects)]
 
     weathers = sorted({entry.weather for entry in next(iter(evaluated.values()))}, key=WEATHERS.index)
     head = [f"{name} {what}" for name in evaluated for what in ("AP50", "recall")] + ["objects"]
-    everything = evaluated.__getitem__
-    by_weather = [
-        row(weather, Part(VEHICLES, farthest=40.0, height=15.0, weather=weather), everything) for weather in weathers
-    ]
-    by_weather += [
-        row(f"clear, {name} only", Part((name,), farthest=40.0, height=15.0, weather="clear"), everything)
-        for name in VEHICLES
-    ]
+    near = partial(Part, farthest=40.0, height=15.0)
+    by_weather = [row(weather, near(VEHICLES, weather=weather)) for weather in weathers]
+    by_weather += [row(f"clear, {name} only", near((name,), weather="clear")) for name in VEHICLES]
     tables: list[Table] = [(f"{of}: vehicles within 40 m and at least 15 px high", ["weather", *head], by_weather)]
     for weather in [name for name in ("clear", "fog") if name in weathers]:
-        rows = [row(name, Part((name,), weather=weather), everything) for name in IMAGE_CLASSES]
-        lights = {name: as_one_light(entries) for name, entries in evaluated.items()}
-        rows.append(row(f"{LIGHT}, any state", Part((LIGHT,), weather=weather), lights.__getitem__))
-        mean = ["mean of classes"]
-        for entries in evaluated.values():
-            mean += [number(mean_precision(entries, IMAGE_CLASSES, weather)), ""]
-        rows.append([*mean, ""])
+        rows = [row(name, Part((name,), weather=weather)) for name in IMAGE_CLASSES]
+        lights = {name: as_one_light(images) for name, images in evaluated.items()}
+        rows.append(row(f"{LIGHT}, any state", Part((LIGHT,), weather=weather), lights))
+        means = [mean_precision(images, IMAGE_CLASSES, weather) for images in evaluated.values()]
+        rows.append(["mean of classes", *(cell for mean in means for cell in (number(mean), "")), ""])
         tables.append((f"{of}, {weather}: by class", ["class", *head], [r for r in rows if r[-1] != "0"]))
         by_distance = [
-            row(f"{title} {near:.0f} to {far:.0f} m", Part(names, near, far, weather=weather), everything)
+            row(f"{title} {nearest:.0f} to {farthest:.0f} m", Part(names, nearest, farthest, weather=weather))
             for title, names in (("vehicles", VEHICLES), ("others", ROAD_USERS[3:]))
-            for near, far in DISTANCES
+            for nearest, farthest in DISTANCES
         ]
         title = f"{of}, {weather}: road users by distance"
         tables.append((title, ["class and distance", *head], [r for r in by_distance if r[-1] != "0"]))
@@ -83,15 +74,12 @@ def error_table(errors: Mapping[str, Array], of: str) -> Table:
     return f"{of}: error of lifted centers in plan view [m]", ["distance", *head], rows
 
 
-def as_markdown(tables: Sequence[Table], notes: Mapping[str, str] | None = None) -> str:
-    """Return tables as aligned Markdown; `notes` by title are inserted above their table."""
+def as_markdown(tables: Sequence[Table]) -> str:
+    """Return tables as aligned Markdown."""
     lines = []
     for title, head, rows in tables:
         widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
         lines += [f"## {title}", ""]
-        note = (notes or {}).get(title)
-        if note:
-            lines += [note, ""]
         for row in (head, ["-" * width for width in widths], *rows):
             lines.append("| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |")
         lines.append("")

@@ -21,6 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, best_confidence, match
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, suppression_groups
 from eidrive_scenario.perception.learned.networks.ssd import Ssd
@@ -29,11 +30,12 @@ from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5
 from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES, Anchors
 from eidrive_scenario.perception.learned.own_network import ssd_candidates, ssd_scales, yolo_candidates, yolo_scales
 from eidrive_scenario.perception.learned.torch_network import untrained
-from eidrive_scenario.perception.learned.weights import DESCRIPTION, Description
+from eidrive_scenario.perception.learned.weights import Description
 from training.augment import change_colors, transform_images
 from training.boxes import IGNORED, PADDING, Targets, centered
 from training.dataset import Dataset
-from training.losses import SsdLoss, YoloLoss, default_boxes, state_rare_objects
+from training.losses import default_boxes, ssd_loss, state_rare_objects, yolo_loss
+from training.weight_files import write_card, write_weights
 
 INPUT_SIZE = (512, 384)
 MOST_OBJECTS = 48
@@ -51,8 +53,8 @@ class Samples:
     def __init__(self, dataset: Dataset, device: torch.device) -> None:
         width, height = INPUT_SIZE
         images = np.empty((len(dataset), height, width, 3), dtype=np.uint8)
-        for row, image in enumerate(dataset.images()):
-            images[row] = image
+        for number, image in enumerate(dataset.images(range(len(dataset)))):
+            images[number] = image
         boxes = np.zeros((len(dataset), MOST_OBJECTS, 4), dtype=np.float32)
         classes = np.full((len(dataset), MOST_OBJECTS), PADDING, dtype=np.int64)
         to_find = dataset.to_find()
@@ -127,7 +129,7 @@ def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dic
     F1."""
     device = samples.images.device
     groups = suppression_groups(IMAGE_CLASSES)
-    matches: dict[int, list[Matches]] = {number: [] for number in range(len(IMAGE_CLASSES))}
+    matches: list[list[Matches]] = [[] for _ in IMAGE_CLASSES]
     present = np.zeros(len(IMAGE_CLASSES), dtype=np.int64)
     for start in range(0, len(samples), 64):
         pixels = samples.images[start : start + 64].float().div(255.0)
@@ -141,29 +143,28 @@ def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dic
                 candidates = yolo_candidates(anchors, yolo_scales(single), LEAST_CONFIDENCE)
             else:
                 candidates = ssd_candidates(ssd_scales(single), LEAST_CONFIDENCE)
-            b, s, n = candidates.boxes, candidates.scores, candidates.classes
-            best = np.argsort(-s, kind="stable")[:500]
-            b, s, n = b[best], s[best], n[best]
-            kept = suppress(b, s, groups[n], 0.5)
-            b, s, n = b[kept], s[kept], n[kept]
+            best = np.argsort(-candidates.scores, kind="stable")[:500]
+            separate = groups[candidates.classes[best]]
+            best = best[suppress(candidates.boxes[best], candidates.scores[best], separate, 0.5)]
             objects = samples.boxes[start + index].cpu().double().numpy()
             classes = samples.classes[start + index].cpu().numpy()
             for class_number in range(len(IMAGE_CLASSES)):
                 of_class = (classes == class_number) | (classes == IGNORED)
-                ignored: NDArray[np.bool_] = classes[of_class] == IGNORED
+                ignored: Bools = classes[of_class] == IGNORED
                 present[class_number] += int((~ignored).sum())
+                detected = best[candidates.classes[best] == class_number]
                 matches[class_number].append(
-                    match(b[n == class_number], s[n == class_number], objects[of_class], ignored)
+                    match(candidates.boxes[detected], candidates.scores[detected], objects[of_class], ignored)
                 )
-    result = {
+    precisions = {
         name: average_precision(matches[number], int(present[number]))
         for number, name in enumerate(IMAGE_CLASSES)
         if present[number]
     }
-    everything = [entry for entries in matches.values() for entry in entries]
-    any_correct = any(entry.correct.any() for entry in everything)
-    confidence_of_best_f1 = best_confidence(everything, int(present.sum())) if any_correct else Description.confidence
-    return {"mean": float(np.mean(list(result.values()))), **result}, confidence_of_best_f1
+    of_all = [of_image for of_class in matches for of_image in of_class]
+    any_correct = any(of_image.correct.any() for of_image in of_all)
+    confidence = best_confidence(of_all, int(present.sum())) if any_correct else Description.confidence
+    return {"mean": float(np.mean(list(precisions.values()))), **precisions}, confidence
 
 
 def train(options: argparse.Namespace) -> None:
@@ -171,18 +172,16 @@ def train(options: argparse.Namespace) -> None:
     torch.manual_seed(options.seed)
     autocast = device.type == "cuda"
     started = time.perf_counter()
-    dataset = Dataset.load(options.data / "train")
-    samples, checks = (Samples(Dataset.load(options.data / part), device) for part in ("train", "validation"))
+    dataset, validation = (Dataset.load(options.data / split) for split in ("train", "validation"))
+    samples, checks = Samples(dataset, device), Samples(validation, device)
     print(f"{len(samples)} + {len(checks)} images on {device} after {time.perf_counter() - started:.0f} s", flush=True)
     anchors = fit_anchors(dataset, options.seed) if options.network == "yolov5" else None
     description = Description(options.network, IMAGE_CLASSES, INPUT_SIZE, anchors)
     network = untrained(description)
     if isinstance(network, YoloV5):
         state_rare_objects(network)
-    network.to(device)
-    network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     defaults = default_boxes(INPUT_SIZE[1], INPUT_SIZE[0]).to(device)
-    loss_of: Any = YoloLoss(network) if isinstance(network, YoloV5) else SsdLoss(defaults)
     average = Average(network)
     decayed = [value for value in network.parameters() if value.ndim > 1]
     others = [value for value in network.parameters() if value.ndim <= 1]
@@ -192,13 +191,13 @@ def train(options: argparse.Namespace) -> None:
     draws = torch.Generator(device).manual_seed(options.seed)
     per_epoch = len(samples) // options.batch
     steps = per_epoch * options.epochs
-    best, step, epoch = -1.0, 0, 0
+    best, step = -1.0, 0
     start = time.perf_counter()
     limit = options.minutes * 60.0 if options.minutes else math.inf
     for epoch in range(options.epochs):
         network.train()
         order = torch.randperm(len(samples), generator=draws, device=device)
-        sums: dict[str, float] = {}
+        means: dict[str, float] = {}
         for number in range(per_epoch):
             rows = order[number * options.batch : (number + 1) * options.batch]
             pixels = samples.images[rows].float().div_(255.0)
@@ -213,47 +212,44 @@ def train(options: argparse.Namespace) -> None:
                 group["lr"] = learning_rate(int(progress * steps), steps, options.rate)
             with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
                 outputs = network(images.contiguous(memory_format=torch.channels_last))
-            loss, parts = loss_of(outputs, targets)
+            if isinstance(network, YoloV5):
+                terms = yolo_loss(outputs, targets, network.anchors)
+            else:
+                terms = ssd_loss(outputs, targets, defaults)
             optimizer.zero_grad(set_to_none=True)
-            loss.backward()
+            torch.stack(list(terms.values())).sum().backward()  # type: ignore[no-untyped-call]
             nn.utils.clip_grad_norm_(network.parameters(), 10.0)
             optimizer.step()
             average.update(network)
             step += 1
-            for name, value in parts.items():
-                sums[name] = sums.get(name, 0.0) + value / per_epoch
+            for name, term in terms.items():
+                means[name] = means.get(name, 0.0) + float(term.detach()) / per_epoch
         elapsed = time.perf_counter() - start
         is_over = elapsed > limit
-        line = f"epoch {epoch + 1}/{options.epochs} {elapsed:.0f} s " + " ".join(
-            f"{k} {v:.3f}" for k, v in sums.items()
-        )
+        losses = " ".join(f"{name} {mean:.3f}" for name, mean in means.items())
+        line = f"epoch {epoch + 1}/{options.epochs} {elapsed:.0f} s {losses}"
         if is_over or epoch + 1 == options.epochs or (epoch + 1) % options.check == 0:
             results, confidence = scores(average.network, checks, autocast)
             description = replace(description, confidence=round(confidence, 3))
             line += f" | AP50 {results['mean']:.4f}"
             if results["mean"] > best:
                 best = results["mean"]
-                metadata = metadata_of(options, description, results, epoch + 1, elapsed, len(samples), len(checks))
-                options.out.mkdir(parents=True, exist_ok=True)
-                save(options.out / f"{options.network}.npz", average.network, description, metadata)
+                path = options.out / f"{options.network}.npz"
+                write_weights(path, stored_arrays(average.network), asdict(description))
+                write_card(path, card_of(options, description, results, epoch + 1, elapsed, len(samples), len(checks)))
         print(line, flush=True)
         if is_over:
             break
     print(json.dumps(results, indent=1))
 
 
-def save(path: Path, network: nn.Module, description: Description, card: dict[str, Any]) -> None:
-    """Write weights and metadata. Convolutions are stored in half precision, other tensors in single precision."""
-    arrays: dict[str, Any] = {}
-    for name, value in network.state_dict().items():
-        array = value.detach().cpu().numpy()
-        arrays[name] = array.astype(np.float16) if array.ndim == 4 else array
-    arrays[DESCRIPTION] = np.array(json.dumps(asdict(description)))
-    np.savez_compressed(path, **arrays)
-    path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+def stored_arrays(network: nn.Module) -> dict[str, NDArray[Any]]:
+    """Return the weights: convolutions in half precision, other tensors in single precision."""
+    arrays = {name: value.cpu().numpy() for name, value in network.state_dict().items()}
+    return {name: array.astype(np.float16) if array.ndim == 4 else array for name, array in arrays.items()}
 
 
-def metadata_of(
+def card_of(
     options: argparse.Namespace,
     description: Description,
     results: dict[str, float],
@@ -262,8 +258,7 @@ def metadata_of(
     images: int,
     checks: int,
 ) -> dict[str, Any]:
-    """Return the metadata of the weights: their origin, and their results on the validation images."""
-    device = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
+    """Return the card of the weights: their origin, and their results on the validation images."""
     return {
         "network": description.network,
         "classes": list(description.classes),
@@ -284,7 +279,7 @@ def metadata_of(
             "epochs": epochs,
             "batch": options.batch,
             "rate": options.rate,
-            "device": device,
+            "device": torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU",
             "seconds": round(seconds),
         },
         "validation_ap50": {name: round(value, 4) for name, value in results.items()},

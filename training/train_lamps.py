@@ -7,7 +7,6 @@ in which `make eval` reads lights. Writes training/out/lamps.npz and its metadat
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Iterable
 from datetime import date
@@ -16,16 +15,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from eidrive_scenario.base.arrays import Array, Bytes, Floats, Integers
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.perception.learned.lights import CROP, NONE, SHOWN, LightsOnMap, crops
 from training.light_scenes import LightScene, light_scenes
+from training.weight_files import write_card
 
 VERSIONS = 12
 """Number of versions of each light: shifted, scaled, mirrored, with noise and dimmed."""
 EMPTY_PER_IMAGE = 2
+BATCH, RATE = 128, 2e-3
 LEAST_HEIGHT = 5.0
 SHIFT, STRETCH = 0.12, 0.15
 """Standard deviations of the position error of a light, as a share of its height, and of the logarithm of the height.
@@ -35,8 +36,8 @@ SHIFT, STRETCH = 0.12, 0.15
 class Samples(NamedTuple):
     """Image regions (N, 3, 32, 16) and their states (N,)."""
 
-    regions: NDArray[np.float32]
-    states: NDArray[np.int64]
+    regions: Floats
+    states: Integers
 
 
 def samples(scenes: Iterable[LightScene], seed: int) -> Samples:
@@ -69,9 +70,7 @@ def samples(scenes: Iterable[LightScene], seed: int) -> Samples:
     return Samples(stacked, np.array(states, dtype=np.int64))
 
 
-def with_noise(
-    image: NDArray[np.uint8], centers: NDArray[np.float64], heights: NDArray[np.float64], rng: np.random.Generator
-) -> NDArray[np.uint8]:
+def with_noise(image: Bytes, centers: Array, heights: Array, rng: np.random.Generator) -> Bytes:
     """Return the image with weak noise, so that no two regions are equal."""
     left, top = np.floor((centers - 2.0 * heights[:, None]).min(axis=0)).astype(int).clip(0)
     right, bottom = np.ceil((centers + 2.0 * heights[:, None]).max(axis=0)).astype(int).clip(1)
@@ -82,7 +81,7 @@ def with_noise(
 
 
 class Network(nn.Module):
-    """Trainable version of the network of perception/learned/lamps.py."""
+    """Trainable version of `LampNetwork` of perception/learned/lights.py."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -97,7 +96,7 @@ class Network(nn.Module):
         logits: Tensor = self.last(nn.functional.dropout(features, 0.3, self.training))
         return logits
 
-    def weights(self) -> dict[str, NDArray[np.float32]]:
+    def weights(self) -> dict[str, Floats]:
         """Return the weights in the format of `LampNetwork`."""
         names = ("first", "second", "third", "last")
         values = {name: value.detach().numpy() for name, value in self.state_dict().items()}
@@ -105,18 +104,18 @@ class Network(nn.Module):
         return kernels | {f"b{number}": values[f"{name}.bias"] for number, name in enumerate(names)}
 
 
-def fit(data: Samples, seed: int, epochs: int, batch: int = 128, rate: float = 2e-3) -> Network:
+def fit(data: Samples, seed: int, epochs: int) -> Network:
     """Return the network, trained with weights that balance the states."""
     torch.manual_seed(seed)
     network = Network()
     regions, states = torch.from_numpy(data.regions), torch.from_numpy(data.states)
     counts = torch.bincount(states, minlength=len(SHOWN)).float().clamp(min=1.0)
     loss = nn.CrossEntropyLoss(weight=(counts.sum() / counts / len(SHOWN)).sqrt(), label_smoothing=0.02)
-    steps = epochs * -(-len(regions) // batch)
-    optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=1e-2)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
+    steps = epochs * -(-len(regions) // BATCH)
+    optimizer = torch.optim.AdamW(network.parameters(), RATE, weight_decay=1e-2)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
     for _ in range(epochs):
-        for rows in torch.split(torch.randperm(len(regions)), batch):
+        for rows in torch.split(torch.randperm(len(regions)), BATCH):
             gain = 0.7 + 0.6 * torch.rand(len(rows), 3, 1, 1).mean(dim=1, keepdim=True)
             value = loss(network((regions[rows] * gain).clamp(max=1.0)), states[rows])
             optimizer.zero_grad()
@@ -135,17 +134,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("training/out"))
     options = parser.parse_args()
     data = samples(light_scenes(options.seed, "lights train", options.worlds, options.processes), options.seed)
-    train(data, options.seed, options.epochs, options.worlds, options.out)
-
-
-def train(data: Samples, seed: int, epochs: int, worlds: int, out: Path) -> None:
-    """Train on these samples; write the weights and their metadata."""
     started = time.perf_counter()
     torch.set_num_threads(2)
-    network = fit(data, seed, epochs)
-    out.mkdir(parents=True, exist_ok=True)
+    network = fit(data, options.seed, options.epochs)
     counts = np.bincount(data.states, minlength=len(SHOWN))
-    metadata = {
+    card = {
         "network": "lamps",
         "shown": list(SHOWN),
         "input_size": list(CROP),
@@ -153,16 +146,18 @@ def train(data: Samples, seed: int, epochs: int, worlds: int, out: Path) -> None
         "torch": torch.__version__,
         "data": {
             "script": "training/train_lamps.py",
-            "seed": seed,
-            "worlds": worlds,
+            "seed": options.seed,
+            "worlds": options.worlds,
             "versions": dict(zip(SHOWN, counts.tolist(), strict=True)),
         },
-        "training": {"epochs": epochs, "device": "cpu", "seconds": round(time.perf_counter() - started)},
+        "training": {"epochs": options.epochs, "device": "cpu", "seconds": round(time.perf_counter() - started)},
     }
     halves: dict[str, Any] = {name: value.astype(np.float16) for name, value in network.weights().items()}
-    np.savez_compressed(out / "lamps.npz", **halves)
-    (out / "lamps.json").write_text(json.dumps(metadata, indent=1) + "\n", encoding="utf-8")
-    print(f"{len(data.states)} image regions; written: {out / 'lamps.npz'}, .json")
+    path = options.out / "lamps.npz"
+    options.out.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(path, **halves)
+    write_card(path, card)
+    print(f"{len(data.states)} image regions; written: {path}, .json")
 
 
 if __name__ == "__main__":

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.sensing.bodies import body_surfaces
 from eidrive_scenario.world.surfaces import BOX_FACES, box_corners
-from training.random_roads import Place, random_place
-from training.random_scene import LanePositions, random_actor
+from training.random_roads import LANE_KINDS, random_place
+from training.random_scene import random_actor
 
 ASSETS = Path("training/data/pillars_assets.npz")
 SHAPES = {
@@ -23,7 +22,7 @@ MOTIONS = ("walking", "standing", "running", "reeling")
 SEED = 54
 
 
-def write_assets(path: Path, places: int, seed: int = SEED) -> None:
+def write_assets(path: Path, places: int) -> None:
     """Write meshes of random bodies, and lanes and houses of random places.
 
     Bodies: `triangles` (K, 3, 3) in the frame of the box center [m], `reflectivity` (K,), `first` (M + 1,), `sizes`
@@ -31,29 +30,26 @@ def write_assets(path: Path, places: int, seed: int = SEED) -> None:
     The last body is a box of edge length 1. Places: `lanes` (N, 6) x, y, heading, width, kind of the lane, place;
     `houses` (H, 7) x, y, length, width, height, heading, place.
     """
-    rng = np.random.default_rng(seed)
-    triangles, reflectivity, sizes, ahead, shapes, categories = [], [], [], [], [], []
+    rng = np.random.default_rng(SEED)
+    triangles, reflectivity, bodies = [], [], []
     for shape, count in SHAPES.items():
         for number in range(count):
             spec = random_actor(rng, shape, shape)
             surfaces = body_surfaces(spec, MOTIONS[number % len(MOTIONS)] if shape == "pedestrian" else "")
             triangles.append(surfaces.triangles - np.array(spec.offset))
             reflectivity.append(surfaces.reflectivity)
-            sizes.append(spec.size)
-            ahead.append(spec.offset[0])
-            shapes.append(shape)
-            categories.append(spec.category)
+            bodies.append((shape, spec.category, spec.size, spec.offset[0]))
     cube = box_corners(np.array([0.0, 0.0, -0.5, 1.0, 1.0, 1.0, 0.0]))[:, BOX_FACES].reshape(-1, 3, 3)
     triangles.append(cube)
     reflectivity.append(np.full(len(cube), 0.17))
-    sizes.append((1.0, 1.0, 1.0))
-    ahead.append(0.0)
-    shapes.append("unit")
-    categories.append("misc")
+    bodies.append(("unit", "misc", (1.0, 1.0, 1.0), 0.0))
+    shapes, categories, sizes, ahead = zip(*bodies, strict=True)
     lanes, houses = [], []
     for number in range(places):
         place = random_place(rng)
-        lanes.append(_lanes(place, number))
+        kinds = [LANE_KINDS.index(kind) for kind in place.positions.kinds.tolist()]
+        poses = place.positions.poses[:, [0, 1, 3]]
+        lanes.append(np.column_stack([poses, place.positions.widths, kinds, np.full(len(kinds), number)]))
         houses += [(*house.center[:2], *house.size, house.yaw, float(number)) for house in place.houses]
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(
@@ -68,16 +64,6 @@ def write_assets(path: Path, places: int, seed: int = SEED) -> None:
         lanes=np.concatenate(lanes).astype(np.float32),
         houses=np.array(houses, dtype=np.float32).reshape(-1, 7),
     )
-
-
-KINDS = ("driving", "parking", "shoulder", "sidewalk")
-
-
-def _lanes(place: Place, number: int) -> Array:
-    positions = LanePositions.of(place.roads)
-    kinds = [KINDS.index(kind) for kind in positions.kinds.tolist()]
-    columns = [*positions.poses[:, [0, 1, 3]].T, positions.widths, kinds, np.full(len(kinds), number)]
-    return np.stack(columns, axis=1)
 
 
 def main() -> None:

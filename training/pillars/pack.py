@@ -23,14 +23,13 @@ from eidrive_scenario.perception.learned.pillars.codec import CODES, LATENT
 from eidrive_scenario.perception.learned.pillars.detector import PillarDetector, PillarSettings, grid_frame
 from eidrive_scenario.perception.learned.pillars.grid import CELLS, ScanHistory
 from eidrive_scenario.perception.learned.pillars.network import features_onnx
-from eidrive_scenario.perception.learned.weights import DESCRIPTION
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.world.weather import Weather
-from training.calibrate import write_description
 from training.pillars.scenes import CLASSES, LAG
 from training.quantize import layer_ranges
 from training.scenes import StationScene, random_scenes
+from training.weight_files import write_card, write_weights
 
 SENSORS: dict[str, SensorSettings] = {
     "camera": CameraSettings(width=64, height=48),
@@ -113,11 +112,6 @@ def scores(results: list[Measured], overlap: float) -> tuple[float, float]:
     return average_precision(matches, objects), best_confidence(matches, objects)
 
 
-def write(path: Path, arrays: dict[str, Floats], description: dict[str, object]) -> None:
-    """Write a weight file."""
-    np.savez_compressed(path, allow_pickle=False, **arrays, **{DESCRIPTION: np.array(json.dumps(description))})
-
-
 def main() -> None:
     """Write weights and card."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -126,18 +120,17 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=SHIPPED / "pillars.npz")
     options = parser.parse_args()
     with np.load(options.trained) as file:
-        arrays = {name: file[name] for name in file.files}
+        arrays = dict(file)
     description = {"network": "pillars", "classes": CLASSES, "input_size": [CELLS, CELLS], "confidence": 0.3}
     arrays["codebook"] = np.zeros((CODES, LATENT), dtype=np.float32)
-    write(options.out, arrays, description)
+    write_weights(options.out, arrays, description)
     training = list(measured(random_scenes(1, "train", options.places, Weather(), sensors=SENSORS), options.out))
     arrays["codebook"] = codebook(training)
-    write(options.out, arrays, description)
+    write_weights(options.out, arrays, description)
     ranges = layer_ranges(features_onnx(arrays), (scan.grid for scan in training))
-    rounded = {name: np.round(limits, 5).tolist() for name, limits in ranges.items()}
-    _, confidence = scores(training, 0.5)
-    write_description(options.out, ranges=rounded, confidence=round(confidence, 3))
-    card: dict[str, object] = {**description, "confidence": round(confidence, 3), "date": str(date.today())}
+    description["confidence"] = round(scores(training, 0.5)[1], 3)
+    write_weights(options.out, arrays, {**description, "ranges": ranges})
+    card: dict[str, object] = {**description, "date": str(date.today())}
     validation = list(random_scenes(1, "validation", options.places, Weather(), sensors=SENSORS))
     for precision in ("float32", "int8"):
         results = list(measured(iter(validation), options.out, precision))
@@ -150,7 +143,7 @@ def main() -> None:
         path = options.trained.with_name(f"pillars_{stage}.json")
         if path.exists():
             card[stage] = json.loads(path.read_text(encoding="utf-8"))
-    options.out.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
+    write_card(options.out, card)
     print(json.dumps(card, indent=1))
 
 

@@ -62,10 +62,6 @@ class Assets:
                 tuple(houses[houses[:, 6] == place, :6] for place in places),
             )
 
-    def of_shape(self, shape: str) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Return the rows of the bodies of a shape."""
-        return np.flatnonzero(self.shapes == shape)
-
 
 def overlaps(box: Array, boxes: Array) -> bool:
     """Return whether a box (5,) x, y, length, width, heading touches one of boxes (N, 5), by separating axes."""
@@ -93,7 +89,7 @@ class SceneMaker:
 
     def __init__(self, assets: Assets) -> None:
         self._assets = assets
-        self._shapes = {shape: assets.of_shape(shape) for shape in set(assets.shapes.tolist())}
+        self._shapes = {shape: np.flatnonzero(assets.shapes == shape) for shape in set(assets.shapes.tolist())}
 
     def scene(self, rng: np.random.Generator) -> dict[str, Array]:
         """Return a scene.

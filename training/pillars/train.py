@@ -10,10 +10,10 @@ import copy
 import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import torch
@@ -36,7 +36,6 @@ from training.pillars.samples import Batch, Sampler, Targets, targets
 from training.pillars.scans import Meshes
 from training.pillars.scenes import CLASSES, STATIONS, Assets, SceneMaker
 
-F = TypeVar("F", bound=Callable[..., Any])
 RATE = 3e-3
 DECAY = 0.01
 AVERAGE = 0.998
@@ -45,7 +44,7 @@ SHARES = (1.0, 1.0, 0.1, 0.05, 0.02, 0.01)
 """Shares of the cells that senders of a batch send."""
 LARGEST_NOISE = 0.6
 """Largest standard deviation of the pose error of a sender, in meters and in degrees; half of the batches have none."""
-TEST_SEED = 10**6
+TEST_SEED, TEST_BATCHES = 10**6, 12
 _BOX_WEIGHTS = (2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 K = len(CLASSES)
 
@@ -162,10 +161,6 @@ def merged_loss(network: Pillars, features: Tensor, target: Targets) -> Tensor:
     return loss_of(network.head(features), target)
 
 
-def _unchanged(function: F) -> F:
-    return function
-
-
 def train(
     network: Pillars, sampler: Sampler, scenes: Iterator[dict[str, Any]], arguments: argparse.Namespace
 ) -> tuple[Pillars, int]:
@@ -175,13 +170,11 @@ def train(
     average = copy.deepcopy(network).eval()
     parameters = list(network.parameters())
     optimizer = torch.optim.AdamW(parameters, lr=RATE, weight_decay=DECAY, fused=sampler.device_type == "cuda")
-    entries = [
-        pair
-        for pair in zip(average.state_dict().values(), network.state_dict().values(), strict=True)
-        if pair[0].dtype.is_floating_point
-    ]
-    averages, currents = (list(part) for part in zip(*entries, strict=True))
-    compiled = partial(torch.compile, dynamic=False) if arguments.compile else _unchanged
+    averages, currents = (
+        [value for value in module.state_dict().values() if value.dtype.is_floating_point]
+        for module in (average, network)
+    )
+    compiled = partial(torch.compile, dynamic=False, disable=not arguments.compile)
     features_of, own_of = compiled(network.features), compiled(own_loss)
     fused_of, merged_of = compiled(fused_loss), compiled(merged_loss)
     random = np.random.default_rng(arguments.seed + (1 if joint else 0))
@@ -251,12 +244,12 @@ def average_precision(entries: list[tuple[float, bool]], objects: int) -> float:
 
 
 @torch.no_grad()
-def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace, batches: int = 12) -> dict[str, float]:
+def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace) -> dict[str, float]:
     """Return the average precision by distance of centers below 1 m, on scenes that training does not see."""
     maker = SceneMaker(Assets.load(arguments.assets))
     detections: dict[str, list[tuple[float, bool]]] = {}
     objects: dict[str, int] = {}
-    for number in range(batches):
+    for number in range(TEST_BATCHES):
         arrays = maker.batch((TEST_SEED, number), arguments.scenes)
         batch = sampler.batch(arrays, pose_errors(arguments.scenes * STATIONS, 0.0, network.head.weight.device))
         features = network.features(batch.grids)
