@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import get_args
 
-from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, ImageNetwork
+from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES
 from eidrive_scenario.perception.learned.network_loading import build_network, weights_path
 from eidrive_scenario.perception.learned.runtimes import Runtime, is_installed, runtime_versions, runtimes_of
 from eidrive_scenario.perception.learned.settings import LearnedSettings
@@ -26,14 +26,28 @@ def runtime_table(names: Sequence[str], dataset: Dataset, images: int, confidenc
     the fastest installed runtime is the reference.
     """
     count = min(images, len(dataset))
-    rows = [len(dataset) * row // count for row in range(count)]
-    cells = []
+    selected = [len(dataset) * number // count for number in range(count)]
+    rows = []
     for name in names:
-        evaluated = {each: _evaluate_twice(name, *each, dataset, rows, confidence) for each in _installed(name)}
-        scores = {each: _class_scores(images) for each, (images, _) in evaluated.items()}
+        scores: dict[tuple[Runtime, Precision], dict[str, float]] = {}
+        repeats: dict[tuple[Runtime, Precision], bool] = {}
+        for runtime, precision in _installed(name):
+            settings = LearnedSettings(runtime=runtime, precision=precision, confidence=confidence)
+            first, second = (
+                evaluate_dataset(build_network(name, settings), dataset, confidence, selected) for _ in range(2)
+            )
+            parts = {category: score(first, Part((category,))) for category in IMAGE_CLASSES}
+            scores[runtime, precision] = {category: part.precision for category, part in parts.items() if part.objects}
+            repeats[runtime, precision] = list(map(_bits, first)) == list(map(_bits, second))
         reference = scores.get(("torch", "float32")) or next(iter(scores.values()))
-        cells += [_row(name, *each, scores[each], reference, evaluated[each][1]) for each in evaluated]
-    return f"Runtimes: {len(rows)} held-out images", HEAD, cells
+        for (runtime, precision), by_class in scores.items():
+            differences = ((abs(value - reference[category]), category) for category, value in by_class.items())
+            difference, largest = max((pair for pair in differences if pair[0]), default=(0.0, "-"))
+            mean = sum(by_class.values()) / len(by_class) if by_class else float("nan")
+            title = f"{runtime} {' '.join(runtime_versions(runtime).values())}"
+            repeated = "yes" if repeats[runtime, precision] else "no"
+            rows.append([name, title, precision, number(mean), f"{difference:.6f}", largest, repeated])
+    return f"Runtimes: {count} held-out images", HEAD, rows
 
 
 def _installed(name: str) -> list[tuple[Runtime, Precision]]:
@@ -46,46 +60,5 @@ def _installed(name: str) -> list[tuple[Runtime, Precision]]:
     ]
 
 
-def _evaluate_twice(
-    name: str, runtime: Runtime, precision: Precision, dataset: Dataset, rows: Sequence[int], confidence: float
-) -> tuple[list[EvaluatedImage], bool]:
-    """Return the detections in some images, and whether a second network returns equal bits."""
-
-    def network() -> ImageNetwork:
-        return build_network(name, LearnedSettings(runtime=runtime, precision=precision, confidence=confidence))
-
-    first, second = (evaluate_dataset(network(), dataset, confidence, rows) for _ in range(2))
-    return first, all(_bits(a) == _bits(b) for a, b in zip(first, second, strict=True))
-
-
 def _bits(image: EvaluatedImage) -> tuple[bytes, bytes, tuple[str, ...]]:
     return image.detections.boxes.tobytes(), image.detections.scores.tobytes(), image.detections.classes
-
-
-def _class_scores(evaluated: Sequence[EvaluatedImage]) -> dict[str, float]:
-    """Return the average precision of each class with required objects."""
-    parts = {name: score(evaluated, Part((name,))) for name in IMAGE_CLASSES}
-    return {name: part.precision for name, part in parts.items() if part.objects}
-
-
-def _row(
-    name: str,
-    runtime: Runtime,
-    precision: Precision,
-    scores: Mapping[str, float],
-    reference: Mapping[str, float],
-    repeats: bool,
-) -> list[str]:
-    differences = {each: abs(value - reference[each]) for each, value in scores.items()}
-    difference, largest = max(((value, each) for each, value in differences.items() if value), default=(0.0, "-"))
-    mean = sum(scores.values()) / len(scores) if scores else float("nan")
-    version = " ".join(runtime_versions(runtime).values())
-    return [
-        name,
-        f"{runtime} {version}",
-        precision,
-        number(mean),
-        f"{difference:.6f}",
-        largest,
-        "yes" if repeats else "no",
-    ]

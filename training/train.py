@@ -103,26 +103,6 @@ def learning_rate(step: int, steps: int, highest: float) -> float:
     return highest * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * share)))
 
 
-class Average:
-    """Moving average of the weights of a network, with a faster initial phase."""
-
-    def __init__(self, network: YoloV5 | Ssd) -> None:
-        self.network = copy.deepcopy(network).eval().requires_grad_(False)
-        self._values = _float_values(self.network)
-        self._steps = 0
-
-    @torch.no_grad()
-    def update(self, network: nn.Module) -> None:
-        self._steps += 1
-        decay = AVERAGE_DECAY * (1.0 - math.exp(-self._steps / 300.0))
-        torch._foreach_lerp_(self._values, _float_values(network), 1.0 - decay)
-
-
-def _float_values(network: nn.Module) -> list[torch.Tensor]:
-    """Return weights and running statistics without batch counters."""
-    return [value for value in network.state_dict().values() if value.dtype.is_floating_point]
-
-
 @torch.no_grad()
 def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dict[str, float], float]:
     """Return AP at overlap 0.5 of each class, their mean over the classes that occur, and the confidence of the best
@@ -182,7 +162,12 @@ def train(options: argparse.Namespace) -> None:
         state_rare_objects(network)
     network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     defaults = default_boxes(INPUT_SIZE[1], INPUT_SIZE[0]).to(device)
-    average = Average(network)
+    average = copy.deepcopy(network).eval().requires_grad_(False)
+    # Weights and running statistics without batch counters; the optimizer changes them in place.
+    averages, currents = (
+        [value for value in module.state_dict().values() if value.dtype.is_floating_point]
+        for module in (average, network)
+    )
     decayed = [value for value in network.parameters() if value.ndim > 1]
     others = [value for value in network.parameters() if value.ndim <= 1]
     optimizer = torch.optim.AdamW(
@@ -220,8 +205,10 @@ def train(options: argparse.Namespace) -> None:
             torch.stack(list(terms.values())).sum().backward()  # type: ignore[no-untyped-call]
             nn.utils.clip_grad_norm_(network.parameters(), 10.0)
             optimizer.step()
-            average.update(network)
             step += 1
+            with torch.no_grad():
+                decay = AVERAGE_DECAY * (1.0 - math.exp(-step / 300.0))  # small at first
+                torch._foreach_lerp_(averages, currents, 1.0 - decay)
             for name, term in terms.items():
                 means[name] = means.get(name, 0.0) + float(term.detach()) / per_epoch
         elapsed = time.perf_counter() - start
@@ -229,13 +216,13 @@ def train(options: argparse.Namespace) -> None:
         losses = " ".join(f"{name} {mean:.3f}" for name, mean in means.items())
         line = f"epoch {epoch + 1}/{options.epochs} {elapsed:.0f} s {losses}"
         if is_over or epoch + 1 == options.epochs or (epoch + 1) % options.check == 0:
-            results, confidence = scores(average.network, checks, autocast)
+            results, confidence = scores(average, checks, autocast)
             description = replace(description, confidence=round(confidence, 3))
             line += f" | AP50 {results['mean']:.4f}"
             if results["mean"] > best:
                 best = results["mean"]
                 path = options.out / f"{options.network}.npz"
-                write_weights(path, stored_arrays(average.network), asdict(description))
+                write_weights(path, stored_arrays(average), asdict(description))
                 write_card(path, card_of(options, description, results, epoch + 1, elapsed, len(samples), len(checks)))
         print(line, flush=True)
         if is_over:

@@ -82,8 +82,9 @@ def test_grids_of_training_are_those_of_the_engine(samples: Any) -> None:
         grid = history.add(time, [LidarReading(cloud, intensity, pose)], frame, 0.0)
     points, before = (torch.from_numpy(cloud + np.array([0.0, 0.0, 2.0]))[None].float() for cloud in reversed(clouds))
     returned, strength = torch.ones(1, len(intensity), dtype=torch.bool), torch.from_numpy(intensity)[None].float()
-    scans = samples.Scans(points, returned, strength, torch.zeros(1, len(intensity), dtype=torch.int32))
-    trained = samples._grids(points, scans, before, scans)[0].numpy()
+    slots = torch.zeros(1, len(intensity), dtype=torch.int32)
+    now, earlier = (samples.Scans(part, returned, strength, slots) for part in (points, before))
+    trained = samples._grids(now, earlier)[0].numpy()
     different = ~np.isclose(trained, grid.channels, atol=2e-3)
     assert different.mean() < 1e-4, "except points on the border of a cell"
     assert (grid.channels[0] > 0.0).sum() > 400
@@ -99,11 +100,11 @@ def test_merged_points_of_training_are_those_of_early_fusion(samples: Any) -> No
     returned[:, -20:] = False
     slots[:, :2] = 7
     scans = samples.Scans(points, returned, torch.full((3, 400), 0.25), slots)
-    merged, shown = samples._merged(points, scans, center, torch.tensor([7, 1, -1]), torch.zeros(3, 3))
+    shown = samples._merged(scans, center, torch.tensor([7, 1, -1]), torch.zeros(3, 3))
     sent = [compress(world[station, 2:-20].astype(np.float32).astype(float), 0.0, 0.1).points() for station in (1, 2)]
     own = shown.intensity == 0.25
-    np.testing.assert_allclose(merged[own & shown.returned].numpy(), world[0, :-20], atol=1e-5)
-    received = merged[~own & shown.returned].numpy()
+    np.testing.assert_allclose(shown.points[own & shown.returned].numpy(), world[0, :-20], atol=1e-5)
+    received = shown.points[~own & shown.returned].numpy()
     assert (shown.intensity[~own] == 1.0).all()
     assert len(received) == sum(map(len, sent))
     np.testing.assert_allclose(np.sort(received.sum(axis=1)), np.sort(np.concatenate(sent).sum(axis=1)), atol=1e-4)

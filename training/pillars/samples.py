@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -90,8 +90,8 @@ class Sampler:
         phase = (torch.rand(len(position), 2, device=self._device) - 0.5) * STRIDE_SIDE
         center = position[:, :2] + phase
         placed = _placed(now, position, scene["yaw"], center), _placed(earlier, before, scene["yaw"], center)
-        grids = _grids(placed[0], now, placed[1], earlier)
-        merged = _grids(*_merged(placed[0], now, center, own, noise), *_merged(placed[1], earlier, center, own, noise))
+        grids = _grids(*placed)
+        merged = _grids(*(_merged(scans, center, own, noise) for scans in placed))
         has_earlier_scan = torch.rand(len(position), device=self._device) < 0.9  # the earlier scan is sometimes missing
         grids[:, 8:] *= has_earlier_scan[:, None, None, None]
         merged[:, 8:] *= has_earlier_scan[: len(noise) : STATIONS, None, None, None]
@@ -121,35 +121,36 @@ def _turn(scene: dict[str, Tensor]) -> None:
     scene["yaw"] += angle[:, None]
 
 
-def _placed(scans: Scans, position: Tensor, yaw: Tensor, center: Tensor) -> Tensor:
-    """Return the points (N, M, 3) relative to the center of the grid and the ground."""
+def _placed(scans: Scans, position: Tensor, yaw: Tensor, center: Tensor) -> Scans:
+    """Return the scans with points (N, M, 3) relative to the center of the grid and the ground."""
     yaw = yaw.flatten()[:, None]
     cos, sin = torch.cos(yaw), torch.sin(yaw)
     x, y, z = scans.points.unbind(2)
     shift = (position[:, :2] - center)[:, None]
     height = z + position[:, 2:3] + GROUND_NOISE * torch.randn(len(position), 1, device=z.device)
-    return torch.stack([cos * x - sin * y + shift[..., 0], sin * x + cos * y + shift[..., 1], height], dim=2)
+    points = torch.stack([cos * x - sin * y + shift[..., 0], sin * x + cos * y + shift[..., 1], height], dim=2)
+    return replace(scans, points=points)
 
 
-def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Tensor) -> tuple[Tensor, Scans]:
-    """Return the points (P, STATIONS · M, 3) of all stations of the first P scenes in the grids of the first stations,
-    and their returns, with pose errors (P · STATIONS, 3).
+def _merged(scans: Scans, center: Tensor, own: Tensor, noise: Tensor) -> Scans:
+    """Return scans of P · STATIONS rays with the points of all stations of the first P scenes in the grids of the first
+    stations, with pose errors (P · STATIONS, 3).
 
     Points of the others are those of the message: centers of occupied cells, each once, with the intensity 1, without
     those on the body of the receiver.
     """
-    number, rays = len(noise), points.shape[1]
-    points, center = points[:number], center[:number]
+    number, rays = len(noise), scans.points.shape[1]
     scans = Scans(*(part[:number] for part in (scans.points, scans.returned, scans.intensity, scans.hit_slots)))
-    stations = torch.arange(number, device=points.device)
+    center = center[:number]
+    stations = torch.arange(number, device=center.device)
     receiver = stations // STATIONS * STATIONS
     cos, sin = torch.cos(noise[:, 2:3]), torch.sin(noise[:, 2:3])
-    x, y, height = points.unbind(2)
+    x, y, height = scans.points.unbind(2)
     shift = center + noise[:, :2] - center[receiver]
     apart = torch.stack([cos * x - sin * y + shift[:, :1], sin * x + cos * y + shift[:, 1:], height], dim=2)
     cells = torch.floor(apart / SHARED_CELL)
     mine = (stations == receiver)[:, None]
-    apart = torch.where(mine[..., None], points, (cells + 0.5) * SHARED_CELL)
+    apart = torch.where(mine[..., None], scans.points, (cells + 0.5) * SHARED_CELL)
     # One number per station and cell; the first point of equal ones remains.
     i, j, k = (cells.long() + 4096).clamp(0, 8191).unbind(2)
     key = ((stations[:, None] * 8192 + i) * 8192 + j) * 8192 + k
@@ -162,15 +163,14 @@ def _merged(points: Tensor, scans: Scans, center: Tensor, own: Tensor, noise: Te
     returned = scans.returned & (mine | ~(repeated | on_receiver))
     intensity = torch.where(mine, scans.intensity, 1.0)
     size = number // STATIONS, STATIONS * rays
-    return apart.reshape(*size, 3), Scans(
-        apart.reshape(*size, 3), returned.reshape(size), intensity.reshape(size), scans.hit_slots.reshape(size)
-    )
+    parts = returned, intensity, scans.hit_slots
+    return Scans(apart.reshape(*size, 3), *(part.reshape(size) for part in parts))
 
 
-def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor:
+def _grids(now: Scans, earlier: Scans) -> Tensor:
     """Return the input of the network (N, 12, 256, 256), with the channels of a cell side by side in memory."""
-    number = len(points)
-    cell, values = _in_cells(points, now.returned, now.intensity)
+    number = len(now.points)
+    cell, values = _in_cells(now)
     ground = values[:, 0] <= CLEARANCE
     below = _sums(number, torch.where(ground, cell, _outside(cell, number)), torch.ones_like(values[:, :1]))[:, 0]
     cell = torch.where(ground, _outside(cell, number), cell)
@@ -179,7 +179,7 @@ def _grids(points: Tensor, now: Scans, before: Tensor, earlier: Scans) -> Tensor
     height, x, y, intensity = means.unbind(1)
     channels = [torch.log1p(count) / 3.0, high / 4.0, torch.where(count > 0.0, low, 0.0) / 4.0, height / 4.0,
                 intensity, x, y, torch.log1p(below) / 3.0]  # fmt: skip
-    cell, values = _in_cells(before, earlier.returned, earlier.intensity)
+    cell, values = _in_cells(earlier)
     cell = torch.where(values[:, 0] <= CLEARANCE, _outside(cell, number), cell)
     count, high, means = _statistics(number, cell, values)
     _, x, y, _ = means.unbind(1)
@@ -196,19 +196,19 @@ def _outside(cell: Tensor, number: int) -> Tensor:
     return torch.arange(len(cell), device=cell.device) % CELLS**2 + number * CELLS**2
 
 
-def _in_cells(points: Tensor, returned: Tensor, intensity: Tensor) -> tuple[Tensor, Tensor]:
+def _in_cells(scans: Scans) -> tuple[Tensor, Tensor]:
     """Return the cells (P,) of the points of N scans in (N, 256, 256), and their height, offset from the center of the
     cell along x and y, and intensity (P, 4).
     """
-    number = len(returned)
+    points, number = scans.points, len(scans.points)
     coordinates = (points[..., :2] + REACH) / SIDE
     index = torch.floor(coordinates)
-    inside = returned & ((index >= 0) & (index < CELLS)).all(dim=2) & (points[..., 2] < TALLEST)
+    inside = scans.returned & ((index >= 0) & (index < CELLS)).all(dim=2) & (points[..., 2] < TALLEST)
     scan = torch.arange(number, device=points.device)[:, None]
     cell = ((scan * CELLS + index[..., 0].long()) * CELLS + index[..., 1].long()).flatten()
     cell = torch.where(inside.flatten(), cell, _outside(cell, number))
     offset = coordinates - index - 0.5
-    return cell, torch.stack([points[..., 2], offset[..., 0], offset[..., 1], intensity], dim=2).reshape(-1, 4)
+    return cell, torch.stack([points[..., 2], offset[..., 0], offset[..., 1], scans.intensity], dim=2).reshape(-1, 4)
 
 
 def _sums(number: int, cell: Tensor, values: Tensor) -> Tensor:
