@@ -48,14 +48,14 @@ class ActionDecoder:
 
         Raise SettingError if the space does not contain the action.
         """
+        kinds = [action.kind for action in self._actions]
+        if len(kinds) == 1:
+            return self._decode(self._actions[0], given, perceived, OWN_DECISIONS)
+        if not isinstance(given, Mapping) or given.keys() != set(kinds):
+            raise _outside(given, f"a mapping with the keys {', '.join(kinds)}")
         decided = OWN_DECISIONS
         for action in self._actions:
-            decision = given
-            if len(self._actions) > 1:
-                if not isinstance(given, Mapping) or given.keys() != {each.kind for each in self._actions}:
-                    raise _outside(given, "a mapping with the keys " + ", ".join(each.kind for each in self._actions))
-                decision = given[action.kind]
-            decided = self._decode(action, decision, perceived, decided)
+            decided = self._decode(action, given[action.kind], perceived, decided)
         return decided
 
     def _decode(
@@ -69,16 +69,15 @@ class ActionDecoder:
             steering = wheel * self._max_steering
             return replace(decided, control=Control(max(pedal, 0.0), max(-pedal, 0.0), steering))
         if isinstance(action, MetaSpeed):
-            last = len(action.speeds) - 1
             if action.relative:
-                self._level = min(max(self._level + _index(given, 3) - 1, 0), last)
+                self._level = min(max(self._level + _index(given, 3) - 1, 0), len(action.speeds) - 1)
             else:
-                self._level = _index(given, last + 1)
+                self._level = _index(given, len(action.speeds))
             return replace(decided, target_speed=action.speeds[self._level])
         if isinstance(action, SendMessages):
             return replace(decided, send=bool(_index(given, 2)))
         mask = _mask(given, action.count)
-        rows = nearest_rows(perceived.detections, perceived.ego)[: action.count]
+        rows = nearest_rows(perceived.detections, perceived.ego)
         shared = tuple(row for row, chosen in zip(rows, mask, strict=False) if chosen)
         return replace(decided, send=bool(mask.any()), share=shared)
 

@@ -131,7 +131,15 @@ class ScenarioEnvironment:
         self._colliding = [name for name in names if terminate_on_collision and name in drivers]
         self._new_episode(DEFAULT_SEED, self._settings, load_weights=False).close()
         self.render_mode = render_mode
-        self._renderer = build_renderer(render_mode, render, names[0])
+        pictures = parse_mapping(RenderSettings, render, "render")
+        self._renderer: Renderer | None = None
+        if render_mode is not None:
+            if render_mode not in RENDER_MODES:
+                hint = f"give {' or '.join(RENDER_MODES)}, or None"
+                raise SettingError(Diagnostic(f"render_mode is {quoted(render_mode)}", hint))
+            from eidrive_scenario.gym.rendering import Renderer  # imports OpenCV
+
+            self._renderer = Renderer(names[0], pictures)
         self.metadata = {**self.metadata, "render_fps": 1.0 / (self._settings.dt * ticks_per_step)}
         self._episode: Episode | None = None
         self.agents = []
@@ -148,13 +156,16 @@ class ScenarioEnvironment:
             load_weights=load_weights,
         )
 
-    def _start(self, drawn_seed: int, options: Mapping[str, Any] | None) -> Episode:
-        """Start an episode at the first tick in which a controlled station is present, or that has ended.
+    def _start(
+        self, drawn_seed: int, options: Mapping[str, Any] | None, absent: Diagnostic
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start an episode at the first tick in which a controlled station is present.
 
         drawn_seed  seed of the run, unless the options contain one
+        absent      error if no controlled station is ever present
 
-        The steps are counted from that tick on. Raise SettingError for unknown options, and for the reward of a
-        criterion that the run does not have.
+        Return the first observations by agent; and seed, time [s] and parameters. The steps are counted from that tick
+        on. Raise SettingError for unknown options, and for the reward of a criterion that the run does not have.
         """
         self.close()
         self._left = set()
@@ -181,17 +192,15 @@ class ScenarioEnvironment:
             episode.close()
             raise
         self._episode, self.agents = episode, self._present(episode)
-        return episode
-
-    def _begin(self, episode: Episode) -> dict[str, Any]:
-        """Begin an episode for the agents; return its seed, time [s] and parameters."""
+        if not self.agents:
+            raise SettingError(absent)
         for name in self.agents:
             self._interfaces[name].begin(episode)
         if self._renderer is not None:
             self._renderer.begin(episode)
-        simulation = episode.simulation
-        info = {"seed": simulation.seed, "time": episode.start.view.time}
-        return {**info, "parameters": dict(simulation.scenario.parameters)}
+        observations = {name: self._interfaces[name].observe(episode) for name in self.agents}
+        seed, parameters = episode.simulation.seed, dict(episode.simulation.scenario.parameters)
+        return observations, {"seed": seed, "time": episode.start.view.time, "parameters": parameters}
 
     def _present(self, episode: Episode) -> list[str]:
         """Return the agents of the current tick."""
@@ -290,23 +299,6 @@ class ScenarioEnvironment:
             self._episode = None
 
 
-def build_renderer(mode: str | None, settings: Any, station: str) -> Renderer | None:
-    """Return the renderer of a mode with RenderSettings or a mapping of them; None without a mode.
-
-    station  station that the pictures follow
-
-    Raise SettingError for an unknown mode or an invalid setting.
-    """
-    parsed = parse_mapping(RenderSettings, settings, "render")
-    if mode is None:
-        return None
-    if mode not in RENDER_MODES:
-        raise SettingError(Diagnostic(f"render_mode is {quoted(mode)}", f"give {' or '.join(RENDER_MODES)}, or None"))
-    from eidrive_scenario.gym.rendering import Renderer  # imports OpenCV
-
-    return Renderer(station, parsed)
-
-
 class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
     """Environment in which a policy controls one station of a scenario.
 
@@ -345,11 +337,9 @@ class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
         If the station enters the world later, the run advances until then. Raise SettingError if it never does.
         """
         super().reset(seed=seed)
-        episode = self._start(int(self.np_random.integers(MAX_SEED)), options)
-        if not self.agents:
-            raise SettingError(Diagnostic(f"station {self.station!r} never enters the world", "select another one"))
-        info = self._begin(episode)
-        return self._interfaces[self.station].observe(episode), info
+        absent = Diagnostic(f"station {self.station!r} never enters the world", "select another one")
+        observations, info = self._start(int(self.np_random.integers(MAX_SEED)), options, absent)
+        return observations[self.station], info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Apply an action for one step; return observation, reward, terminated, truncated and information.

@@ -35,64 +35,37 @@ COLUMNS = (
     "deviation_x", "deviation_y", "covariance_known", "age", *CLASSES,
 )  # fmt: skip
 """Columns of the table. Positions [m], velocities over ground [m/s] and headings are in the axes of the vehicle."""
-FEW = 12
-"""Maximum number of objects for which scalar arithmetic is faster than arrays."""
 _SIGNED = ("x", "y", "velocity_x", "velocity_y", "cos", "sin")
-_CLASS = {name: COLUMNS.index(name) for name in CLASSES}
 _CLASS_COLUMNS = {name: [float(name == other) for other in CLASSES] for name in CLASSES}
 
 
 def column_bounds(reach: float) -> tuple[Array, Array]:
     """Return lower and upper bounds of the columns in SI units for objects within `reach` [m]."""
-    high = np.ones(len(COLUMNS))
-    for name, bound in (
-        ("x", reach),
-        ("y", reach),
-        ("velocity_x", MAX_SPEED),
-        ("velocity_y", MAX_SPEED),
-        ("length", MAX_SIZE),
-        ("width", MAX_SIZE),
-        ("deviation_x", MAX_DEVIATION),
-        ("deviation_y", MAX_DEVIATION),
-        ("age", MAX_AGE),
-    ):
-        high[COLUMNS.index(name)] = bound
+    bounds = {
+        "x": reach, "y": reach, "velocity_x": MAX_SPEED, "velocity_y": MAX_SPEED, "length": MAX_SIZE, "width": MAX_SIZE,
+        "deviation_x": MAX_DEVIATION, "deviation_y": MAX_DEVIATION, "age": MAX_AGE,
+    }  # fmt: skip
+    high = np.array([bounds.get(name, 1.0) for name in COLUMNS])
     low = np.where([name in _SIGNED for name in COLUMNS], -high, 0.0)
     return low, high
 
 
 def nearest_rows(objects: Detections, ego: EgoState, reach: float = math.inf) -> list[int]:
     """Return the rows of the objects within `reach` [m], nearest first; equal distances in the order of the rows."""
-    if not len(objects):
-        return []
     x, y, _ = ego.position.tolist()
-    if len(objects) <= FEW:
-        distances = [math.hypot(box[0] - x, box[1] - y) for box in objects.boxes.tolist()]
-        return sorted([row for row, away in enumerate(distances) if away <= reach], key=distances.__getitem__)
-    distance = np.hypot(objects.boxes[:, 0] - x, objects.boxes[:, 1] - y)
-    order = np.argsort(distance, kind="stable")
-    return [row for row in order.tolist() if distance[row] <= reach]
+    distances = [math.hypot(box[0] - x, box[1] - y) for box in objects.boxes.tolist()]
+    return sorted([row for row, distance in enumerate(distances) if distance <= reach], key=distances.__getitem__)
 
 
-def object_values(
-    objects: Detections, ego: EgoState, now: float, *, count: int, reach: float
-) -> Sequence[float] | Array:
+def object_values(objects: Detections, ego: EgoState, now: float, *, count: int, reach: float) -> list[float]:
     """Return the values of the table of the nearest objects in SI units, row by row; at most `count` rows."""
-    rows = nearest_rows(objects, ego, reach)[:count]
-    age = max(now - objects.time, 0.0)
-    if len(rows) > FEW:
-        return object_rows(objects, rows, ego, age).ravel()
-    return [value for row in few_object_rows(objects, rows, ego, age) for value in row] if rows else ()
-
-
-def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> list[list[float]]:
-    """Return the same as `object_rows` in scalar arithmetic. Adding 0 replaces -0 at rest."""
     cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
     own_x, own_y, _ = ego.position.tolist()
     boxes, velocities = objects.boxes.tolist(), objects.velocity.tolist()
     covariances, confidence = objects.covariance.tolist(), objects.confidence.tolist()
-    filled = []
-    for row in rows:
+    age = max(now - objects.time, 0.0)
+    values: list[float] = []
+    for row in nearest_rows(objects, ego, reach)[:count]:
         x, y, _, length, width, _, yaw = boxes[row]
         dx, dy = x - own_x, y - own_y
         vx, vy = velocities[row]
@@ -106,54 +79,25 @@ def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age
             ahead = cos * cos * xx + cos * sin * (xy + yx) + sin * sin * yy
             aside = sin * sin * xx - sin * cos * (xy + yx) + cos * cos * yy
         heading = yaw - ego.yaw
-        filled.append(
-            [
-                1.0,
-                dx * cos + dy * sin,
-                dy * cos - dx * sin,
-                vx * cos + vy * sin + 0.0,
-                vy * cos - vx * sin + 0.0,
-                float(moves),
-                length,
-                width,
-                math.cos(heading),
-                math.sin(heading),
-                confidence[row],
-                math.sqrt(max(ahead, 0.0)),
-                math.sqrt(max(aside, 0.0)),
-                float(certain),
-                age,
-                *_CLASS_COLUMNS[objects.classes[row]],
-            ]
-        )
-    return filled
-
-
-def object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> Array:
-    """Return the rows (N, C) of these objects in SI units."""
-    filled = np.zeros((len(rows), len(COLUMNS)))
-    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-    axes = np.array([[cos, -sin], [sin, cos]])
-    boxes = objects.boxes[rows]
-    filled[:, 0] = 1.0
-    filled[:, 1:3] = (boxes[:, :2] - ego.position[:2]) @ axes
-    velocity = objects.velocity[rows] @ axes
-    has_velocity = np.isfinite(velocity[:, 0]) & np.isfinite(velocity[:, 1])
-    filled[:, 3:5] = np.where(np.reshape(has_velocity, (-1, 1)), velocity, 0.0)
-    filled[:, 5] = has_velocity
-    filled[:, 6:8] = boxes[:, 3:5]
-    heading = boxes[:, 6] - ego.yaw
-    filled[:, 8], filled[:, 9] = np.cos(heading), np.sin(heading)
-    filled[:, 10] = objects.confidence[rows]
-    covariance = objects.covariance[rows]
-    certain = np.isfinite(covariance.sum(axis=(1, 2)))
-    variance = np.einsum("ji,njk,ki->ni", axes, np.where(np.reshape(certain, (-1, 1, 1)), covariance, 0.0), axes)
-    filled[:, 11:13] = np.sqrt(np.maximum(variance, 0.0))
-    filled[:, 13] = certain
-    filled[:, 14] = age
-    for index, row in enumerate(rows):
-        filled[index, _CLASS[objects.classes[row]]] = 1.0
-    return filled
+        values += [
+            1.0,
+            dx * cos + dy * sin,
+            dy * cos - dx * sin,
+            vx * cos + vy * sin + 0.0,  # adding 0 replaces -0 at rest
+            vy * cos - vx * sin + 0.0,
+            float(moves),
+            length,
+            width,
+            math.cos(heading),
+            math.sin(heading),
+            confidence[row],
+            math.sqrt(max(ahead, 0.0)),
+            math.sqrt(max(aside, 0.0)),
+            float(certain),
+            age,
+            *_CLASS_COLUMNS[objects.classes[row]],
+        ]
+    return values
 
 
 CHANNELS = ("existence", "velocity_x", "velocity_y", "route")
@@ -182,8 +126,7 @@ def occupancy_grid(objects: Detections, route: Array, ego: EgoState, settings: G
     route  points (P, 2) in the frame of the vehicle [m]
     """
     grid = np.zeros((len(CHANNELS), settings.length, settings.width), np.float32)
-    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-    axes = np.array([[cos, -sin], [sin, cos]])
+    axes = _axes(ego)
     corners_of_all = footprint(objects.boxes)
     for row in reversed(nearest_rows(objects, ego)):
         corners = (corners_of_all[row] - ego.position[:2]) @ axes
@@ -232,20 +175,19 @@ class ObservationEncoder:
         self._parts: dict[str, tuple[Part, slice, tuple[int, ...]]] = {}
         """Conversion, place among all values, and shape of each part."""
         parts: dict[str, spaces.Space[Any]] = {}
-        scales, lows, highs, start = [], [], [], 0
+        scales, start = [], 0
         for name, (encode, low, high) in sorted(self._selected().items()):
             scale = high if settings.normalized else np.ones_like(high)
-            low32, high32 = (low / scale).astype(np.float32), (high / scale).astype(np.float32)
-            parts[name] = spaces.Box(low32, high32, dtype=np.float32)
+            parts[name] = spaces.Box((low / scale).astype(np.float32), (high / scale).astype(np.float32))
             self._parts[name] = encode, slice(start, start + high.size), high.shape
             start += high.size
             scales.append(scale.ravel())
-            lows.append(low32.ravel())
-            highs.append(high32.ravel())
         self._scale = np.concatenate([*scales, []])
-        self._low, self._high = (np.concatenate([*each, []], dtype=np.float32) for each in (lows, highs))
         space = spaces.Dict(parts)
-        self.space: spaces.Space[Any] = spaces.flatten_space(space) if settings.flat else space
+        bounds = spaces.flatten_space(space)
+        assert isinstance(bounds, spaces.Box)
+        self._low, self._high = bounds.low, bounds.high
+        self.space: spaces.Space[Any] = bounds if settings.flat else space
 
     def _selected(self) -> Mapping[str, tuple[Part, Array, Array]]:
         """Return conversion, lower and upper bounds in SI units of the selected parts."""
@@ -322,7 +264,7 @@ class ObservationEncoder:
         return () if self._route is None else points_ahead(self._route, perceived.ego, self.settings.route)
 
     def _table_part(self, name: str, table: TableSettings) -> Part:
-        def encode(perceived: StationPerception) -> Sequence[float] | Array:
+        def encode(perceived: StationPerception) -> Sequence[float]:
             objects = perceived.fused if name == "tracks" else perceived.detections
             return object_values(objects, perceived.ego, perceived.time, count=table.count, reach=table.range)
 
@@ -336,15 +278,15 @@ class ObservationEncoder:
     def _grid(self, perceived: StationPerception) -> NDArray[Any]:
         assert self.settings.grid is not None
         ego = perceived.ego
-        points = np.empty((0, 2)) if self._route is None else _in_frame(self._route.points, ego)
+        route = self._route
+        points = np.empty((0, 2)) if route is None else (route.points - ego.position[:2]) @ _axes(ego)
         return occupancy_grid(perceived.fused, points, ego, self.settings.grid).ravel()
 
 
-def _in_frame(points: Array, ego: EgoState) -> Array:
-    """Return points (M, 2) of the world frame in the frame of the vehicle."""
+def _axes(ego: EgoState) -> Array:
+    """Return the axes of the vehicle as columns (2, 2) in the world frame."""
     cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-    local: Array = (points - ego.position[:2]) @ np.array([[cos, -sin], [sin, cos]])
-    return local
+    return np.array([[cos, -sin], [sin, cos]])
 
 
 def points_ahead(route: PathPart, ego: EgoState, settings: RouteSettings) -> list[float]:

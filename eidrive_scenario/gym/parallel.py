@@ -61,12 +61,9 @@ class EidriveParallelEnv(ScenarioEnvironment, ParallelEnv[str, Any, Any]):  # ty
         if seed is not None:
             self._generator, _ = gymnasium.utils.seeding.np_random(seed)
         supported = {key: value for key, value in (options or {}).items() if key in OPTIONS}
-        episode = self._start(int(self._generator.integers(MAX_SEED)), supported)
-        if not self.agents:
-            raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
-        info = self._begin(episode)
-        observations = {name: self._interfaces[name].observe(episode) for name in self.agents}
-        return observations, {name: dict(info) for name in self.agents}
+        absent = Diagnostic("no controlled station enters the world", "select other stations")
+        observations, info = self._start(int(self._generator.integers(MAX_SEED)), supported, absent)
+        return observations, {name: dict(info) for name in observations}
 
     def step(self, actions: Mapping[str, Any]) -> Outcome:
         """Apply the actions for one step; return its outcome by agent. The values are those of `EidriveEnv.step`.

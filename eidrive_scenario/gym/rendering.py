@@ -34,8 +34,8 @@ class Renderer:
         Until the station enters the world, the pictures show the place of the first station that is present.
         """
         simulation = episode.simulation
-        agents = getattr(simulation.stack, "settings", {})
-        self._builder = SnapshotBuilder(self._station, agents.get(self._station, DEFAULT_SETTINGS))
+        settings = simulation.stack.settings.get(self._station, DEFAULT_SETTINGS)
+        self._builder = SnapshotBuilder(self._station, settings)
         if simulation.roads is not self._roads[0]:
             self._roads = simulation.roads, network_drawing(simulation.roads)
         episode.observers.append(self._observe)

@@ -26,7 +26,7 @@ from eidrive_scenario.gym.settings import (
     parse_actions,
 )
 from eidrive_scenario.simulation import RunResult, Simulation
-from eidrive_scenario.world.actor import ActorSpec, Control
+from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
@@ -62,8 +62,6 @@ class StationInterface:
         if driving and not drives:
             message = f"action {driving[0]!r} drives, and the station {name!r} does not"
             raise SettingError(Diagnostic(message, "give the action send or share"))
-        self.spec: ActorSpec = actor_spec(name, simulation.scenario.entities[name])
-        """Body of the station, which the parameters of an episode may select."""
         senders = [station for station in simulation.stack.controllable if station != name]
         self.encoder = ObservationEncoder(observation, senders)
         self.decoder = ActionDecoder(self.actions)
@@ -83,15 +81,15 @@ class StationInterface:
         """Begin an episode in which the station is present."""
         self.encoder.reset()
         simulation, perceived = episode.simulation, episode.perceived[self.name]
-        self.spec = actor_spec(self.name, simulation.scenario.entities[self.name])
+        spec = actor_spec(self.name, simulation.scenario.entities[self.name])
         self._control, self._planner, self._route = None, None, (-1.0, None)
         if self._needs_route:
             own = simulation.stack.settings[self.name].model_copy(update={"obey_signals": False})
             dt, seed = simulation.settings.dt, simulation.seed
-            self._planner = RoutePlanner(own, self.spec, simulation.roads, dt=dt, seed=seed)
+            self._planner = RoutePlanner(own, spec, simulation.roads, dt=dt, seed=seed)
         requested = None if perceived.goal is None else perceived.goal.speed
         speed = perceived.ego.speed if requested is None else requested
-        self.decoder.reset(speed, self.spec.max_steering)
+        self.decoder.reset(speed, spec.max_steering)
         self.encoder.receive(perceived)
 
     def observe(self, episode: Episode) -> Any:

@@ -18,9 +18,7 @@ from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings
 from eidrive_scenario.gym.observations import (
     COLUMNS,
-    few_object_rows,
     nearest_rows,
-    object_rows,
     object_values,
     occupancy_grid,
     points_ahead,
@@ -213,7 +211,7 @@ def test_time_to_collision_concerns_the_actor_on_the_own_course_only() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 3, 30])
-def test_rows_of_few_objects_equal_rows_of_many(count: int) -> None:
+def test_table_rows_of_random_objects_are_rotated_by_matrices(count: int) -> None:
     draws = np.random.default_rng(count)
     roots = draws.normal(size=(count, 2, 2))
     covariance, velocity = roots @ roots.transpose(0, 2, 1), draws.normal(0.0, 9.0, (count, 2))
@@ -222,9 +220,27 @@ def test_rows_of_few_objects_equal_rows_of_many(count: int) -> None:
     boxes = draws.normal(0.0, 20.0, (count, 7))
     objects = Detections(1.0, boxes, draws.random(count), classes, velocity, covariance)
     ego = EgoState(1.5, np.array([3.0, -2.0, 0.0]), 2.5, 0.0, 0.0, 4.0, 0.0, 0.0)
-    rows = draws.permutation(count).tolist()
-    few = np.array(few_object_rows(objects, rows, ego, 0.5))
-    assert few == pytest.approx(object_rows(objects, rows, ego, 0.5), rel=1e-12, abs=1e-12)
+    rows = np.array(nearest_rows(objects, ego))
+    table = np.reshape(object_values(objects, ego, 1.5, count=count, reach=1e3), (count, len(COLUMNS)))
+    column = dict(zip(COLUMNS, table.T, strict=True))
+    world_from_vehicle = np.array([[math.cos(2.5), -math.sin(2.5)], [math.sin(2.5), math.cos(2.5)]])
+    for names, expected in (
+        (("x", "y"), (boxes[rows, :2] - [3.0, -2.0]) @ world_from_vehicle),
+        (("velocity_x", "velocity_y"), np.nan_to_num(velocity[rows]) @ world_from_vehicle),
+        (("length", "width"), boxes[rows, 3:5]),
+    ):
+        np.testing.assert_allclose(np.stack([column[name] for name in names], axis=1), expected, atol=1e-12)
+    variance = world_from_vehicle.T @ np.nan_to_num(covariance[rows]) @ world_from_vehicle
+    np.testing.assert_allclose(column["deviation_x"] ** 2, variance[:, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(column["deviation_y"] ** 2, variance[:, 1, 1], atol=1e-12)
+    np.testing.assert_allclose(np.arctan2(column["sin"], column["cos"]), _turned(boxes[rows, 6] - 2.5), atol=1e-12)
+    assert column["velocity_known"].tolist() == np.isfinite(velocity[rows, 0]).tolist()
+    assert column["covariance_known"].tolist() == np.isfinite(covariance[rows, 0, 0]).tolist()
+    assert [CLASSES[index] for index in table[:, -len(CLASSES) :].argmax(axis=1)] == [classes[row] for row in rows]
+
+
+def _turned(angle: Any) -> Any:
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @pytest.mark.parametrize("count", [5, 40])
