@@ -78,6 +78,8 @@ LEFT, RIGHT, TOP, BOTTOM = 0.047, 0.873, 0.95, 0.14
 """Edges of the axes as fractions of the size. The names of the series are to the right of them."""
 WIDE = 0.975
 """Right edge of the axes without names; half of the number at the end of the axis is beyond it."""
+RATE = "success rate"
+"""Title of the axis of rates."""
 NAME_SPACING = 11.5
 """Minimum vertical distance between names [pt]."""
 
@@ -123,13 +125,11 @@ def line_chart(
         return inline_svg(figure, f"{y_title} over {x_title}")
 
 
-def rate_figure(
-    lines: Sequence[ChartSeries], *, x_title: str, y_title: str, x_range: tuple[float, float], size: Size
-) -> Figure:
+def rate_figure(lines: Sequence[ChartSeries], *, x_title: str, x_range: tuple[float, float], size: Size) -> Figure:
     """Return rates with their intervals as a figure of a size [mm], with a legend of several series below it."""
     with paper_style():
         figure, axes = _paper_axes(size)
-        _draw_lines(axes, lines, (x_title, y_title), (x_range, (0.0, 1.0)), ticks=6, points=True)
+        _draw_lines(axes, lines, (x_title, RATE), (x_range, (0.0, 1.0)), ticks=6, points=True)
         if len(lines) > 1:
             handles = [Line2D([], [], color=line.color, marker="o", ms=4.0) for line in lines]
             names = [line.name for line in lines]
@@ -289,11 +289,11 @@ def rate_map(columns: MapAxis, rows: MapAxis, rates: Rates) -> str:
         mesh = _draw_rates(axes, columns, rows, rates)
         beside = figure.add_axes((MAP_RIGHT + 0.03, MAP_BOTTOM, 0.03, MAP_TOP - MAP_BOTTOM))
         bar = figure.colorbar(mesh, cax=beside, format=PercentFormatter(1.0))
-        bar.set_label("success rate")
+        bar.set_label(RATE)
         beside.tick_params(length=0.0)
         bar.outline.set_visible(False)
         above = _tooltips(axes, columns, rows, rates)
-        return inline_svg(figure, f"success rate over {columns.name} and {rows.name}", kind="map", above=above)
+        return inline_svg(figure, f"{RATE} over {columns.name} and {rows.name}", kind="map", above=above)
 
 
 def rate_map_figure(columns: MapAxis, rows: MapAxis, rates: Rates, size: Size) -> Figure:
@@ -301,7 +301,7 @@ def rate_map_figure(columns: MapAxis, rows: MapAxis, rates: Rates, size: Size) -
     with paper_style():
         figure, axes = _paper_axes(size)
         mesh = _draw_rates(axes, columns, rows, rates)
-        bar = figure.colorbar(mesh, format=PercentFormatter(1.0), label="success rate")
+        bar = figure.colorbar(mesh, format=PercentFormatter(1.0), label=RATE)
         if bar.solids is not None:  # matplotlib draws bars of 50 or more colors as images
             bar.solids.set(rasterized=False, edgecolor="face")
     return figure

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import re
 import secrets
 import selectors
 import socket
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
@@ -76,16 +74,14 @@ class Feed:
     def wait_until_alone(self) -> None:
         """Wait until no client is connected."""
         with self._changed:
-            while self.clients:
-                self._changed.wait(1.0)  # a wait without a timeout cannot be interrupted on Windows
+            self._changed.wait_for(lambda: not self.clients)
 
     def stop(self, timeout: float) -> None:
         """End the connections once all events are sent, and wait for that at most `timeout` [s]."""
-        deadline = time.monotonic() + timeout
         with self._changed:
             self._is_stopped = True
             self._changed.notify_all()
-            self._changed.wait_for(lambda: not self.clients, max(0.0, deadline - time.monotonic()))
+            self._changed.wait_for(lambda: not self.clients, timeout)
 
 
 HOST = "127.0.0.1"
@@ -151,7 +147,6 @@ class LiveServer:
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
-    allow_reuse_address = os.name != "nt"  # On Windows, the option lets two servers share a port
     feed: Feed
     page: Callable[[], bytes]
     token: str

@@ -153,22 +153,16 @@ def describe_error(error: Exception) -> str:
 class ReplayBuilder:
     """Builder of the data of a replay from the frames of a run, which can be taken in parts.
 
-    report    a frame that cannot be drawn is skipped and reported; without a report its error is raised
+    report    a frame that cannot be drawn is skipped and reported
     settings  of stations, by name; they define the lifetime of reports
-    models    of the actors, and their sensors; by default those of their categories
-    light     changes of the light; by default those of the scenario
+    models    of the actors, and their sensors
+    light     changes of the light
     """
 
     def __init__(
-        self,
-        report: DamageReport | None = None,
-        settings: Mapping[str, AgentSettings] | None = None,
-        models: ActorModels | None = None,
-        light: LightChanges | None = None,
+        self, report: DamageReport, settings: Mapping[str, AgentSettings], models: ActorModels, light: LightChanges
     ) -> None:
-        self._report = report
-        self._settings = settings or {}
-        self._models, self._light = models or ActorModels(), light or LightChanges()
+        self._report, self._settings, self._models, self._light = report, settings, models, light
         self._builders: dict[str, SnapshotBuilder] = {}
         self._series, self._messages, self._timeline = SeriesBuilder(), MessageList(), Timeline()
         self._left = _LARGEST_PAGE
@@ -191,8 +185,6 @@ class ReplayBuilder:
             part = _frame_data(frame, self._builders, self._settings)
             self._series.observe(frame)
         except UNDRAWABLE as error:
-            if self._report is None:
-                raise
             self._report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")
             return
         added = len(part["stations"].keys() - self._stations) + self._series.width - self._width
@@ -200,8 +192,7 @@ class ReplayBuilder:
         self._left -= _size(part) + _VALUE * self._width + _ABSENT * added * self._frames
         if self._left < 0:
             self.is_full = True
-            if self._report is not None:
-                self._report.add("the recording is too large for one page", f"shown up to {frame.view.time:.2f} s")
+            self._report.add("the recording is too large for one page", f"shown up to {frame.view.time:.2f} s")
             return
         self._append(part, frame)
         self._series.keep()
@@ -216,7 +207,7 @@ class ReplayBuilder:
             return
         complete = not self._messages.omitted
         self._messages.observe(events)
-        if complete and self._messages.omitted and self._report is not None:
+        if complete and self._messages.omitted:
             shown = f"the first {self._messages.count} are shown"
             self._report.add("the page does not show all messages", shown)
 
@@ -279,10 +270,12 @@ def replay_data(
     changes    [time, path, after, why] of the storyboard transitions
     contacts   [time, name, other name, relative speed at the impact [m/s]] of all contacts
 
-    For `report`, `settings`, `models` and `light` see `ReplayBuilder`. `final_links` are the message outcomes of the
-    last tick.
+    For `report`, `settings`, `models` and `light` see `ReplayBuilder`; by default, models are those of categories, and
+    the light is that of the scenario. `final_links` are the message outcomes of the last tick.
     """
-    builder = ReplayBuilder(report, settings, models, light)
+    builder = ReplayBuilder(
+        DamageReport() if report is None else report, settings or {}, models or ActorModels(), light or LightChanges()
+    )
     for frame in frames:
         builder.observe(frame)
         if builder.is_full:

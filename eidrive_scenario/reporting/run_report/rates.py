@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.experiments.statistics.intervals import Proportion, wilson
 from eidrive_scenario.reporting.drawing.charts import (
+    RATE,
     ChartSeries,
     MapAxis,
     line_chart,
@@ -164,8 +165,6 @@ def _order(text: str) -> tuple[int, float, str]:
 
 COLORS = ("#0284c7", "#d97706", "#059669", "#a855f7", "#dc2626", "#64748b", "#be185d", "#65a30d")
 """Colors of the curves, each readable on light and dark ground."""
-RATE = "success rate"
-"""Title of the axis of rates."""
 MOST_AXES = 4
 """Maximum number of axes whose pairs have heat maps."""
 
@@ -297,7 +296,7 @@ def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, 
     """Yield the curves and heat maps of a report as figures of a size [mm] with their names."""
     for scenario, axis, _, lines in _curves(groups):
         x_range = _range([value for line in lines for value in line.x])
-        yield f"{scenario}-{axis}", rate_figure(lines, x_title=axis, y_title=RATE, x_range=x_range, size=size)
+        yield f"{scenario}-{axis}", rate_figure(lines, x_title=axis, x_range=x_range, size=size)
     by_scenario: dict[str, list[RunGroup]] = defaultdict(list)
     for group in groups:
         by_scenario[group.scenario].append(group)

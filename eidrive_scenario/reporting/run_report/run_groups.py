@@ -93,26 +93,16 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
         grouped.setdefault((run.channel, *(of_run.get(name, "") for name in differing)), []).append(run)
     chosen = _differing_options([(channel, members[0]) for (channel, *_), members in grouped.items()])
     short = len({(key[0], *options.items()) for key, options in zip(grouped, chosen, strict=True)}) == len(grouped)
-    return [
-        RunGroup(
-            scenario,
-            channel,
-            options
-            if short
-            else {
-                **options,
-                **{
-                    name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
-                    for name, value in zip(differing, of_group, strict=True)
-                    if value not in _EMPTY and name not in _NAMES and name not in options
-                },
-            },
-            channel_text(*(run.settings for run in members)),
-            tuple(members),
-            axes,
-        )
-        for ((channel, *of_group), members), options in zip(grouped.items(), chosen, strict=True)
-    ]
+    groups = []
+    for ((channel, *of_group), members), options in zip(grouped.items(), chosen, strict=True):
+        others = {
+            name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
+            for name, value in zip(differing, of_group, strict=True)
+            if value not in _EMPTY and name not in _NAMES and name not in options
+        }
+        content = channel_text(*(run.settings for run in members))
+        groups.append(RunGroup(scenario, channel, options | ({} if short else others), content, tuple(members), axes))
+    return groups
 
 
 def _depends_on_axes(values: Sequence[str], runs: Sequence[ReportedRun], axes: Sequence[str]) -> bool:
