@@ -27,7 +27,7 @@ class ActionDecoder:
     """
 
     def __init__(self, actions: Sequence[ActionSettings]) -> None:
-        self._actions = actions
+        self._actions = {action.kind: action for action in actions}
         self._max_steering = 0.0
         self._level = 0
         by_kind: dict[str, spaces.Space[Any]] = {action.kind: _space(action) for action in actions}
@@ -39,7 +39,7 @@ class ActionDecoder:
         Relative speeds start from the one that is nearest to the speed.
         """
         self._max_steering = max_steering
-        for action in self._actions:
+        for action in self._actions.values():
             if isinstance(action, MetaSpeed):
                 self._level = min(range(len(action.speeds)), key=lambda level: abs(action.speeds[level] - speed))
 
@@ -48,14 +48,14 @@ class ActionDecoder:
 
         Raise SettingError if the space does not contain the action.
         """
-        kinds = [action.kind for action in self._actions]
-        if len(kinds) == 1:
-            return self._decode(self._actions[0], given, perceived, OWN_DECISIONS)
-        if not isinstance(given, Mapping) or given.keys() != set(kinds):
-            raise _outside(given, f"a mapping with the keys {', '.join(kinds)}")
+        if len(self._actions) == 1:
+            (action,) = self._actions.values()
+            return self._decode(action, given, perceived, OWN_DECISIONS)
+        if not isinstance(given, Mapping) or given.keys() != self._actions.keys():
+            raise _outside(given, f"a mapping with the keys {', '.join(self._actions)}")
         decided = OWN_DECISIONS
-        for action in self._actions:
-            decided = self._decode(action, given[action.kind], perceived, decided)
+        for kind, action in self._actions.items():
+            decided = self._decode(action, given[kind], perceived, decided)
         return decided
 
     def _decode(
