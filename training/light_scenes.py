@@ -23,12 +23,12 @@ from training.dataset import shows_enough
 from training.labels import Label, head_box, mark_readable, signal_labels
 from training.random_roads import Place, map_worlds, random_place
 from training.random_scene import (
-    put,
     random_actor,
     random_appearances,
     random_signals,
     random_traffic,
     random_weather,
+    replace_actors,
     rows_before,
     view_of_carrier,
 )
@@ -96,7 +96,7 @@ def _scene(
     carrier = (spec, Placement(x, y, z, heading + float(rng.normal(0.0, 0.05))))
     view = view_of_carrier(world, camera, carrier)
     actors = [carrier, *random_traffic(rng, place.positions, view)]
-    put(world, actors)
+    replace_actors(world, actors)
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)

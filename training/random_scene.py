@@ -108,7 +108,7 @@ def centered_placement(spec: ActorSpec, x: float, y: float, z: float, heading: f
     return Placement(x - math.cos(heading) * ahead, y - math.sin(heading) * ahead, z, heading)
 
 
-def put(world: World, actors: Iterable[tuple[ActorSpec, Placement]]) -> None:
+def replace_actors(world: World, actors: Iterable[tuple[ActorSpec, Placement]]) -> None:
     """Replace all actors of a world."""
     for name in world.names:
         world.remove(name)
@@ -118,7 +118,7 @@ def put(world: World, actors: Iterable[tuple[ActorSpec, Placement]]) -> None:
 
 def view_of_carrier(world: World, settings: CameraSettings, carrier: tuple[ActorSpec, Placement]) -> View:
     """Put a body alone into the world, and return the view of a camera at its front."""
-    put(world, [carrier])
+    replace_actors(world, [carrier])
     return View(settings, mounting(settings, carrier[0], "front").camera_pose(world.view(), 0), carrier)
 
 

@@ -26,12 +26,12 @@ from training.labels import Label, actor_labels, mark_readable, signal_labels
 from training.random_roads import Place, map_worlds, random_place
 from training.random_scene import (
     View,
-    put,
     random_appearances,
     random_signals,
     random_traffic,
     random_view,
     random_weather,
+    replace_actors,
 )
 
 STORED = (512, 384)
@@ -66,7 +66,7 @@ def shot(world: World, place: Place, rng: np.random.Generator) -> Shot:
         view = random_view(rng, place.positions, heads)
     carriers = [] if view.carrier is None else [view.carrier]
     actors = [*random_traffic(rng, place.positions, view), *carriers]
-    put(world, actors)
+    replace_actors(world, actors)
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)

@@ -20,7 +20,7 @@ from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
-from training.random_scene import put, random_actor, random_traffic, view_of_carrier
+from training.random_scene import random_actor, random_traffic, replace_actors, view_of_carrier
 
 LIBRARY = ("coop/scenario_1", "coop/scenario_2")
 SENSORS: dict[str, SensorSettings] = {"camera": CameraSettings(), "lidar": LidarSettings()}
@@ -86,7 +86,7 @@ def random_scenes(
                 placement = Placement(*place.positions.draw(rng))
                 carrier = (random_actor(rng, "Carrier", "car"), placement)
                 view = view_of_carrier(world, CameraSettings(), carrier)
-                put(world, [carrier, *random_traffic(rng, place.positions, view)])
+                replace_actors(world, [carrier, *random_traffic(rng, place.positions, view)])
                 rig = Rig(carrier[0], sensors, seed=seed)
                 yield from _read(world, {"Carrier": rig}, place.roads, weather.name, sensors)
 

@@ -20,7 +20,7 @@ from eidrive_scenario.world.weather import Weather
 from training.image_evaluation import objects_of
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
-from training.random_scene import put, random_traffic, random_view
+from training.random_scene import random_traffic, random_view, replace_actors
 
 VISUAL_RANGES = (30_000.0, 1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 35.0)
 ELEVATIONS = (40.0, 20.0, 10.0, 5.0, 2.0, 0.0, -3.0, -6.0, -9.0, -12.0, -18.0)
@@ -48,7 +48,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
         camera = ImageSensor(CameraSettings())
         with place.world() as world:
             actors = random_traffic(rng, place.positions, view)
-            put(world, actors)
+            replace_actors(world, actors)
             specs = {spec.name: spec for spec, _ in actors}
             boxes = None
             for key, weather in weathers.items():

@@ -148,7 +148,7 @@ def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dic
 
 
 def train(options: argparse.Namespace) -> None:
-    device = torch.device(options.device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    device = torch.device(options.device)
     torch.manual_seed(options.seed)
     autocast = device.type == "cuda"
     started = time.perf_counter()
@@ -266,7 +266,7 @@ def card_of(
             "epochs": epochs,
             "batch": options.batch,
             "rate": options.rate,
-            "device": torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU",
+            "device": torch.cuda.get_device_name(options.device) if options.device.startswith("cuda") else "CPU",
             "seconds": round(seconds),
         },
         "validation_ap50": {name: round(value, 4) for name, value in results.items()},
@@ -285,7 +285,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=2e-3)
     parser.add_argument("--check", type=int, default=15, help="number of epochs between validations")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--device", default="")
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     train(parser.parse_args())
 
 
