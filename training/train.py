@@ -175,6 +175,8 @@ def train(options: argparse.Namespace) -> None:
     )
     draws = torch.Generator(device).manual_seed(options.seed)
     per_epoch = len(samples) // options.batch
+    if not per_epoch:
+        raise SystemExit(f"--batch: larger than the training set (got {options.batch}; expected up to {len(samples)})")
     steps = per_epoch * options.epochs
     best, step = -1.0, 0
     start = time.perf_counter()
