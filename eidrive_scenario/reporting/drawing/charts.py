@@ -125,11 +125,11 @@ def line_chart(
         return inline_svg(figure, f"{y_title} over {x_title}")
 
 
-def rate_figure(lines: Sequence[ChartSeries], *, x_title: str, x_range: tuple[float, float], size: Size) -> Figure:
+def rate_figure(lines: Sequence[ChartSeries], *, x_title: str, size: Size) -> Figure:
     """Return rates with their intervals as a figure of a size [mm], with a legend of several series below it."""
     with paper_style():
         figure, axes = _paper_axes(size)
-        _draw_lines(axes, lines, (x_title, RATE), (x_range, (0.0, 1.0)), ticks=6, points=True)
+        _draw_lines(axes, lines, (x_title, RATE), (None, (0.0, 1.0)), ticks=6, points=True)
         if len(lines) > 1:
             handles = [Line2D([], [], color=line.color, marker="o", ms=4.0) for line in lines]
             names = [line.name for line in lines]
@@ -156,11 +156,13 @@ def _draw_lines(
 ) -> list[tuple[float, float, ChartSeries]]:
     """Draw the series on a grid, and return the last points of those that have one inside the ranges.
 
-    titles, ranges  of x and y; the ranges are those of the points by default
+    titles, ranges  of x and y; the ranges are those of the points by default, with a width for a single x
     ticks           maximum number of intervals of x
     """
-    axes.set_xlim(ranges[0] or _extent([value for line in lines for value in line.x]))
-    axes.set_ylim(ranges[1] or (0.0, _extent([value for line in lines for value in line.y])[1]))
+    xs = [value for line in lines for value in line.x] or [0.0, 1.0]
+    low, high = min(xs), max(xs)
+    axes.set_xlim(ranges[0] or ((low, high) if low < high else (low - 0.5, high + 0.5)))
+    axes.set_ylim(ranges[1] or (0.0, max((value for line in lines for value in line.y), default=1.0)))
     axes.set_xlabel(titles[0])
     axes.set_ylabel(titles[1])
     axes.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
@@ -210,10 +212,6 @@ def _draw_names(axes: Axes, ends: Sequence[tuple[float, float, ChartSeries]]) ->
             annotation_clip=False,
             gid="name",
         )
-
-
-def _extent(values: Sequence[float]) -> tuple[float, float]:
-    return (min(values), max(values)) if values else (0.0, 1.0)
 
 
 def heat_cells(

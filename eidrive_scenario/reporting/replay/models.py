@@ -36,7 +36,7 @@ from eidrive_scenario.rendering.scene import (
 )
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.sensing.sensor import mounting
-from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
+from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.simulation.recorded_outcome import Body
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 from eidrive_scenario.world.road_objects import buildings, road_object_bodies, signal_heads
@@ -198,17 +198,13 @@ def _sensor_poses(station: Any, spec: ActorSpec) -> list[list[Any]]:
         sensors = station_sensors(AgentSettings.model_validate(given))
     except (EidriveError, ValidationError, AttributeError, LookupError, TypeError, ValueError, ImportError):
         return []
-    return [_sensor_pose(name, sensor, spec) for name, sensor in sensors.items() if _angle(sensor) is not None]
-
-
-def _angle(sensor: SensorSettings) -> float | None:
-    """Return the horizontal opening angle of a sensor [degrees]."""
-    return getattr(sensor, "fov", getattr(sensor, "field_of_view", None))
-
-
-def _sensor_pose(name: str, sensor: SensorSettings, spec: ActorSpec) -> list[Any]:
-    mount = mounting(sensor, spec, "front" if isinstance(sensor, CameraSettings) else "roof")
-    foot = np.array([mount.x, mount.y, mount.z]) - spec.offset + (0.0, 0.0, spec.size[2] / 2.0)
-    reach = getattr(sensor, "range", math.inf)
-    pose = [*foot.tolist(), mount.yaw, mount.pitch, math.radians(_angle(sensor) or 360.0)]
-    return [name, sensor.kind, *(round(value, 4) for value in pose), reach if math.isfinite(reach) else None]
+    poses: list[list[Any]] = []
+    for name, sensor in sensors.items():
+        angle = getattr(sensor, "fov", getattr(sensor, "field_of_view", None))
+        if angle is not None:
+            mount = mounting(sensor, spec, "front" if isinstance(sensor, CameraSettings) else "roof")
+            foot = np.array([mount.x, mount.y, mount.z]) - spec.offset + (0.0, 0.0, spec.size[2] / 2.0)
+            pose = [round(value, 4) for value in (*foot.tolist(), mount.yaw, mount.pitch, math.radians(angle))]
+            reach = getattr(sensor, "range", math.inf)
+            poses.append([name, sensor.kind, *pose, reach if math.isfinite(reach) else None])
+    return poses

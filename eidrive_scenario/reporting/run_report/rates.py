@@ -200,15 +200,7 @@ class RateMap:
 def rate_curves(groups: Sequence[RunGroup]) -> Iterator[RateCurves]:
     """Yield the curves of each scenario whose groups vary one number only."""
     for scenario, axis, members, lines in _curves(groups):
-        chart = line_chart(
-            lines,
-            x_title=axis,
-            y_title=RATE,
-            x_range=_range([value for line in lines for value in line.x]),
-            y_range=(0.0, 1.0),
-            named=False,
-            points=True,
-        )
+        chart = line_chart(lines, x_title=axis, y_title=RATE, y_range=(0.0, 1.0), named=False, points=True)
         yield RateCurves(
             scenario,
             axis,
@@ -258,12 +250,6 @@ def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> Char
     )
 
 
-def _range(values: Sequence[float]) -> tuple[float, float]:
-    """Return the limits of the axis, with a width for a single value."""
-    low, high = min(values), max(values)
-    return (low, high) if low < high else (low - 0.5, high + 0.5)
-
-
 def rate_maps(group: RunGroup) -> Iterator[RateMap]:
     """Yield the heat map of each pair of numbers that vary in a group; none for more than four."""
     for columns, rows, rates in _maps(group):
@@ -295,8 +281,7 @@ def _maps(group: RunGroup) -> Iterator[tuple[Levels, Levels, dict[tuple[int, int
 def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, Figure]]:
     """Yield the curves and heat maps of a report as figures of a size [mm] with their names."""
     for scenario, axis, _, lines in _curves(groups):
-        x_range = _range([value for line in lines for value in line.x])
-        yield f"{scenario}-{axis}", rate_figure(lines, x_title=axis, x_range=x_range, size=size)
+        yield f"{scenario}-{axis}", rate_figure(lines, x_title=axis, size=size)
     by_scenario: dict[str, list[RunGroup]] = defaultdict(list)
     for group in groups:
         by_scenario[group.scenario].append(group)

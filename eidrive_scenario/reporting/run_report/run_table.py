@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedCriterion, ReportedRun
@@ -79,7 +79,9 @@ def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
         ],
         "outcomes": [OUTCOMES.index(run.outcome) for run in runs],
         "groups": numbers,
-        "groupNames": [" · ".join([group.scenario, group.channel, *_settings_of(group)]) for group in groups],
+        "groupNames": [
+            " · ".join([group.scenario, group.channel, *map(": ".join, group.differing.items())]) for group in groups
+        ],
         "criteria": [[_verdict(criterion, kinds, texts) for criterion in run.criteria] for run in runs],
         "kinds": [[name, _rounded(limit), unit] for name, limit, unit in kinds],
         "metrics": metrics,
@@ -165,20 +167,6 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _EXACT
 
 
-def _settings_of(group: RunGroup) -> list[str]:
-    return [f"{name}: {value}" for name, value in group.differing.items()]
-
-
-def common_failures(runs: Sequence[ReportedRun]) -> Mapping[str, int]:
-    """Return the number of failed runs of each criterion that failed, the most frequent ones first."""
-    counts: dict[str, int] = {}
-    for run in runs:
-        if run.outcome == "failed":
-            for name in dict.fromkeys(criterion.name for criterion in run.criteria if not criterion.passed):
-                counts[name] = counts.get(name, 0) + 1
-    return dict(sorted(counts.items(), key=lambda entry: -entry[1]))
-
-
 _NAMED = 4
 """Maximum number of criteria that a headline names."""
 
@@ -189,8 +177,13 @@ def headline(runs: Sequence[ReportedRun]) -> str:
     several = len(runs) > 1
     if counts["passed"] == len(runs):
         return f"All {len(runs)} runs passed" if several else "The run passed"
-    failures = common_failures(runs)
-    names = [f"{name} ({count})" if several else name for name, count in failures.items()][:_NAMED]
+    failures = Counter(
+        name
+        for run in runs
+        if run.outcome == "failed"
+        for name in dict.fromkeys(criterion.name for criterion in run.criteria if not criterion.passed)
+    )
+    names = [f"{name} ({count})" if several else name for name, count in failures.most_common(_NAMED)]
     names += [f"{len(failures) - _NAMED} more criteria"] * (len(failures) > _NAMED)
     verbs = {"failed": f"failed: {', '.join(names)}" if names else "failed", "did not finish": "did not finish"}
     verbs["not judged"] = "were not judged" if counts["not judged"] > 1 else "was not judged"
