@@ -74,7 +74,7 @@ class Samples:
         return len(self.images)
 
 
-def fit_anchors(dataset: Dataset, seed: int, rounds: int = 60) -> Anchors:
+def fit_anchors(dataset: Dataset, seed: int) -> Anchors:
     """Return nine anchors, sorted by area, three for each scale.
 
     They are the k-means clusters of box widths and heights, with the overlap of concentric boxes as similarity (Redmon
@@ -84,7 +84,7 @@ def fit_anchors(dataset: Dataset, seed: int, rounds: int = 60) -> Anchors:
     sides = np.maximum(box[:, 2:] - box[:, :2], 2.0)
     rng = np.random.default_rng(seed)
     means = sides[rng.choice(len(sides), len(STRIDES) * ANCHORS_PER_SCALE, replace=False)]
-    for _ in range(rounds):
+    for _ in range(60):
         shared = np.minimum(sides[:, None], means[None]).prod(axis=2)
         near = (shared / (sides.prod(axis=1)[:, None] + means.prod(axis=1)[None] - shared)).argmax(axis=1)
         means = np.array(

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.experiments.statistics.intervals import interval_text
-from eidrive_scenario.experiments.statistics.paired import PairedDifference
 from eidrive_scenario.experiments.sweeps.axes import text_of_value
 from eidrive_scenario.experiments.sweeps.comparison import UNDECIDED, Comparison, NamedComparison
 from eidrive_scenario.reporting.page import write_page
@@ -150,15 +149,14 @@ def _table(comparisons: Sequence[NamedComparison]) -> tuple[list[str], list[_Row
             str(counts.only_second),
             f"{counts.difference:+.1%} ({low:+.1%} to {high:+.1%})",
             f"{comparison.p_value:.3g}",
-            *(_difference(comparison.metrics.get(metric)) for metric in metrics),
+            *(
+                f"{paired.mean:+.4g} ({interval_text(paired.low, paired.high, '+.4g')})" if paired is not None else ""
+                for paired in map(comparison.metrics.get, metrics)
+            ),
         ]
         bar = low, high, counts.difference
         rows.append(_Row(name, cells, comparison.conclusion, remark if comparison.lost else "", bar))
     return columns, rows
-
-
-def _difference(paired: PairedDifference | None) -> str:
-    return "" if paired is None else f"{paired.mean:+.4g} ({interval_text(paired.low, paired.high, '+.4g')})"
 
 
 def _compared(comparisons: Sequence[NamedComparison]) -> Comparison:

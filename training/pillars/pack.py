@@ -83,13 +83,13 @@ def _required(boxes: Array, cloud: LidarReading) -> Bools:
     return required
 
 
-def codebook(scans: list[Measured], seed: int = 1) -> Floats:
+def codebook(scans: list[Measured]) -> Floats:
     """Return the centers (256, 8) of the compressed features of cells with objects, by k-means.
 
     Most of the cells that a station sends have no object: they are a fifth of the sample, or they would have most of
     the entries.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     parts = []
     for scan in scans:
         latent, confidence = scan.features.latent.reshape(LATENT, -1).T, scan.features.confidence.ravel()

@@ -9,9 +9,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import equidistant, footprint
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.recording import Recording
@@ -46,53 +45,36 @@ class Strip(NamedTuple):
 
 
 def bridge_spans(strips: Sequence[Strip]) -> Iterator[tuple[int, float, float]]:
-    """Yield the parts of strips that are above another strip, or another part of it: index, first and last s [m]."""
-    usual = [index for index, strip in enumerate(strips) if strip.points.size and _is_usual(strip)]
-    strips = [strips[index] for index in usual]
-    if not strips:
+    """Yield the parts of strips that are above another strip, or another part of it: index, first and last s [m].
+
+    Strips with numbers that are not finite, or beyond the maximum coordinate, are omitted.
+    """
+    usual = [
+        (index, strip)
+        for index, strip in enumerate(strips)
+        if strip.points.size and np.isfinite(strip.heights).all() and (np.abs(strip.points) <= _FARTHEST).all()
+    ]
+    levels = [level for _, strip in usual for level in (float(strip.heights.min()), float(strip.heights.max()))]
+    if not usual or max(levels) - min(levels) < CLEARANCE:
         return
-    highest = max(float(strip.heights.max()) for strip in strips)
-    lowest = min(float(strip.heights.min()) for strip in strips)
-    if highest - lowest < CLEARANCE:
-        return
-    cells = _cells(strips)
-    flat = np.concatenate([cell.ravel() for cell in cells])
-    heights = np.concatenate([np.tile(strip.heights, len(strip.points)) for strip in strips])
-    occupied, cell_of_point = np.unique(flat, return_inverse=True)
+    heights = np.concatenate([np.tile(strip.heights, len(strip.points)) for _, strip in usual])
+    # The lowest height in each square of the plane, and the points that are above it
+    squares = np.floor(np.concatenate([strip.points.reshape(-1, 2) for _, strip in usual]) / _CELL).astype(np.int64)
+    rows = squares[:, 1] - squares[:, 1].min()
+    occupied, square_of_point = np.unique(squares[:, 0] * (rows.max() + 1) + rows, return_inverse=True)
     ground = np.full(len(occupied), np.inf)
-    np.minimum.at(ground, cell_of_point, heights)
-    above = heights - ground[cell_of_point] >= CLEARANCE
-    start = 0
-    for index, strip, cell in zip(usual, strips, cells, strict=True):
-        covers = above[start : start + cell.size].reshape(cell.shape).any(axis=0)
-        start += cell.size
-        for first, last in _runs(covers):
+    np.minimum.at(ground, square_of_point, heights)
+    above = heights - ground[square_of_point] >= CLEARANCE
+    ends = np.cumsum([strip.points.size // 2 for _, strip in usual])
+    for (index, strip), of_strip in zip(usual, np.split(above, ends[:-1]), strict=True):
+        covers = of_strip.reshape(strip.points.shape[:2]).any(axis=0)
+        changes = np.flatnonzero(np.diff(covers, prepend=False, append=False)).tolist()
+        for first, end in zip(changes[::2], changes[1::2], strict=True):
             yield (
                 index,
                 max(float(strip.stations[0]), float(strip.stations[first]) - _MARGIN),
-                min(float(strip.stations[-1]), float(strip.stations[last]) + _MARGIN),
+                min(float(strip.stations[-1]), float(strip.stations[end - 1]) + _MARGIN),
             )
-
-
-def _is_usual(strip: Strip) -> bool:
-    """Return whether all numbers are finite and no coordinate is beyond the maximum."""
-    return bool(np.isfinite(strip.heights).all() and (np.abs(strip.points) <= _FARTHEST).all())
-
-
-def _cells(strips: Sequence[Strip]) -> list[Integers]:
-    """Return the number of the square of each point of the strips, (K, N) each."""
-    columns_and_rows = [np.floor(strip.points / _CELL).astype(np.int64) for strip in strips]
-    rows = [each[..., 1] for each in columns_and_rows]
-    lowest = min(int(each.min()) for each in rows)
-    count = max(int(each.max()) for each in rows) - lowest + 1
-    return [each[..., 0] * count + (each[..., 1] - lowest) for each in columns_and_rows]
-
-
-def _runs(covers: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield first and last index of each run of True."""
-    changes = np.flatnonzero(np.diff(covers, prepend=False, append=False)).tolist()
-    for first, end in zip(changes[::2], changes[1::2], strict=True):
-        yield first, end - 1
 
 
 SPACING = 1.0

@@ -194,28 +194,31 @@ def _box(element: StoryElement, elements: ReferenceMatch[StoryElement]) -> Box:
         lines += _trigger(element.stop_leaf.trigger, Role.STOP, "stops when")
     children = element.elements
     if isinstance(element, ManeuverGroupElement):
-        lines += _group_lines(element)
+        actions = [action for action in _walk(element) if isinstance(action, ActionElement)]
+        actors = dict.fromkeys(name for action in actions for name in action.actors if name is not None)
+        if any(action.triggering is not None for action in actions):
+            actors["triggering entities of the act"] = None
+        if actors:
+            lines.append(BoxLine(Role.ACTORS, "", ", ".join(actors)))
         if len(children) == 1:
             lines.append(BoxLine(Role.CONTENT, "maneuver", children[0].name))
             children = children[0].elements
     if isinstance(element, ActionElement):
-        lines += _action_lines(element)
+        behaviors = [behavior for actor in element.actors for behavior in element.behaviours(actor)]
+        texts = dict.fromkeys(behavior.describe() for behavior in behaviors)
+        lines += [BoxLine(Role.CONTENT, "", text) for text in texts]
+    remarks = [element.priority] if isinstance(element, EventElement) else []
+    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
+        remarks.append(f"up to {element.limit} times")
     return Box(
         element.kind,
         element.name,
         element.record.path,
-        _remark(element),
+        ", ".join(remarks),
         tuple(lines),
         [_box(child, elements) for child in children],
         tuple(dict.fromkeys(waits)),
     )
-
-
-def _remark(element: StoryElement) -> str:
-    remarks = [element.priority] if isinstance(element, EventElement) else []
-    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
-        remarks.append(f"up to {element.limit} times")
-    return ", ".join(remarks)
 
 
 def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[BoxLine]:
@@ -236,19 +239,6 @@ def _waits(trigger: Trigger, elements: ReferenceMatch[StoryElement]) -> Iterator
                 if element.kind == condition.storyboard_element_type.value:
                     path = element.record.path
                     yield path[:-1] if isinstance(element, ActionElement) else path
-
-
-def _group_lines(group: ManeuverGroupElement) -> list[BoxLine]:
-    actions = [action for action in _walk(group) if isinstance(action, ActionElement)]
-    actors = dict.fromkeys(name for action in actions for name in action.actors if name is not None)
-    if any(action.triggering is not None for action in actions):
-        actors["triggering entities of the act"] = None
-    return [BoxLine(Role.ACTORS, "", ", ".join(actors))] if actors else []
-
-
-def _action_lines(action: ActionElement) -> list[BoxLine]:
-    behaviors = [behavior for actor in action.actors for behavior in action.behaviours(actor)]
-    return [BoxLine(Role.CONTENT, "", text) for text in dict.fromkeys(behavior.describe() for behavior in behaviors)]
 
 
 @dataclass(frozen=True)
