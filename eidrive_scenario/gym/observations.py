@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import cv2
@@ -198,16 +199,16 @@ class ObservationEncoder:
         if settings.route is not None:
             reach = settings.route.length + 10.0
             high = np.tile([1.0, reach, reach], (settings.route.points, 1))
-            parts["route"] = self._route_ahead, high * [0.0, -1.0, -1.0], high
+            parts["route"] = partial(self._route_ahead, settings.route), high * [0.0, -1.0, -1.0], high
         for name, table in (("tracks", settings.tracks), ("own", settings.own)):
             if table is not None:
                 low, high = (np.tile(bound, (table.count, 1)) for bound in column_bounds(table.range))
-                parts[name] = self._table_part(name, table), low, high
+                parts[name] = partial(self._table, table, name == "tracks"), low, high
         if settings.senders:
             high = np.tile([1.0, MAX_AGE], (len(self._senders), 1))
             parts["senders"] = self._ages, np.zeros_like(high), high
         if settings.grid is not None:
-            parts["grid"] = self._grid, *grid_bounds(settings.grid)
+            parts["grid"] = partial(self._grid, settings.grid), *grid_bounds(settings.grid)
         return parts
 
     @property
@@ -259,28 +260,24 @@ class ObservationEncoder:
         driven = control.throttle, control.brake, control.steering
         return (ego.speed, ego.acceleration, ego.yaw_rate, *request, *driven)
 
-    def _route_ahead(self, perceived: StationPerception) -> Sequence[float]:
-        assert self.settings.route is not None
-        return () if self._route is None else points_ahead(self._route, perceived.ego, self.settings.route)
+    def _route_ahead(self, settings: RouteSettings, perceived: StationPerception) -> Sequence[float]:
+        return () if self._route is None else points_ahead(self._route, perceived.ego, settings)
 
-    def _table_part(self, name: str, table: TableSettings) -> Part:
-        def encode(perceived: StationPerception) -> Sequence[float]:
-            objects = perceived.fused if name == "tracks" else perceived.detections
-            return object_values(objects, perceived.ego, perceived.time, count=table.count, reach=table.range)
-
-        return encode
+    @staticmethod
+    def _table(table: TableSettings, fused: bool, perceived: StationPerception) -> Sequence[float]:
+        objects = perceived.fused if fused else perceived.detections
+        return object_values(objects, perceived.ego, perceived.time, count=table.count, reach=table.range)
 
     def _ages(self, perceived: StationPerception) -> Sequence[float]:
         newest = [self._newest.get(sender) for sender in self._senders]
         rows = [(0.0, 0.0) if time is None else (1.0, max(perceived.time - time, 0.0)) for time in newest]
         return [value for row in rows for value in row]
 
-    def _grid(self, perceived: StationPerception) -> NDArray[Any]:
-        assert self.settings.grid is not None
+    def _grid(self, settings: GridSettings, perceived: StationPerception) -> NDArray[Any]:
         ego = perceived.ego
         route = self._route
         points = np.empty((0, 2)) if route is None else (route.points - ego.position[:2]) @ _axes(ego)
-        return occupancy_grid(perceived.fused, points, ego, self.settings.grid).ravel()
+        return occupancy_grid(perceived.fused, points, ego, settings).ravel()
 
 
 def _axes(ego: EgoState) -> Array:

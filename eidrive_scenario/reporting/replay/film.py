@@ -105,16 +105,14 @@ class RecordedStation:
             if snapshot.time > wanted + TIME_TOLERANCE:
                 break
             newest = snapshot, center
-        try:
-            if newest is not None:
-                snapshot, center = newest
+        if newest is not None:
+            snapshot, center = newest
+            with suppress(*UNDRAWABLE):
                 return scene_figure(
                     lambda canvas: draw_snapshot(canvas, snapshot, self.roads),
                     lambda ratio: Window.centered(center, EXTENT, ratio),
                     size,
                 )
-        except UNDRAWABLE:
-            pass
         raise InputError(Diagnostic("this frame of the recording cannot be drawn", "give another --at"))
 
     def pictures(self, size: tuple[int, int], rate: float) -> Iterator[Image]:
