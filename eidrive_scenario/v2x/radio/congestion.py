@@ -23,14 +23,15 @@ class NoDcc(Settings):
 
 
 class ReactiveDcc(Settings):
-    """Reactive approach: minimum interval by channel busy ratio of the last 100 ms (ETSI TS 102 687, table A.2).
+    """Reactive approach: minimum interval by channel busy ratio of the last 100 ms (ETSI TS 102 687 V1.2.1, table A.1,
+    for messages of at most 1 ms).
 
-    limits     upper bounds of the channel busy ratio, ascending
-    intervals  minimum time between two messages up to each bound [s]
+    limits     channel busy ratios below which each interval applies, ascending; the last interval also applies above
+    intervals  minimum time between two messages [s]
     """
 
     kind: Literal["reactive"]
-    limits: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = (0.20, 0.30, 0.40, 0.50, 1.0)
+    limits: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = (0.30, 0.40, 0.50, 0.60, 1.0)
     intervals: tuple[Annotated[float, Field(gt=0.0, le=LONGEST_INTERVAL)], ...] = (0.1, 0.2, 0.4, 0.5, 1.0)
 
     period: ClassVar[float] = 0.1
@@ -43,7 +44,7 @@ class ReactiveDcc(Settings):
 
     def interval_at(self, busy: Array) -> Array:
         """Return the minimum intervals [s] at these channel busy ratios."""
-        rows = np.minimum(np.searchsorted(self.limits, busy), len(self.limits) - 1)
+        rows = np.minimum(np.searchsorted(self.limits, busy, side="right"), len(self.limits) - 1)
         return np.array(self.intervals)[rows]
 
 

@@ -77,7 +77,7 @@ def test_limeric_interval_depends_on_the_channel_time_of_a_message(size: int, ch
 
 
 def test_reactive_dcc_follows_the_busy_ratio_of_subchannels() -> None:
-    """60 stations at 20 Hz offer 30 % of the subchannels: above 20 % they send at 5 Hz, at 7.5 % again at 10 Hz."""
+    """60 stations at 20 Hz offer 30 % of the subchannels; at 10 Hz, the maximum below 30 %, they use 15 %."""
     places = many(60)
     profile = {**MODE_4, "queue": {"discipline": "lcfs"}, "sidelink": {"interval": 0.05}}
     free, held = (
