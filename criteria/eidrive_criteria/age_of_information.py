@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from eidrive_criteria.linked import Link, LinkCriterion, LinkSettings
-from eidrive_scenario.api.criteria import ReceptionLog, Verdict
+from eidrive_scenario.api.criteria import Frame, ReceptionLog, Verdict
 from eidrive_scenario.api.v2x import LinkEvent, ReceivedMessage
 
 Measure = Literal["mean", "p95", "peak"]
@@ -31,7 +31,8 @@ class AgeOfInformation(LinkCriterion):
     """Criterion that fails if the age of information of one of the links exceeds `at_most`.
 
     The age is the time since the generation of the newest message that the receiver has got from the sender. It counts
-    from the first reception on. A link on which all messages were lost has an infinite age.
+    from the first reception on, and again after an absence of the receiver. A link on which all messages were lost has
+    an infinite age.
     """
 
     settings_type = AgeOfInformationSettings
@@ -44,6 +45,11 @@ class AgeOfInformation(LinkCriterion):
         self._log = ReceptionLog()
         self._used: set[Link] = set()
         """Links with a lost or received message."""
+
+    def observe(self, frame: Frame) -> None:
+        for receiver in {receiver for _, receiver in self._used if receiver not in frame.view.rows}:
+            self._log.end_links(receiver, self.time)
+        super().observe(frame)
 
     def add_outcome(self, event: LinkEvent) -> None:
         if event.outcome == "lost":

@@ -126,6 +126,15 @@ def test_age_of_information(exchange: Any) -> None:
     assert not age(frames, sender="A", at_most=0.67).passed
 
 
+def test_age_of_information_does_not_count_the_absence_of_the_receiver(exchange: Any, frame: Any, car: Any) -> None:
+    """The age rises from 0.2 s at 0.2 s to 1 s at 1 s, and after the absence from 0.2 s at 2.2 s to 1 s at 3 s."""
+    frames = [
+        frame(present.view.time, {"A": car(20), "B": car(40)}) if 1.1 < present.view.time < 1.9 else present
+        for present in exchange(3.0, ("A", "Ego", 0.0, 0.2), ("A", "Ego", 2.0, 2.2))
+    ]
+    assert age(frames, receiver="Ego").value == pytest.approx(0.6)
+
+
 def test_age_of_the_worst_link_counts(exchange: Any) -> None:
     """The age of B at the Ego rises from 0.2 s at 1.2 s to 2 s at 3 s, that of A from 0.2 s at 2.2 s to 1 s."""
     frames = exchange(3.0, ("A", "Ego", 2.0, 2.2), ("B", "Ego", 1.0, 1.2))
