@@ -163,9 +163,7 @@ def build_agent(
         fusion=fusion,
         planner=driver,
         controller=controller,
-        message_generator=MessageGenerator(
-            spec, settings, sensors=len(sensors), view=view, encoder=encoder, seed=seed, dt=dt, number=number
-        ),
+        message_generator=MessageGenerator(spec, settings, view=view, encoder=encoder, seed=seed, dt=dt, number=number),
         dt=dt,
         receives_messages=listens,
         sharing=sharing,

@@ -35,8 +35,7 @@ from eidrive_scenario.world.actor import ActorSpec
 class MessageGenerator:
     """Generator of the messages of one station, by the rules that its settings select.
 
-    sensors  number of sensors of the station
-    view     sectors that they cover, for the sensor information of its CPMs
+    view     sectors of the sensors with which the station perceives objects, for the sensor information of its CPMs
     encoder  encodes messages to measure their size; None uses the size model
     seed     of the phase of the messages. Stations are not synchronized, so that their phases are random and uniform
     dt       time step [s]: messages are generated in the time step after their phase, and passed to the radio with an
@@ -49,7 +48,6 @@ class MessageGenerator:
         spec: ActorSpec,
         settings: AgentSettings,
         *,
-        sensors: int,
         view: tuple[ViewSector, ...] = (),
         encoder: Asn1Encoder | None = None,
         seed: int = 0,
@@ -58,7 +56,6 @@ class MessageGenerator:
     ) -> None:
         self._spec = spec
         self._settings = settings
-        self._sensors = sensors
         self._view = view
         self._encoder = encoder
         self._clock = settings.clock
@@ -174,10 +171,10 @@ class MessageGenerator:
         contents = self._cpm_rules.contents(detections, numbers, now, shortest)
         if contents is None:
             return []
-        lists_sensors, rows = contents.sensors and self._sensors > 0, list(contents.rows)
+        lists_sensors, rows = contents.sensors and bool(self._view), list(contents.rows)
         generated: list[Message] = []
         while rows or not generated:
-            sensors = self._sensors if lists_sensors else 0
+            sensors = len(self._view) if lists_sensors else 0
             room = objects_that_fit(self._settings.mtu, sensors, self._settings.security_bytes)
             part, rows = rows[:room], rows[room:]
             objects = tuple(numbers[row] for row in part)
@@ -202,14 +199,14 @@ class MessageGenerator:
 
         lists_sensors  whether a CPM has sensor information;  low_frequency  whether a CAM has that container
         """
-        sensors, security = self._sensors if lists_sensors else 0, self._settings.security_bytes
+        sensors, security = len(self._view) if lists_sensors else 0, self._settings.security_bytes
         size = cam_size(low_frequency) if kind == "cam" else cpm_size(len(detections), sensors, security)
         view = self._view if lists_sensors else None
         message = Message(self._spec.name, self.number, now, state, detections, size, kind, objects, sensors=view)
         self.number += 1
         if self._encoder is None:
             return message
-        encoded = self._encoder.encode(message, sensors=sensors, low_frequency=low_frequency)
+        encoded = self._encoder.encode(message, low_frequency=low_frequency)
         return replace(message, size=len(encoded) + security)
 
 

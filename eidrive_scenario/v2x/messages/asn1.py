@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -91,17 +90,16 @@ class Asn1Encoder:
         car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), (self._station,), *unknown(1))
         state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for seen, more in ((car, True), (car if kind == "cam" else Detections(0.0), False)):
-            message = Message("station", 0, 0.0, state, seen, 0, "cam" if kind == "cam" else "cpm")
-            self.encode(message, sensors=int(more), low_frequency=more)
+            sensors = (ViewSector(0.0, 0.0, 0.0, 0.0, math.pi, math.inf),) if more else None
+            message = Message("station", 0, 0.0, state, seen, 0, "cam" if kind == "cam" else "cpm", sensors=sensors)
+            self.encode(message, low_frequency=more)
 
-    def encode(self, message: Message, *, sensors: int = 0, low_frequency: bool = False) -> bytes:
-        """Return the encoded message; `sensors` applies to a CPM, `low_frequency` to a CAM.
+    def encode(self, message: Message, *, low_frequency: bool = False) -> bytes:
+        """Return the encoded message; `low_frequency` applies to a CAM.
 
         Raise SettingError if the message does not match the type of the module.
         """
-        value = (
-            cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, sensors, self._station)
-        )
+        value = cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, self._station)
         try:
             encoded: bytes = self._modules.encode(TYPES[message.kind], value)
         except Exception as error:  # errors of many types, such as AttributeError for a recursive type
@@ -160,7 +158,7 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
     }
 
 
-def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
+def cpm_value(message: Message, station: str) -> dict[str, Any]:
     """Return a CPM (TR 103 562, annex A) of a station of this class.
 
     Objects are in the frame of the sender. A CPM of a roadside unit omits the container of the originating station.
@@ -172,10 +170,9 @@ def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
     }
     if station != ROADSIDE:
         parameters["stationDataContainer"] = ("originatingVehicleContainer", _motion(state))
-    if sensors:
-        sectors = (message.sensors or ())[:sensors]
+    if message.sensors:
         parameters["sensorInformationContainer"] = [
-            _sensor(number, sector) for number, sector in zip_longest(range(sensors), sectors)
+            _sensor(number, sector) for number, sector in enumerate(message.sensors)
         ]
     if len(detections):
         delay = _clamp((state.time - detections.time) * 1e3, -1500, 1500)
@@ -222,19 +219,20 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
     }
 
 
-def _sensor(number: int, sector: ViewSector | None) -> dict[str, Any]:
-    """Return a sensor with its sector in the frame of the station; without one with unknown properties."""
-    properties = {"range": 0, "horizontalOpeningAngleStart": 3601, "horizontalOpeningAngleEnd": 3601}
-    area: dict[str, Any] = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0}
-    if sector is not None:
-        first, last = 0, 3600
-        if sector.half_angle < math.pi:
-            first, last = (_tenths_of_degrees(sector.yaw + side * sector.half_angle) for side in (-1.0, 1.0))
-        reach = _clamp(10.0 * sector.range, 0, 10000) if math.isfinite(sector.range) else 10000
-        properties = {"range": reach, "horizontalOpeningAngleStart": first, "horizontalOpeningAngleEnd": last}
-        area["xSensorOffset"] = _clamp(100.0 * sector.x, -5000, 0)
-        area["ySensorOffset"] = _clamp(100.0 * sector.y, -1000, 1000)
-    area["vehicleSensorPropertyList"] = [properties]
+def _sensor(number: int, sector: ViewSector) -> dict[str, Any]:
+    """Return a sensor with its sector in the frame of the station."""
+    first, last = 0, 3600
+    if sector.half_angle < math.pi:
+        first, last = (_tenths_of_degrees(sector.yaw + side * sector.half_angle) for side in (-1.0, 1.0))
+    reach = _clamp(10.0 * sector.range, 0, 10000) if math.isfinite(sector.range) else 10000
+    area = {
+        "refPointId": 0,
+        "xSensorOffset": _clamp(100.0 * sector.x, -5000, 0),
+        "ySensorOffset": _clamp(100.0 * sector.y, -1000, 1000),
+        "vehicleSensorPropertyList": [
+            {"range": reach, "horizontalOpeningAngleStart": first, "horizontalOpeningAngleEnd": last}
+        ],
+    }
     return {"sensorID": number % 256, "type": 0, "detectionArea": ("vehicleSensor", area)}
 
 

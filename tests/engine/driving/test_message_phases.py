@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.settings import AgentSettings
@@ -16,6 +17,7 @@ from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.world.actor import ActorSpec
 
 DT = 0.01
+VIEW = ViewSector(0.0, 0.0, 1.0, 0.0, math.pi, 50.0)
 
 
 def sent(
@@ -23,7 +25,7 @@ def sent(
 ) -> list[float]:
     """Times of the messages of a station that drives straight on."""
     spec = ActorSpec(name, "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
-    generator = MessageGenerator(spec, AgentSettings.model_validate(properties), sensors=1, seed=seed)
+    generator = MessageGenerator(spec, AgentSettings.model_validate(properties), view=(VIEW,), seed=seed)
     times = [begin + tick * DT for tick in range(round(seconds / DT))]
     found = []
     for now in times:
@@ -87,7 +89,7 @@ def ready_times(dt: float, seconds: float = 2.0) -> dict[str, list[float]]:
     for number in range(40):
         spec = ActorSpec(f"Car{number}", "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
         settings = AgentSettings.model_validate({"message_rate": 10})
-        generator = MessageGenerator(spec, settings, sensors=1, seed=3, dt=dt)
+        generator = MessageGenerator(spec, settings, view=(VIEW,), seed=3, dt=dt)
         for tick in range(round(seconds / dt)):
             now = tick * dt
             for message in generator.generate(StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0), Detections(now), now):
@@ -110,7 +112,7 @@ def test_message_at_a_multiple_of_the_time_step_has_no_offset() -> None:
     for phase, expected in ((0.0, 0.0), (0.1, 0.0), (0.15, 0.0), (0.13, 0.03)):
         spec = ActorSpec("Car", "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
         settings = AgentSettings.model_validate({"message_rate": 1, "message_phase": phase})
-        generator = MessageGenerator(spec, settings, sensors=1, dt=0.05)
+        generator = MessageGenerator(spec, settings, view=(VIEW,), dt=0.05)
         found: list[Message] = []
         for tick in range(10):
             now = tick * 0.05

@@ -117,18 +117,22 @@ def test_sensor_information_is_sent_once_per_second_by_the_rules_of_etsi() -> No
     assert len(times) >= 3
 
 
+def test_cpm_lists_only_sensors_that_perceive_objects() -> None:
+    """The size is 121 + 35 (S + O) bytes (Thandavarayan et al. 2019): GNSS and IMU have no detection area."""
+    (message,) = sent(station(localization="ekf"), 0.05)
+    assert message.size == 121 + 35 * (1 + len(message.detections))
+
+
 def test_encoded_sensor_has_range_and_opening_angles() -> None:
     """Units of TR 103 562: 0.1 m, and 0.1 degree counter-clockwise from the axis of the station."""
-    value = cpm_value(cpm(1.0, sensors=(AHEAD,)), 2, "car")
-    first, second = value["cpm"]["cpmParameters"]["sensorInformationContainer"]
-    (properties,) = first["detectionArea"][1]["vehicleSensorPropertyList"]
+    value = cpm_value(cpm(1.0, sensors=(AHEAD,)), "car")
+    (sensor,) = value["cpm"]["cpmParameters"]["sensorInformationContainer"]
+    (properties,) = sensor["detectionArea"][1]["vehicleSensorPropertyList"]
     assert properties == {
         "range": 600,
         "horizontalOpeningAngleStart": 3100,
         "horizontalOpeningAngleEnd": 500,
     }
-    (unknown,) = second["detectionArea"][1]["vehicleSensorPropertyList"]
-    assert unknown["horizontalOpeningAngleStart"] == 3601
 
 
 def test_message_with_shared_points_has_a_region(monkeypatch: pytest.MonkeyPatch) -> None:

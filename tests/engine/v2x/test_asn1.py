@@ -65,7 +65,7 @@ def test_encoder_writes_roadside_unit_without_speed_and_heading() -> None:
     assert "lowFrequencyContainer" not in cam
     cpm = encoder.decode("cpm", encoder.encode(message("cpm", 1)))["cpm"]["cpmParameters"]
     assert cpm["managementContainer"]["stationType"] == 15
-    by_class = {name: cpm_value(message("cpm", 1), 0, name)["cpm"]["cpmParameters"] for name in ("misc", "truck")}
+    by_class = {name: cpm_value(message("cpm", 1), name)["cpm"]["cpmParameters"] for name in ("misc", "truck")}
     assert ["stationDataContainer" in parameters for parameters in by_class.values()] == [False, True]
 
 
