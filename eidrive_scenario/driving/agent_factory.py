@@ -16,6 +16,7 @@ from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.lidar.station import StationLidars, turning_each_step
 from eidrive_scenario.perception.localization import Localizer, MotionNoise, PoseNoiseProcess
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
@@ -147,7 +148,7 @@ def build_agent(
         if listens:  # perception of merged data: that of the station, without localization
             another = detector if fusion.shares == "features" else build_detector(settings)
             if another is not detector:
-                another.setup(installation)
+                another.setup(DetectorContext(spec, turning_each_step(sensors, dt), roads, seed))
             joint = Perception(
                 another,
                 tracker=_tracker(settings, another),
@@ -155,7 +156,9 @@ def build_agent(
                 false_objects=settings.false_objects,
             )
         limit = settings.mtu - settings.security_bytes
-        sharing = SensorDataSharing(fusion, perception, joint, limit=limit, latency=settings.detector_latency)
+        sharing = SensorDataSharing(
+            fusion, perception, joint, lidars=StationLidars(sensors), limit=limit, latency=settings.detector_latency
+        )
     return Agent(
         spec,
         settings,

@@ -57,7 +57,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
         return self.settings.max_lateness
 
     def payloads(self, readings: Readings, limit: int) -> tuple[Payload, ...]:
-        """Return the points of all lidars of a station."""
+        """Return the points of all lidars of a station, whose readings are those of whole revolutions."""
         if not readings.lidars:
             return ()
         points = np.concatenate([reading.world_points for reading in readings.lidars.values()])

@@ -19,6 +19,7 @@ from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.perception.lidar.station import StationLidars
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import describe
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, pose_covariance_at
@@ -144,18 +145,27 @@ class SensorDataSharing:
     perception  perception of the station alone
     joint       separate instance for the merged data, as detectors and trackers have state; None for a station that
                 does not receive messages
+    lidars      of the station, whose last revolution is shared
     limit       maximum size of a message with features [bytes]
     latency     computing time after which features are sent [s]; points are sent at once
     """
 
     def __init__(
-        self, fusion: FusionMethod, perception: Perception, joint: Perception | None, *, limit: int, latency: float
+        self,
+        fusion: FusionMethod,
+        perception: Perception,
+        joint: Perception | None,
+        *,
+        lidars: StationLidars,
+        limit: int,
+        latency: float,
     ) -> None:
         self.own: tuple[Payload, ...] = ()
         """Newest sensor data of this station that are ready for transmission."""
         self._fusion = fusion
         self._perception = perception
         self._joint = joint
+        self._lidars = lidars
         self._limit = limit
         self._latency = latency if fusion.shares == "features" else 0.0
         self._features: FeatureMap | None = None
@@ -174,6 +184,8 @@ class SensorDataSharing:
             newest = self._perception.detector.feature_map
             readings = replace(readings, features=None if newest is self._features else newest)
             self._features = newest
+        else:
+            readings = replace(readings, lidars=self._lidars.revolutions(readings))
         now = readings.time
         payloads = self._fusion.payloads(readings, self._limit)
         if payloads:

@@ -47,6 +47,19 @@ class StationLidars:
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
 
+def turning_each_step(sensors: Mapping[str, SensorSettings], dt: float) -> dict[str, SensorSettings]:
+    """Return sensors whose lidars have the same rays, and turn at least once per time step `dt` [s].
+
+    They describe readings of whole revolutions, which a detector must not accumulate again.
+    """
+    turning = dict(sensors)
+    for name, lidar in sensors.items():
+        if isinstance(lidar, LidarSettings) and lidar.rotation * dt < 1.0:
+            rays = lidar.points_per_second / lidar.rotation
+            turning[name] = lidar.model_copy(update={"rotation": 1.0 / dt, "points_per_second": rays / dt})
+    return turning
+
+
 class _Revolution:
     """Readings of one sensor that cover its last revolution, for readings that each cover only a part of it."""
 

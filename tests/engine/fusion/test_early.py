@@ -103,6 +103,25 @@ def test_early_fusion_detects_car_in_received_points_without_forwarding_it() -> 
     assert math.dist(step.fused.boxes[0, :2], CAR) < 0.5
 
 
+def test_station_shares_the_points_of_its_last_revolution() -> None:
+    """Half a revolution in each tick: the car is in the first half, and the message follows the second one."""
+    rsu = agent(RSU, sensors={"lidar": {"rotation": 10.0}}, message_rate=10.0, message_phase=0.05)
+    rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None)
+    (message,) = rsu.act(readings(0.05, (40.0, 12.0, math.pi)), (), 0.05, None).outbox
+    assert message.points is not None
+    assert (message.points.points()[:, 2] > 0.15).sum() > 100
+
+
+def test_points_of_earlier_messages_are_not_merged_with_later_parts_of_a_revolution() -> None:
+    """The received points show one car that moves by 6 m while the lidar of the ego completes its revolution."""
+    ego, rsu = agent(EGO, sensors={"lidar": {"rotation": 10.0}}), agent(RSU)
+    for now, x in ((0.0, 20.0), (0.05, 26.0)):
+        sent = rsu.act(readings(now, (40.0, 12.0, math.pi), car(x, 4.0, "fl")), (), now, None).outbox[0]
+        ego.act(readings(now + 0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(sent, now)], now + 0.05, None)
+        (detected,) = (report.detections for report in ego.reports if report.station == "Ego")
+        assert detected.boxes[:, 0].tolist() == pytest.approx([x], abs=0.5)
+
+
 def test_early_fusion_separates_far_cars_in_adjacent_lanes() -> None:
     """Both are near a unit and 76 m from the ego, where the columns of the ego rays are 3 m apart."""
     cars = (76.0, 4.0), (76.0, 7.2)
