@@ -155,7 +155,7 @@ class Localizer:
         """Return the readings with the estimated motion, and with the sensor poses that follow from it."""
         truth = readings.ego
         if self._filter is None:
-            self._filter = InertialFilter(self._initial_estimate(truth), self._noise)
+            self._filter, self._time = InertialFilter(self._initial_estimate(truth), self._noise), readings.time
         else:
             self._filter.propagation = self._filter.estimate.covariance
         self._imu = readings.imu or self._imu

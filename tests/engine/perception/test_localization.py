@@ -254,6 +254,16 @@ def test_localizer_between_fixes_follows_imu() -> None:
     np.testing.assert_allclose(np.diff(xs), 0.5, atol=0.05)
 
 
+def test_localizer_of_a_station_that_enters_late_starts_at_its_first_reading() -> None:
+    """The filter does not extrapolate the acceleration at the entry over the time before it."""
+    starts = [
+        Localizer("Ego", 1).with_estimated_pose(Readings(time, ego(5.0, 6.0, 1.0, 3.0, time), imu=imu(4.0, 0.2))).ego
+        for time in (0.0, 6.0)
+    ]
+    np.testing.assert_array_equal(starts[0].position, starts[1].position)
+    assert (starts[0].yaw, starts[0].speed) == (starts[1].yaw, starts[1].speed)
+
+
 def test_estimate_before_first_reading_raises() -> None:
     with pytest.raises(ValueError, match="before the first reading"):
         Localizer("Ego", 1).estimate  # noqa: B018
