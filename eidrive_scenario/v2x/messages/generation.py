@@ -73,7 +73,8 @@ class CamGenerationRules:
         return True
 
     def _start_in_steady_state(self, state: StationState, now: float, elapsed: float) -> None:
-        interval = DISTANCE / state.speed if state.speed * LONGEST > DISTANCE else LONGEST
+        speed = abs(state.speed)
+        interval = DISTANCE / speed if speed * LONGEST > DISTANCE else LONGEST
         age = elapsed * max(interval, SHORTEST)
         back = state.speed * age
         x, y = state.x - back * math.cos(state.yaw), state.y - back * math.sin(state.yaw)
