@@ -112,7 +112,7 @@ def test_station_shares_the_points_of_its_last_revolution() -> None:
     assert (message.points.points()[:, 2] > 0.15).sum() > 100
 
 
-def test_points_of_earlier_messages_are_not_merged_with_later_parts_of_a_revolution() -> None:
+def test_points_of_earlier_messages_are_not_merged_again() -> None:
     """The received points show one car that moves by 6 m while the lidar of the ego completes its revolution."""
     ego, rsu = agent(EGO, sensors={"lidar": {"rotation": 10.0}}), agent(RSU)
     for now, x in ((0.0, 20.0), (0.05, 26.0)):
