@@ -96,7 +96,8 @@ class SnapshotBuilder:
         message = received.message
         if message.objects is not None:
             assembler = PartialReportAssembler(self._settings.report_lifetime)
-            complete = self._partial.setdefault(message.sender, assembler).update(message)
+            assembler = self._partial.setdefault(message.sender, assembler)
+            complete = assembler.update(message.objects, message.identified)
             received = replace(received, message=replace(message, detections=complete))
         key = message.sender, message.kind
         held = self._newest.get(key)

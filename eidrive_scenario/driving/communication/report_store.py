@@ -52,13 +52,17 @@ class PartialReportAssembler:
         self._timeout = timeout
         self._objects: dict[int, Detections] = {}
 
-    def update(self, message: Message) -> Detections:
+    def update(self, ids: Sequence[int], detections: Detections) -> Detections:
         """Add a message; return all known objects predicted to the time of the newest measurement.
 
         Objects are predicted at their last velocity; objects of unknown velocity keep their position.
+
+        ids         of the objects in the message
+        detections  those of them that are not the ego body, with their ids
         """
-        detections = message.detections
-        for row, number in enumerate(message.objects or ()):
+        for number in set(ids).difference(detections.tracks):
+            self._objects.pop(number, None)
+        for row, number in enumerate(detections.tracks):
             held = self._objects.get(number)
             if held is None or held.time <= detections.time:
                 self._objects[number] = detections.subset([row])
@@ -284,9 +288,7 @@ class ReportStore:
             if message.detections.time + self._lifetime < now - TIME_TOLERANCE:
                 expired.append(row)
                 continue
-            detections = message.detections
-            if message.objects is not None and not detections.tracks:
-                detections = replace(detections, tracks=message.objects)
+            detections = message.identified
             state: StationState | None = message.state
             pose_change: Array | None = None
             if not own:
@@ -298,10 +300,10 @@ class ReportStore:
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
             completed: Detections | None = None
-            if not complete:  # the message lists a part of the objects of its sender
+            if message.objects is not None:  # the message lists a part of the objects of its sender
                 if sender not in self._partial:
                     self._partial[sender] = PartialReportAssembler(self._lifetime)
-                completed = self._without_own_body(message, self._partial[sender].update(message), pose_covariance)
+                completed = self._partial[sender].update(message.objects, detections)
             self.add(Report(station, detections, received.arrived, state, complete, pose_change), completed)
         if now > self._next_deletion:
             ends = {station: self._end_of_life(held) for station, held in self._reports.items()}

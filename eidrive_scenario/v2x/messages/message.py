@@ -73,6 +73,12 @@ class Message(msgspec.Struct, frozen=True, gc=False):
         """Sensor data in the message; None without."""
         return self.points if self.features is None else self.features
 
+    @property
+    def identified(self) -> Detections:
+        """Detections with the object ids of the message as track numbers."""
+        given = self.detections
+        return given if self.objects is None or given.tracks else replace(given, tracks=self.objects)
+
 
 def station_id(name: str) -> int:
     """Return the number of a station in encoded messages: the last four bytes of its name."""

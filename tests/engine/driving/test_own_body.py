@@ -10,9 +10,11 @@ from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.communication.own_body import OwnBody
-from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.v2x.messages.message import StationState
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec
 
 Place = tuple[float, float]
@@ -152,3 +154,24 @@ def test_objects_far_from_all_places_of_the_body_are_kept(car: ActorSpec) -> Non
         assert alone == len(own.without(seen(place, far_away, time=time))) - 1
         removed += alone == 0
     assert removed > 5
+
+
+def test_former_places_of_the_body_are_not_held_under_old_ids(car: ActorSpec) -> None:
+    """A station reports the ego as object 3, and 0.4 s and 4 m later as object 5, in messages that list a part."""
+    settings = AgentSettings.model_validate({"fusion": "average", "planner": "none"})
+    agent = build_agent(settings, car, None, seed=0, dt=0.05)
+    agent.receives_messages = True
+    ahead, pillar = car.offset[0], (30.0, 9.0)
+    for tick in range(9):
+        now, x = 0.05 * tick, 0.5 * tick
+        inbox = []
+        if tick in (0, 8):
+            places, ids = ((x + ahead, 0.0), pillar), ((3, 4) if tick == 0 else (5, 4))
+            detections = seen(*places, covariance=np.diag([0.04, 0.04]), time=now)
+            state = StationState(now, 40.0, 9.0, 0.0, 0.0, 0.0)
+            inbox = [ReceivedMessage(Message("RSU", tick, now, state, detections, 200, objects=ids), now)]
+        ego = EgoState(now, np.array([x, 0.0, 0.0]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0)
+        nothing = TruthReading((), (), np.zeros((0, 7)), np.zeros((0, 2)), np.ones(0))
+        agent.act(Readings(now, ego, nothing), inbox, now, None)
+    (report,) = (report for report in agent.reports if report.station == "RSU")
+    assert report.detections.boxes[:, :2].tolist() == [list(pillar)]
