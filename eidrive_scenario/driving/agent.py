@@ -62,7 +62,7 @@ class Agent:
         """Whether the station receives messages; a station that does not drive may only transmit."""
         self.sharing = sharing
         self.message_generator = message_generator
-        self._detections = Detections(0.0)
+        self._detections: Detections | None = None
         self._regions: PerceptionRegionStore | None = None
         if planner is not None and planner.observes_regions:
             self._regions = PerceptionRegionStore()
@@ -128,8 +128,8 @@ class Agent:
         ego = readings.ego
         self._own_body.record(ego, readings.attached)
         fresh = self.perception.perceive(readings)
-        if fresh is not None:
-            self._detections = fresh
+        if fresh is not None or self._detections is None:  # nothing is measured before the first detections
+            self._detections = Detections(now) if fresh is None else fresh
         detections = self._detections
         covariance = self.perception.pose_covariance
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)

@@ -115,6 +115,15 @@ def test_total_loss_equals_no_cooperation_exactly(car: ActorSpec) -> None:
         assert first.inbox == second.inbox == ()
 
 
+def test_station_that_enters_late_sends_no_detections_from_before_its_entry() -> None:
+    """The first detections are available after 0.3 s; until then nothing is measured."""
+    rsu = agent(RSU, detector_latency=0.3)
+    sent = [rsu.act(readings(6.0 + DT * tick, (0.0, 0.0), (9.0, 0.0)), (), 6.0 + DT * tick, None) for tick in range(8)]
+    listed = [step.outbox[0].detections for step in sent]
+    assert [len(detections) for detections in listed] == [0] * 6 + [1] * 2
+    assert [detections.time for detections in listed] == pytest.approx([6.0] * 7 + [6.05])
+
+
 def test_latency_delays_received_detections_only(car: ActorSpec) -> None:
     cooperation = Cooperation(car, "{delay: {kind: constant, seconds: 0.3}}")
     for tick in range(12):
