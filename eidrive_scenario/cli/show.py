@@ -156,7 +156,7 @@ def draw(
     from eidrive_scenario.reporting.drawing.scenario_picture import is_road_file, source_figure
     from eidrive_scenario.reporting.drawing.vector_canvas import check_format, parse_size, write_figure
 
-    path = Path(file) if is_road_file(file) else resolve_scenario(file)
+    path = Path(file) if is_road_file(Path(file)) else resolve_scenario(file)
     picture = out or Path(f"{path.stem}.svg")
     check_output_paths({"--out": picture}, [path])
     check_format("--out", picture)

@@ -42,7 +42,7 @@ def command_of_source(source: Scenario | Source | ConcreteRun, seed: int, settin
         path, given = source.scenario, source.assignments
     elif isinstance(source, Scenario):
         path, given = source.path, source.assigned
-    if not isinstance(path, str | Path):
+    if not isinstance(path, str | os.PathLike):
         return ""
     return command_of(resolve_scenario(path), seed, replace(settings, parameters={**given, **settings.parameters}))
 

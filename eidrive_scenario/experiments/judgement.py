@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from eidrive_scenario.evaluation.criteria_parser import (
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import CriteriaObserver, Criterion, Verdict, bind_roads
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
@@ -77,7 +79,7 @@ class Judgement:
         }
 
 
-def judge_recording(location: str | Path, criteria: Any = None) -> Judgement:
+def judge_recording(location: str | os.PathLike[str], criteria: Any = None) -> Judgement:
     """Judge a recorded run, given as its recording or the folder of the run.
 
     criteria  None for the criteria of the run, whose verdicts then equal those of the run bit for bit; or other
@@ -87,7 +89,7 @@ def judge_recording(location: str | Path, criteria: Any = None) -> Judgement:
     no readable frame, or lacks what a criterion requires, and ExtensionError for a fault of a criterion.
     """
     try:
-        return _judge(open_recording(recording_in(Path(location))), criteria)
+        return _judge(open_recording(recording_in(path_argument(location, "location"))), criteria)
     except EidriveError:
         raise
     except Exception as error:

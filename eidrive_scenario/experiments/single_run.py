@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -17,6 +18,7 @@ from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.extensions.registry import third_party_files
 from eidrive_scenario.files.atomic import atomic_output, exclusive
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE, RecordMode
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
@@ -46,11 +48,11 @@ def run_and_save(
     *,
     seed: int = DEFAULT_SEED,
     settings: RunSettings | None = None,
-    out: str | Path | None = None,
-    below: str | Path | None = None,
+    out: str | os.PathLike[str] | None = None,
+    below: str | os.PathLike[str] | None = None,
     record: bool | str = True,
-    csv: str | Path | None = None,
-    log: str | Path | None = None,
+    csv: str | os.PathLike[str] | None = None,
+    log: str | os.PathLike[str] | None = None,
     explanations: Sequence[Explanation] = (),
     observers: Sequence[Observer] = (),
     wall_limit: float | None = None,
@@ -90,20 +92,21 @@ def run_and_save(
             )
             for explanation in explanations:
                 explanation.watch(simulation.storyboard)
-            parent = out if out is not None else below
+            parent, name = (out, "out") if out is not None else (below, "below")
             folder = None
             if parent is not None:
-                folder = stack.enter_context(run_folder(Path(parent), simulation.resolved, own=out is None))
+                location = path_argument(parent, name)
+                folder = stack.enter_context(run_folder(location, simulation.resolved, own=out is None))
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
-                    stack.enter_context(exclusive(Path(log)))
+                    stack.enter_context(exclusive(path_argument(log, "log")))
                 from eidrive_scenario.recording import RunLog
 
                 simulation.add_observer(RunLog(log))
             if csv is not None:
                 from eidrive_scenario.recording import CsvWriter
 
-                simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(Path(csv)))))
+                simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(path_argument(csv, "csv")))))
             if folder is not None and kept is not RecordMode.NEVER:
                 recording = folder.recording
                 if limit is not None:
@@ -167,7 +170,7 @@ def _text(source: Scenario | Source | ConcreteRun) -> bytes:
         return text_of(source.scenario)
     if isinstance(source, Scenario):
         return _text(source.source)
-    return text_of(resolve_scenario(source) if isinstance(source, str | Path) else source)
+    return text_of(resolve_scenario(source) if isinstance(source, str | os.PathLike) else source)
 
 
 def _keep(result: RunResult, folder: RunFolder, record: RecordMode) -> RunResult:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -101,7 +102,7 @@ class RecordedRun:
             self.warnings.append(reason)
 
 
-def open_run(location: str | Path) -> RecordedRun:
+def open_run(location: str | os.PathLike[str]) -> RecordedRun:
     """Open a recording, given as its file or as the folder of a run. Raise InputError if it cannot be read.
 
     Invalid roads of a damaged recording are omitted with a warning.

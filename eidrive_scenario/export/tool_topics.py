@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from eidrive_scenario.export.mcap_topics import ToolTopics
 from eidrive_scenario.export.osi.trace import OsiTopics, check_osi
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run
 from eidrive_scenario.files.atomic import atomic_output
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.recording.recorder import Recorder
 
 _TOPICS: Mapping[str, tuple[Callable[[], None], type[ToolTopics]]] = {
@@ -32,7 +34,7 @@ def check_topics(names: Iterable[str]) -> tuple[str, ...]:
     return topics
 
 
-def add_topics(recording: str | Path, topics: Iterable[str] = ALL_TOPICS) -> tuple[str, ...]:
+def add_topics(recording: str | os.PathLike[str], topics: Iterable[str] = ALL_TOPICS) -> tuple[str, ...]:
     """Add topics for other tools to a recording, given as its file or as the folder of a run.
 
     topics  `foxglove` and `osi`, all by default; former topics are replaced
@@ -42,7 +44,7 @@ def add_topics(recording: str | Path, topics: Iterable[str] = ALL_TOPICS) -> tup
     topics, a missing library, and a file that cannot be written.
     """
     chosen = check_topics(topics)
-    run = open_run(recording)
+    run = open_run(path_argument(recording, "recording"))
     # A link would be written directly, while it is read
     write_with_topics(run, run.recording.path.resolve(), chosen)
     return tuple(dict.fromkeys(run.warnings))

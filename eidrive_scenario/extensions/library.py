@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.files.bounded import MIB, absolute, is_regular_file, read_regular_file
+from eidrive_scenario.files.bounded import MIB, absolute, is_regular_file, path_argument, read_regular_file
 from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.untrusted_xml import first_elements
 
@@ -86,12 +86,12 @@ def _description(path: Path) -> str:
     return "".join(letter for letter in " ".join("".join(descriptions).split()) if letter.isprintable())
 
 
-def resolve_scenario(name: str | Path) -> Path:
+def resolve_scenario(name: str | os.PathLike[str]) -> Path:
     """Return the file of a scenario given by path or by library name; a path takes precedence.
 
     Raise SettingError with the most similar name if neither exists.
     """
-    path = Path(name)
+    path = path_argument(name, "name", "the path or the library name of a scenario")
     if is_regular_file(path):
         _check_encoding(path)
         return path
@@ -106,14 +106,14 @@ def resolve_scenario(name: str | Path) -> Path:
     raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", hint))
 
 
-def scenario_suggestion(name: str | Path) -> str:
+def scenario_suggestion(name: str | os.PathLike[str]) -> str:
     """Return a hint for a scenario that is neither a file nor in the library: a similar file beside it or name."""
     return file_suggestion(name, (SCENARIO_SUFFIX,), scenarios())
 
 
-def from_library(name: str | Path) -> Path:
+def from_library(name: str | os.PathLike[str]) -> Path:
     """Return the file of a library scenario; the path itself if it is a file or not a name of the library."""
-    path = Path(name)
+    path = path_argument(name, "name", "the path or the library name of a scenario")
     return path if is_regular_file(path) else _inside(path) or path
 
 
@@ -154,7 +154,7 @@ def names(kind: Kind) -> list[str]:
     return sorted(path.stem for path in (library_path() / kind).glob("*.yaml"))
 
 
-def resolve(kind: Kind, name: str | Path) -> Path:
+def resolve(kind: Kind, name: str | os.PathLike[str]) -> Path:
     """Return the file of a channel profile or weather preset given by path or name.
 
     Raise SettingError with the most similar name if neither exists.
@@ -204,7 +204,7 @@ def definition(path: Path) -> Definition:
         return bool(definitions)
 
     try:
-        content = read_regular_file(path, _MAX_BYTES)
+        content = read_regular_file(path_argument(path, "path"), _MAX_BYTES)
         return definitions[0] if first_elements(content, _MAX_ELEMENTS, visit) else "scenario"
     except (OSError, ValueError):
         return "unreadable"

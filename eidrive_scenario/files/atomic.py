@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Self
 
 from eidrive_scenario.errors import Diagnostic, InputError, OutputError
+from eidrive_scenario.files.bounded import path_argument
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
@@ -100,7 +101,7 @@ class _NamedFile(io.FileIO):
             raise
 
 
-def create(path: str | Path) -> BinaryIO:
+def create(path: str | os.PathLike[str]) -> BinaryIO:
     """Open a new file for writing and create its folders. Raise OutputError if it cannot be written."""
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -140,11 +141,12 @@ def atomic_output(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def write_atomically(path: Path) -> Iterator[BinaryIO]:
+def write_atomically(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """Open a file for writing that replaces that of its name when the block ends without an error.
 
     Otherwise a file of this name is unchanged. Raise OutputError if it cannot be written.
     """
+    path = path_argument(path, "path")
     with atomic_output(path) as unfinished:
         try:
             with create(unfinished) as stream:
@@ -162,12 +164,13 @@ def write_atomically(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def exclusive(path: Path) -> Iterator[None]:
+def exclusive(path: str | os.PathLike[str]) -> Iterator[None]:
     """Lock a file against other processes that use this function.
 
     Paths that are not regular files, and folders in which no lock can be created, are not locked. Raise OutputError
     if another process has the lock.
     """
+    path = path_argument(path, "path")
     if os.path.exists(path) and not os.path.isfile(path):
         yield
         return

@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+
 MIB = 2**20
 _CHUNK = MIB
 _FLAGS = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY
@@ -98,6 +100,17 @@ def _check_kind(status: os.stat_result, path: str | os.PathLike[str]) -> None:
 
 def _size(limit: int) -> str:
     return f"{limit // MIB} MiB" if limit >= MIB else f"{limit // 1024} KiB"
+
+
+def path_argument(value: str | os.PathLike[str], name: str, expected: str = "a path") -> Path:
+    """Return an argument of a public function as a path. Raise SettingError for an object of another type.
+
+    name      name of the argument
+    expected  hint, such as what the path refers to
+    """
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
+        raise SettingError(Diagnostic(f"{name} is {quoted(value)}", f"give {expected}"))
+    return Path(value)
 
 
 def absolute(path: str | Path) -> Path:

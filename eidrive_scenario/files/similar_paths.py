@@ -14,7 +14,7 @@ _MOST_ENTRIES = 2000
 
 
 def file_suggestion(
-    given: str | Path,
+    given: str | os.PathLike[str],
     suffixes: Collection[str],
     names: Iterable[str] = (),
     *,

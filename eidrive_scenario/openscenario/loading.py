@@ -5,6 +5,7 @@ Scenarios stay in the process, so that each run of a sweep does not read the sam
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -107,7 +108,7 @@ def _load(source: Scenario | Source | ConcreteRun, parameters: Mapping[str, str 
         return source
     if isinstance(source, ConcreteRun):
         return load_kept(source.scenario, {**source.assignments, **(parameters or {})})
-    if isinstance(source, str | Path):
+    if isinstance(source, str | os.PathLike):
         return load_kept(resolve_scenario(source), parameters)
     return load_scenario(source, parameters)
 

@@ -147,7 +147,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     Raise ScenarioError with all errors of the file and its catalogs, each with file and line; ConstraintError if all
     errors are parameter values that violate their constraints.
     """
-    if isinstance(source, str | Path):
+    if isinstance(source, str | os.PathLike):
         source = from_library(source)
     document = open_document(source)
     collector = DiagnosticCollector()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -185,7 +186,7 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         if seed is not None:
             variant = replace(variant, seed=seed, replaced=(), rate=None)
         try:
-            source = resolve_scenario(source) if isinstance(source, str | Path) else source
+            source = resolve_scenario(source) if isinstance(source, str | os.PathLike) else source
             result = run_and_report(request.node, source, variant, settings)
         except InputError as error:
             add_error(request.node, error, request.node.path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files.bounded import check_values
+from eidrive_scenario.files.bounded import check_values, path_argument
 from eidrive_scenario.recording import mcap_records as mcap
 from eidrive_scenario.recording.frame import Frame, check_frame
 from eidrive_scenario.recording.integrity import NAME as SEAL
@@ -96,13 +97,13 @@ class Recording:
             skipped(reason)
 
 
-def read_recording(path: str | Path) -> Recording:
+def read_recording(path: str | os.PathLike[str]) -> Recording:
     """Open a recording, given as its file, the folder of its run, or a folder that contains a single run.
 
     The whole file is checked. If it is damaged, `damage` of the recording describes it, and a warning is logged.
     Raise InputError if the file does not exist or is not a recording of this package.
     """
-    recording = open_recording(recording_in(Path(path)))
+    recording = open_recording(recording_in(path_argument(path, "path")))
     if recording.damage:
         _log.warning("%s is damaged: %s", recording.path, "; ".join(recording.damage))
     return recording

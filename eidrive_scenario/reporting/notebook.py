@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import io
-import os
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,8 +11,8 @@ from tempfile import TemporaryDirectory
 
 from matplotlib.figure import Figure
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.extensions.library import resolve_scenario
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.reporting.drawing.scenario_picture import is_road_file, source_figure
@@ -47,8 +46,8 @@ class Picture:
     figure: Figure
 
     def write(self, path: str | PathLike[str]) -> None:
-        """Write the figure in the format of the suffix of a path."""
-        write_figure(self.figure, Path(path))
+        """Write the figure in the format of the suffix of a path. Raise SettingError for another suffix."""
+        write_figure(self.figure, path_argument(path, "path"))
 
     def _repr_svg_(self) -> str:
         text = io.StringIO()
@@ -69,7 +68,8 @@ def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> RunDispl
         recording, verdicts = run.recording, run._repr_html_()
         text = str(run)
     else:
-        recording, verdicts = recording_in(_path(run, "the result of a run, its folder or its recording")), ""
+        location = path_argument(run, "run", "the result of a run, its folder or its recording")
+        recording, verdicts = recording_in(location), ""
         text = str(recording)
     return RunDisplay(verdicts + ("" if recording is None else _replay_frame(recording, height)), text)
 
@@ -83,7 +83,8 @@ def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | 
 
     Raise InputError for an invalid file, SettingError for a station of a road file or another size.
     """
-    path = Path(source) if is_road_file(os.fspath(source)) else resolve_scenario(os.fspath(source))
+    path = path_argument(source, "source", "the path of a scenario or road file, or a library name")
+    path = path if is_road_file(path) else resolve_scenario(path)
     return Picture(source_figure(path, checked_size(size), station))
 
 
@@ -95,7 +96,8 @@ def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:
 
     Raise InputError without any result.
     """
-    return report_files([_path(run, "paths, each as an argument") for run in runs], Path(out))
+    locations = [path_argument(run, "runs", "paths, each as an argument") for run in runs]
+    return report_files(locations, path_argument(out, "out"))
 
 
 def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Path:
@@ -105,13 +107,8 @@ def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Pa
 
     Raise InputError if no frame can be read.
     """
-    return make_replay(open_recording(recording_in(Path(recording))), Path(out)).page
-
-
-def _path(value: str | PathLike[str], expected: str) -> Path:
-    if not isinstance(value, str | PathLike):
-        raise SettingError(Diagnostic(f"not a path (got {quoted(value)}; expected {expected})"))
-    return Path(value)
+    location = path_argument(recording, "recording")
+    return make_replay(open_recording(recording_in(location)), path_argument(out, "out")).page
 
 
 def _replay_frame(recording: Path, height: int) -> str:

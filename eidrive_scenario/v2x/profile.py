@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_settings, settings_type_of
-from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.bounded import is_regular_file, path_argument
 from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
 from eidrive_scenario.openscenario.values.parameters import Scope, is_reference, parameter_hints, resolve_references
@@ -36,7 +37,7 @@ class ChannelProfile(Settings):
 
 
 def load_profile(
-    source: str | Path | Mapping[str, Any],
+    source: str | os.PathLike[str] | Mapping[str, Any],
     folders: Sequence[Path] = (),
     *,
     origin: str = "",
@@ -55,6 +56,8 @@ def load_profile(
     """
     if isinstance(source, Mapping):
         return _parse(source, "custom", origin or "channel", line, {}, scope)
+    if not isinstance(source, str):
+        source = path_argument(source, "source", "the name, the file or the mapping of a channel profile")
     source = _named_by_reference(source, origin, line, scope)
     if str(source).strip() == NO_COOPERATION:
         return None

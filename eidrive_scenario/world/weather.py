@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
@@ -13,6 +13,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.extensions.library import resolve
 from eidrive_scenario.extensions.settings import Settings, parse_settings
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.files.yaml_text import load_yaml_file
 
 CONTRAST_THRESHOLD = 0.02
@@ -124,14 +125,14 @@ class Weather(Settings):
         return self.sun_elevation < DARK or EXTINCTION_AT_RANGE / self.extinction < POOR_SIGHT
 
 
-def load_weather(source: str | Path, *, origin: str = "") -> Weather:
+def load_weather(source: str | os.PathLike[str], *, origin: str = "") -> Weather:
     """Return a weather preset of the library by name, or a YAML file.
 
     `origin` is the source of the name, such as an option. Raise SettingError with file and line of each error, or with
     `origin` if the file does not exist.
     """
     try:
-        path = resolve("weather", source)
+        path = resolve("weather", path_argument(source, "source", "the name or the file of a weather preset"))
     except SettingError as error:
         raise SettingError([replace(diagnostic, source=origin) for diagnostic in error.diagnostics]) from error
     data, lines = load_yaml_file(path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from eidrive_scenario.experiments.sweeps.axes import axis_identity, without_run
 from eidrive_scenario.experiments.sweeps.result_folders import folder_runs, varying, with_axes
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
 
 INTERVALS: Mapping[str, Callable[..., Proportion]] = {
@@ -284,13 +286,14 @@ def as_table(runs: Iterable[StoredRun]) -> tuple[list[str], list[dict[str, Any]]
     return list(dict.fromkeys(name for row in rows for name in row)), rows
 
 
-def read_results(*stores: str | Path) -> Any:
+def read_results(*stores: str | os.PathLike[str]) -> Any:
     """Return the runs of one or several stores or folders of results as a pandas DataFrame, one row per run.
 
     Raise SettingError if a file is not a store, or without pandas.
     """
     pandas = optional_import("pandas", "tables")
-    names, rows = as_table(stored_runs([Path(store) for store in stores]))
+    paths = [path_argument(store, "stores", "paths, each as an argument") for store in stores]
+    names, rows = as_table(stored_runs(paths))
     return pandas.DataFrame(rows, columns=names)
 
 

@@ -88,7 +88,7 @@ def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansi
     distribution from a file, and a warning otherwise, as in Python. The scenario itself is not read: its parameters
     and their constraints are checked when a run is loaded. Raise ScenarioError with all errors of the file.
     """
-    if isinstance(source, str | Path):
+    if isinstance(source, str | os.PathLike):
         source = from_library(source)
     document = open_document(source)
     collector = DiagnosticCollector()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections import OrderedDict
 from collections.abc import Hashable
 from pathlib import Path
@@ -55,8 +56,8 @@ class SupportsGetElement(Protocol):
 
 
 Source: TypeAlias = (
-    "Path | str | bytes | etree._Element | etree._ElementTree | ElementTree.Element | ElementTree.ElementTree | "
-    "SupportsGetElement"
+    "os.PathLike[str] | str | bytes | etree._Element | etree._ElementTree | ElementTree.Element | "
+    "ElementTree.ElementTree | SupportsGetElement"
 )
 
 LIMITS = XmlLimits(max_bytes=64 * MIB, max_nodes=2_000_000)
@@ -93,7 +94,7 @@ def open_document(source: Source) -> Document:
     """Parse a file or its bytes, or wrap a parsed tree. Raise ScenarioError with file and line if it is invalid."""
     if isinstance(source, bytes):
         return _parsed(source, "<bytes>", None)
-    if not isinstance(source, str | Path):
+    if not isinstance(source, str | os.PathLike):
         return _from_tree(source)
     return _parsed(_content(source), str(source), Path(source))
 
@@ -115,12 +116,12 @@ def text_of(source: Source) -> bytes:
     """Return the bytes of a file, or of a tree written as a file. Raise ScenarioError if the source is invalid."""
     if isinstance(source, bytes):
         return source
-    if isinstance(source, str | Path):
+    if isinstance(source, str | os.PathLike):
         return _content(source)
     return etree.tostring(open_document(source).root, encoding="utf-8", xml_declaration=True)
 
 
-def _content(path: str | Path) -> bytes:
+def _content(path: str | os.PathLike[str]) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:

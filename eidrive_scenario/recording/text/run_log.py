@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Protocol, TextIO
 
 from eidrive_scenario.driving.step import Plan
@@ -89,7 +89,7 @@ class RunLog:
     The path `-` is standard output. Raise SettingError if the file cannot be written.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | os.PathLike[str]) -> None:
         self._own = str(path) != STANDARD_OUTPUT
         self._stream: TextIO = io.TextIOWrapper(create(path), encoding="utf-8") if self._own else sys.stdout
         self._paths: dict[tuple[str, str], str] = {}

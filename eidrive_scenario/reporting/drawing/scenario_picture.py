@@ -297,9 +297,8 @@ def _zones(simulation: Simulation, outline: Outline) -> Iterator[TriggerZone]:
         yield TriggerZone(name, (x, y), radius)
 
 
-def is_road_file(source: str | Path) -> bool:
-    """Return whether a source is a road file, not a scenario."""
-    path = Path(source)
+def is_road_file(path: Path) -> bool:
+    """Return whether a file is a road file, not a scenario."""
     return path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads"
 
 

@@ -295,10 +295,12 @@ def paper_style() -> Iterator[None]:
 
 
 def write_figure(figure: Figure, path: Path, resolution: float = RESOLUTION) -> None:
-    """Write a figure as PNG, SVG or PDF by the suffix of its file. Raise SettingError if it cannot be written.
+    """Write a figure as PNG, SVG or PDF by the suffix of its file. Raise SettingError for another suffix, or if it
+    cannot be written.
 
     resolution  of a PNG file [dots per inch]
     """
+    check_format("path", path)
     suffix = path.suffix.lower()
     buffer = io.BytesIO()
     with paper_style():

@@ -62,8 +62,7 @@ def test_road_file_has_no_station() -> None:
 @pytest.mark.parametrize(
     ("function", "argument", "options", "message"),
     [
-        (report.show, None, {}, "not a path (got None; expected the result of a run, its folder or its recording)"),
-        (report.write_report, ["runs"], {"out": "a"}, "not a path (got ['runs']; expected paths, each as an argument)"),
+        (report.show, None, {}, "run is None; give the result of a run, its folder or its recording"),
         (report.draw, "coop/scenario_1", {"size": (0, 90)}, "size: no width and height in millimeters (got (0, 90))"),
         (report.draw, "coop/scenario_1", {"size": 85}, "size: no width and height in millimeters (got 85)"),
     ],
