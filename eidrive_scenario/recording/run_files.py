@@ -18,8 +18,8 @@ SCENARIO_FILE, ROAD_FILE = "scenario.xosc", "road.xodr"
 """Names of the scenario and its road in the attachments of a recording."""
 _LARGEST = 256 * 2**20
 """Maximum size of a result [bytes]."""
-_MAX_DEPTH = 40
-"""Maximum nesting depth of a result."""
+MAX_DEPTH = 40
+"""Maximum nesting depth of a result and of settings."""
 
 
 class RecordMode(StrEnum):
@@ -96,7 +96,7 @@ def read_result(path: Path) -> dict[str, Any]:
     """Read a result as JSON values. Raise InputError if the file is not a result."""
     try:
         data = read_regular_file(path, _LARGEST)
-        result = load_json(data, max_depth=_MAX_DEPTH)
+        result = load_json(data, max_depth=MAX_DEPTH)
     except OSError as error:
         raise InputError(Diagnostic(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
     except ValueError as error:

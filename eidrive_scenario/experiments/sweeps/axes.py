@@ -35,6 +35,8 @@ RUN = "run"
 """Name of the axis of the runs of a distribution file."""
 SETTINGS = {option.name: option for option in OPTIONS if option.form.has_axis}
 """Settings of a run that may vary; all other names are parameters of the scenario."""
+DESCRIPTIVE = frozenset({"name", "description"})
+"""Settings of a channel profile that have no effect on runs."""
 _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -231,7 +233,7 @@ def changed_profile(profile: Mapping[str, Any], changes: Mapping[str, Scalar]) -
     A part without the setting is replaced if there is one kind for it alone: `delay.seconds` then selects a constant
     delay, and `loss.probability` independent losses. The name of the profile is removed.
     """
-    changed: dict[str, Any] = {key: value for key, value in profile.items() if key not in ("name", "description")}
+    changed: dict[str, Any] = {key: value for key, value in profile.items() if key not in DESCRIPTIVE}
     for path, value in changes.items():
         *parts, last = path.split(".")
         inner = changed

@@ -13,10 +13,19 @@ import msgspec
 from eidrive_scenario.base.content_digest import sha256_of
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.reported_run import parse_run
-from eidrive_scenario.experiments.sweeps.axes import PARAMETER, SETTINGS, Scalar, axis_identity, is_setting
+from eidrive_scenario.experiments.sweeps.axes import (
+    CHANNEL,
+    DESCRIPTIVE,
+    PARAMETER,
+    SETTINGS,
+    Scalar,
+    axis_identity,
+    is_setting,
+)
 from eidrive_scenario.experiments.sweeps.store import ABORTED, FAILED, NOT_JUDGED, PASSED, StoredRun
+from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.recording import open_recording
-from eidrive_scenario.recording.run_files import RESULT, read_result, result_paths, unfinished_runs
+from eidrive_scenario.recording.run_files import MAX_DEPTH, RESULT, read_result, result_paths, unfinished_runs
 from eidrive_scenario.run_options import NO_COOPERATION, OPTIONS
 from eidrive_scenario.simulation.result import typed
 
@@ -57,12 +66,16 @@ def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
 
 
 def varying(runs: Iterable[StoredRun]) -> list[str]:
-    """Return the names of the settings with several values among runs of folders."""
-    values: dict[str, set[Scalar]] = {}
+    """Return the names of the settings with several values among runs of folders.
+
+    A setting `channel.KEY` is one of them if it has several values in profiles of one name, such as `custom`.
+    """
+    values: dict[str, dict[Scalar, set[Scalar]]] = {}
     for run in runs:
         for name, value in run.point.items():
-            values.setdefault(name, set()).add(value)
-    return [name for name, several in values.items() if len(several) > 1]
+            profile = run.point.get(CHANNEL, "") if name.startswith(f"{CHANNEL}.") else ""
+            values.setdefault(name, {}).setdefault(profile, set()).add(value)
+    return [name for name, by_profile in values.items() if any(len(several) > 1 for several in by_profile.values())]
 
 
 def with_axes(runs: Iterable[StoredRun], axes: Mapping[str, str]) -> Iterator[StoredRun]:
@@ -124,7 +137,7 @@ def _interrupted(location: Path, number: int) -> Iterator[StoredRun]:
         try:
             metadata = open_recording(path).metadata
             text = metadata["settings"]
-            given = json.loads(text)
+            given = load_json(text.encode(), max_depth=MAX_DEPTH)
             settings, point = msgspec.convert(given, _Settings), _point(given)
         except (InputError, LookupError, ValueError):
             continue
@@ -154,7 +167,20 @@ def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
             value = "+".join(map(str, value)) or NO_COOPERATION
         if isinstance(value, str | int | float):
             point[name] = value
+    point.update(_channel_settings(settings.get("channel_profile"), CHANNEL))
     for name, text in resolved.parameters.items():
         if name not in (*resolved.drawn, *resolved.varied):
             point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = cast("Scalar", typed(text))
     return point
+
+
+def _channel_settings(profile: Any, path: str) -> Iterator[tuple[str, Scalar]]:
+    """Yield the settings of a channel profile by the names of their axes, without those that only describe it."""
+    for key, value in profile.items() if isinstance(profile, Mapping) else ():
+        name = f"{path}.{key}"
+        if isinstance(value, bool):
+            yield name, str(value).lower()
+        elif isinstance(value, str | int | float) and key not in DESCRIPTIVE:
+            yield name, value
+        else:
+            yield from _channel_settings(value, name)

@@ -80,6 +80,25 @@ def test_axis_of_a_store_distinguishes_runs_of_a_folder(
     assert {run.point[axis] for run in stored_runs([store, runs])} == {5, 30}
 
 
+def test_channel_settings_of_a_store_distinguish_runs_of_a_folder(
+    eidrive: Eidrive, scenario: Path, tmp_path: Path
+) -> None:
+    """Profiles of one name have no other difference; those of different names are told apart by their names."""
+    store, folder = tmp_path / "s.db", tmp_path / "runs"
+    axis = "channel.delay.seconds"
+    eidrive("sweep", scenario, "--channel", "ideal", "--vary", f"{axis}=0,0.3", "--store", store, "--workers", "1")
+    for delay in ("0", "0.3"):
+        profile = f"{{delay: {{kind: constant, seconds: {delay}}}}}"
+        eidrive("run", scenario, "--channel", profile, "--no-record", "--out", folder / delay)
+    comparison = compare([store], [folder])
+    assert (comparison.verdicts.pairs, comparison.identical, comparison.unpaired) == (2, 2, 0)
+    (between,) = compare_values([folder], axis)
+    assert (between.first, between.second) == (0, 0.3)
+    eidrive("run", scenario, "--channel", "latency_300ms", "--no-record", "--out", tmp_path / "named" / "slow")
+    eidrive("run", scenario, "--channel", "ideal", "--no-record", "--out", tmp_path / "named" / "ideal")
+    assert {tuple(run.point) for run in stored_runs([tmp_path / "named"])} == {("channel",)}
+
+
 def test_settings_of_a_store_have_the_values_of_axes_of_others(
     eidrive: Eidrive, scenario: Path, tmp_path: Path
 ) -> None:
