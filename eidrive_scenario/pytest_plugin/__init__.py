@@ -11,6 +11,7 @@ from eidrive_scenario.pytest_plugin.failures import pytest_report_teststatus as 
 from eidrive_scenario.pytest_plugin.failures import pytest_runtest_makereport as pytest_runtest_makereport
 from eidrive_scenario.pytest_plugin.failures import pytest_runtest_setup as pytest_runtest_setup
 from eidrive_scenario.pytest_plugin.fixture import pytest_generate_tests as pytest_generate_tests
+from eidrive_scenario.pytest_plugin.fixture import pytest_itemcollected as pytest_itemcollected
 from eidrive_scenario.pytest_plugin.fixture import run_scenario as run_scenario
 from eidrive_scenario.pytest_plugin.items import pytest_collect_file as pytest_collect_file
 from eidrive_scenario.pytest_plugin.items import pytest_sessionfinish as pytest_sessionfinish

@@ -21,7 +21,7 @@ from eidrive_scenario.pytest_plugin.failures import (
     add_section,
     explain_outcome,
 )
-from eidrive_scenario.pytest_plugin.markers import run_markers, test_name
+from eidrive_scenario.pytest_plugin.markers import keywords, run_markers, test_name
 from eidrive_scenario.pytest_plugin.option_values import path_beside
 from eidrive_scenario.pytest_plugin.outcome import run_and_report
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant, run_variants
@@ -85,6 +85,13 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         for variant in variants
     ]
     metafunc.parametrize("run_scenario", cases, indirect=True)
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Add the settings of a run of a marked test to the words of the option -k, as scenario files have them."""
+    match getattr(getattr(item, "callspec", None), "params", {}).get("run_scenario"):
+        case (_, RunVariant() as variant):
+            item.extra_keyword_matches.update(keywords(variant.selectors, None))
 
 
 def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]:

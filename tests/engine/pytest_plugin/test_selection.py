@@ -53,6 +53,24 @@ def test_success_rate_has_marker_slow(project: pytest.Pytester) -> None:
     assert items == ["near/drive[rate=0.9]"]
 
 
+def test_keyword_expression_selects_settings_of_python_tests(project: pytest.Pytester) -> None:
+    project.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.parametrize("other", [1, 2])
+        @pytest.mark.scenario("xosc/near/drive", channel=["none", "ideal"], seeds=3)
+        def test_marked(run_scenario, other):
+            pass
+
+        def test_unmarked(run_scenario):
+            pass
+        """
+    )
+    assert len(collected(project, "-k", "channel:ideal and seed:3")) == 2
+    assert len(collected(project, "-k", "not seed:3")) == 9
+
+
 def test_python_test_has_marker_of_folder(project: pytest.Pytester) -> None:
     project.makepyfile(
         """
