@@ -149,7 +149,7 @@ def _record(
     given = {option.name: option.form.recorded(getattr(settings, option.name)) for option in OPTIONS}
     given["run"] = None if resolved.run is None else str(resolved.run)
     metadata = {
-        "scenario": scenario.name,
+        "scenario": resolved.scenario,
         "seed": str(resolved.seed),
         **{name: text for name, text in given.items() if text is not None},
         "parameters": json.dumps(scenario.parameters),

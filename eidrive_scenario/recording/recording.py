@@ -54,7 +54,7 @@ class Recording:
 
     @property
     def scenario(self) -> str:
-        """Name of the scenario; empty if the metadata omit it."""
+        """Name of the scenario in the library, or of its file; empty if the metadata omit it."""
         return self.metadata.get("scenario", "")
 
     @property

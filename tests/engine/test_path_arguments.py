@@ -70,7 +70,7 @@ def test_paths_of_other_libraries_are_read_and_written(tmp_path: Path) -> None:
     scenario = OtherPath(str(experiments.resolve_scenario(SCENARIO)))
     result = run_and_save(scenario, out=OtherPath(str(tmp_path / "run")), settings=BRIEF)
     assert result.trace_hash == run.run_file(SCENARIO, settings=BRIEF).trace_hash
-    assert run.read_recording(OtherPath(str(tmp_path / "run"))).scenario == "scenario_1"
+    assert run.read_recording(OtherPath(str(tmp_path / "run"))).scenario == SCENARIO
     assert result.command == f"eidrive run {SCENARIO} --seed 1 --time-limit 0.1"
 
 

@@ -173,7 +173,7 @@ class LiveView:
         light = LightChanges(parse_weather(settings.get("weather_profile")))
         self._builder = ReplayBuilder(self._report, station_settings(settings), models, light)
         run = RunOfPage(
-            run_title(simulation.scenario.name, simulation.seed),
+            run_title(simulation.resolved.scenario, simulation.seed),
             run_facts(settings),
             settings,
             command_of_source(simulation.scenario, simulation.seed, simulation.settings),

@@ -23,6 +23,13 @@ def test_judge_prints_criteria_of_run_with_its_exit_code(
     assert all(verdict["reason"] in shown for verdict in first["criteria"])
 
 
+def test_judged_scenario_has_the_name_of_its_run(eidrive: Eidrive, tmp_path: Path) -> None:
+    """`coop` and `pipeline` have scenarios of equal file names."""
+    run = eidrive("run", "pipeline/scenario_1", "--time-limit", "0.5", "--out", tmp_path, "--json")
+    judged = eidrive("judge", tmp_path, "--json")
+    assert json.loads(run.stdout)["scenario"] == json.loads(judged.stdout)["scenario"] == "pipeline/scenario_1"
+
+
 def test_judge_with_other_criterion_fails(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path)
     (tmp_path / "slow.yaml").write_text("max_speed: {of: Ego, at_most: 5}\n")

@@ -180,7 +180,7 @@ def test_page_during_the_run_has_settings_but_no_verdict() -> None:
         simulation.tick()
         page: Any = html.fromstring(live.page())
         assert live.announced == [live.address]
-        assert page.xpath("//h1")[0].text == "scenario_1, seed 1"
+        assert page.xpath("//h1")[0].text == "coop/scenario_1, seed 1"
         assert "latency_300ms" in page.text_content()
         assert not page.xpath("//div[@id='verdict']")[0].text_content().strip()
         assert not page.xpath("//div[@role='alert']")
