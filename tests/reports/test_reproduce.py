@@ -119,6 +119,13 @@ def test_help_names_all_parts(eidrive: Eidrive) -> None:
     assert [name for name in PARTS if name not in text] == []
 
 
+def test_hyphen_is_no_folder(eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = eidrive("reproduce", "table2", "--episodes", 1, *QUICK, "--out", "-")
+    assert (done.exit_code, "--out: - is not a path" in done.stderr) == (2, True)
+    assert not list(tmp_path.iterdir())
+
+
 def test_replays_are_linked_from_the_page(eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page links to the report of the recorded runs, which links to a replay of each."""
     part = replace(PARTS["table2"], cases=lambda detectors: table_2.cases(detectors)[:2], report=empty_report)

@@ -70,6 +70,8 @@ def reproduce(
     from eidrive_reports.reproduction.parts import ALL, selected_detectors, selected_parts
     from eidrive_reports.reproduction.reproduce import reproduce as reproduce_part
 
+    if str(out) == "-":
+        raise typer.BadParameter("- is not a path", param_hint="--out")
     names = _names(detectors) or []
     given = {"fusion": _names(fusion), "channels": _names(channels), "scenarios": _names(scenarios)}
     sets = {option: texts for option, texts in given.items() if texts is not None}
