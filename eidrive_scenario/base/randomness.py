@@ -7,8 +7,20 @@ another one, and the order of the agents in a list does not matter.
 from __future__ import annotations
 
 import hashlib
+from operator import index
+from typing import SupportsIndex
 
 import numpy as np
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+
+
+def checked_seed(seed: SupportsIndex) -> int:
+    """Return a seed, such as an entry of an array, as an int. Raise SettingError if it is not an integer."""
+    try:
+        return index(seed)
+    except TypeError:
+        raise SettingError(Diagnostic(f"the seed is {seed!r}", "give an integer")) from None
 
 
 def generator(seed: int, *key: str | int) -> np.random.Generator:

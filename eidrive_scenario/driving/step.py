@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -100,9 +100,13 @@ class StationAction(msgspec.Struct, frozen=True):
         if speed is not None:
             _check_range("target_speed", speed, 0.0, MAX_TARGET_SPEED)
         if control is not None:
+            if not isinstance(control, Control):
+                raise SettingError(Diagnostic(f"control of an action is {quoted(control)}", "give a Control"))
             _check_range("control.throttle", control.throttle, 0.0, 1.0)
             _check_range("control.brake", control.brake, 0.0, 1.0)
             _check_range("control.steering", control.steering, -math.pi, math.pi)
+        if self.share is not None and not isinstance(self.share, Iterable):
+            raise SettingError(Diagnostic(f"share of an action is {quoted(self.share)}", "give a tuple of rows"))
 
     @property
     def drives(self) -> bool:

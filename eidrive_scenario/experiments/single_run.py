@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eidrive_scenario.base.randomness import checked_seed
 from eidrive_scenario.base.wall_limit import limit_wall_time
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.commands import command_of_source
@@ -23,7 +24,7 @@ from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE, RecordMode
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
-from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_seed, checked_settings
+from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_settings
 from eidrive_scenario.simulation import Observer, RunResult, Simulation
 from eidrive_scenario.simulation.observers import checked_observers
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.export.foxglove.writer import FoxgloveTopics, check_foxglove
 from eidrive_scenario.export.mcap_topics import ToolTopics
 from eidrive_scenario.export.osi.trace import OsiTopics, check_osi
@@ -26,6 +26,8 @@ ALL_TOPICS = tuple(_TOPICS)
 
 def check_topics(names: Iterable[str]) -> tuple[str, ...]:
     """Return these names of topics, each once. Raise SettingError if one is unknown, or if its library is missing."""
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise SettingError(Diagnostic(f"topics is {quoted(names)}", f"give a list of {' and '.join(_TOPICS)}"))
     topics = tuple(dict.fromkeys(names))
     for name in topics:
         if name not in _TOPICS:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from eidrive_scenario.base.content_digest import sha256_of
+from eidrive_scenario.base.randomness import checked_seed
 from eidrive_scenario.errors import ErrorCollector
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.files.bounded import read_regular_file
@@ -97,10 +98,9 @@ def load_for_seed(
                 changes), or any other source of `load_scenario`
     parameters  values that take precedence over drawn ones and over those of the distribution
 
-    Raise ScenarioError for an invalid file, InputError for an invalid variation.
+    Raise ScenarioError for an invalid file, InputError for an invalid variation or seed.
     """
-    scenario = _load(source, parameters)
-    return _draw(scenario, seed, parameters)
+    return _draw(_load(source, parameters), checked_seed(seed), parameters)
 
 
 def _load(source: Scenario | Source | ConcreteRun, parameters: Mapping[str, str | Assignment] | None) -> Scenario:

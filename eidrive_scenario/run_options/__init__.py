@@ -13,7 +13,6 @@ from eidrive_scenario.run_options.table import OPTIONS as OPTIONS
 from eidrive_scenario.run_options.table import PytestForm as PytestForm
 from eidrive_scenario.run_options.table import RunOption as RunOption
 from eidrive_scenario.run_options.table import RunSettings as RunSettings
-from eidrive_scenario.run_options.table import checked_seed as checked_seed
 from eidrive_scenario.run_options.table import checked_settings as checked_settings
 from eidrive_scenario.run_options.table import option_of as option_of
 from eidrive_scenario.run_options.table import options_of as options_of

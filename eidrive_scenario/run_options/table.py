@@ -10,9 +10,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, SupportsIndex, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 
@@ -309,14 +308,6 @@ def option_of(name: str) -> RunOption:
 def options_of(command: str) -> list[RunOption]:
     """Return the options of a command of the command line, with the help that they have there."""
     return [replace(option, **option.commands[command]) for option in OPTIONS if command in option.commands]
-
-
-def checked_seed(seed: SupportsIndex) -> int:
-    """Return a seed, such as an entry of an array, as an int. Raise SettingError if it is not an integer."""
-    try:
-        return index(seed)
-    except TypeError:
-        raise SettingError(Diagnostic(f"the seed is {seed!r}", "give an integer")) from None
 
 
 def checked_settings(settings: RunSettings | None) -> RunSettings:

@@ -10,6 +10,7 @@ from typing import Self
 
 from msgspec.structs import replace
 
+from eidrive_scenario.base.randomness import checked_seed
 from eidrive_scenario.base.wall_limit import limit_wall_time, raise_if_limit_reached
 from eidrive_scenario.driving.stack import StackFactory
 from eidrive_scenario.driving.stations import Stations
@@ -19,7 +20,7 @@ from eidrive_scenario.evaluation.criterion import CriteriaObserver
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.run_options import DEFAULT_SEED, RunSettings, as_setting_text, checked_seed, checked_settings
+from eidrive_scenario.run_options import DEFAULT_SEED, RunSettings, as_setting_text, checked_settings
 from eidrive_scenario.simulation.attribution import attributed, report_extension, wall_limit_error
 from eidrive_scenario.simulation.commands import add_criteria, execute
 from eidrive_scenario.simulation.observers import Observer, Observers, checked_observers

@@ -118,6 +118,8 @@ def test_begun_tick_states_the_scheduled_end() -> None:
     [
         ({"target_speed": -1.0}, "target_speed of an action is -1.0; give a number from 0 to 10000"),
         ({"target_speed": float("nan")}, "target_speed of an action is nan"),
+        ({"control": 5}, "control of an action is 5; give a Control"),
+        ({"share": 5}, "share of an action is 5; give a tuple of rows"),
         ({"control": Control(1.5, 0.0, 0.0)}, "control.throttle of an action is 1.5; give a number from 0 to 1"),
         ({"control": Control(0.0, 0.0, float("inf"))}, "control.steering of an action is inf"),
     ],

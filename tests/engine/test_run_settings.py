@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from eidrive_scenario.api.run import load_scenario
+from eidrive_scenario.api.run import load_for_seed, load_scenario
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
@@ -47,7 +47,7 @@ def test_channel_as_a_mapping_equals_its_yaml_text(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", ["1", 1.0, None])
 def test_noninteger_seed_raises(tmp_path: Path, seed: Any) -> None:
-    for run in (Simulation, run_file, run_and_save):
+    for run in (Simulation, load_for_seed, run_file, run_and_save):
         with pytest.raises(SettingError, match=r"the seed is .*; give an integer"):
             run(ONE, seed=seed)
 

@@ -184,7 +184,8 @@ def headline(runs: Sequence[ReportedRun]) -> str:
         for name in dict.fromkeys(criterion.name for criterion in run.criteria if not criterion.passed)
     )
     names = [f"{name} ({count})" if several else name for name, count in failures.most_common(_NAMED)]
-    names += [f"{len(failures) - _NAMED} more criteria"] * (len(failures) > _NAMED)
+    if len(failures) > _NAMED:
+        names.append(f"{len(failures) - _NAMED} more {'criterion' if len(failures) == _NAMED + 1 else 'criteria'}")
     verbs = {"failed": f"failed: {', '.join(names)}" if names else "failed", "did not finish": "did not finish"}
     verbs["not judged"] = "were not judged" if counts["not judged"] > 1 else "was not judged"
     parts = [f"{counts[name]} {verb}" if several else verb for name, verb in verbs.items() if counts[name]]

@@ -114,6 +114,8 @@ def test_unknown_topics_leave_the_recording_unchanged(recording: Path, tmp_path:
     path.write_bytes(recording.read_bytes())
     with pytest.raises(SettingError, match="there are no topics 'rviz'"):
         add_topics(path, ["osi", "rviz"])
+    with pytest.raises(SettingError, match="topics is 'osi'; give a list"):
+        add_topics(path, "osi")
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=r"no recording\.mcap"):
         add_topics(tmp_path / "empty")

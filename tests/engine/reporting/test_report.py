@@ -103,6 +103,10 @@ TIME_LIMIT: dict[str, Any] = {"end_reason": "time limit", "criteria": []}
             "2 of 5 runs failed: collision (2), speed (1); 1 did not finish; 1 was not judged",
         ),
         (
+            [result(1, "none", False, criteria=[verdict(name, False) for name in "abcde"])],
+            "The run failed: a, b, c, d, 1 more criterion",
+        ),
+        (
             [result(1, "none", False, criteria=[verdict(name, False) for name in "abcdef"]), result(2, "none", True)],
             "1 of 2 runs failed: a (1), b (1), c (1), d (1), 2 more criteria",
         ),
