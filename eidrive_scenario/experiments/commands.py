@@ -22,10 +22,16 @@ from eidrive_scenario.run_options import OPTIONS, RunSettings
 from eidrive_scenario.simulation.result import RunResult
 
 
-def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
-    """Return the `eidrive run` command that repeats a run, quoted for a shell."""
+def command_of(scenario: str | os.PathLike[str], seed: int, settings: RunSettings) -> str:
+    """Return the `eidrive run` command that repeats a run, quoted for a shell.
+
+    scenario  path or library name
+
+    Raise SettingError if there is no such scenario.
+    """
+    path = resolve_scenario(scenario)
     project = selected_project()
-    words = ["eidrive", *([] if project is None else ["--project", str(project)]), "run", _scenario(scenario)]
+    words = ["eidrive", *([] if project is None else ["--project", str(project)]), "run", _scenario(path)]
     for options in ([], ["--seed", str(seed)]):
         words += options
         for option in OPTIONS:
@@ -44,7 +50,7 @@ def command_of_source(source: Scenario | Source | ConcreteRun, seed: int, settin
         path, given = source.path, source.assigned
     if not isinstance(path, str | os.PathLike):
         return ""
-    return command_of(resolve_scenario(path), seed, replace(settings, parameters={**given, **settings.parameters}))
+    return command_of(path, seed, replace(settings, parameters={**given, **settings.parameters}))
 
 
 def reproduction_lines(result: RunResult) -> list[str]:

@@ -42,7 +42,7 @@ def test_planner_replaces_those_of_driven_stations_only() -> None:
         assert simulation.resolved.stations["Ego"]["target_speed"] == 7.0, "other properties are kept"
 
 
-def test_run_with_the_option_equals_a_file_with_the_planner(tmp_path: Path) -> None:
+def test_run_with_the_option_equals_a_file_with_the_planner() -> None:
     def written(planner: str) -> bytes:
         return scenario(object_xml("Ego", controller=agent_xml(planner=planner, conflict_area=AREA, target_speed=5)))
 
@@ -54,7 +54,8 @@ def test_run_with_the_option_equals_a_file_with_the_planner(tmp_path: Path) -> N
     assert by_option.settings.stations == in_file.settings.stations
     assert (by_option.settings.planner, in_file.settings.planner) == ("route", None)
     assert by_option.settings.digest != in_file.settings.digest
-    assert "--planner route" in command_of(tmp_path / "a.xosc", 1, RunSettings(planner="route"))
+    command = command_of("coop/scenario_1", 1, RunSettings(planner="route"))
+    assert command == "eidrive run coop/scenario_1 --planner route --seed 1"
 
 
 def test_planner_settings_of_the_file_do_not_apply_to_another_planner() -> None:

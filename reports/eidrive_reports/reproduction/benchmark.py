@@ -44,7 +44,6 @@ from eidrive_scenario.api.experiments import (
     PairedVerdicts,
     command_of,
     mean_interval,
-    resolve_scenario,
     sha256_of,
     wilson,
 )
@@ -129,7 +128,7 @@ def cell_commands(scenario: str, method: Method, channel: BenchmarkChannel, runs
     """
     chosen = next((run for run in runs if run.passed is not True), runs[0])
     settings = settings_of(scenario, method, channel)
-    single = command_of(resolve_scenario(scenario), chosen.seed, settings)
+    single = command_of(scenario, chosen.seed, settings)
     words = [*shlex.split(single.partition(" run ")[0]), "reproduce", NAME, "--fusion", method.name]
     words += ["--channels", channel.name] if method.cooperates else []
     words += ["--scenarios", scenario, "--episodes", str(len(runs)), "--out", CELL_FOLDER]
