@@ -47,8 +47,8 @@ class _Settings(msgspec.Struct):
 def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
     """Return the runs whose results are in these files and folders, and the interrupted ones, which are aborted.
 
-    Their points have all settings that a sweep could vary (see `with_axes`). Raise InputError for a damaged result, and
-    for a location without runs.
+    They are numbered in the order of their paths. Their points have all settings that a sweep could vary (see
+    `with_axes`). Raise InputError for a damaged result, and for a location without runs.
     """
     runs: list[StoredRun] = []
     for location in locations:
@@ -57,7 +57,7 @@ def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
                 Diagnostic("no such file or folder", "give a store or a folder of results", str(location))
             )
         before = len(runs)
-        runs += [_finished(path, len(runs)) for path in result_paths([location])]
+        runs += [_finished(path, number) for number, path in enumerate(result_paths([location]), before)]
         runs += _interrupted(location, len(runs))
         if len(runs) == before:
             hint = "give a store of a sweep, or a folder that eidrive run --out or pytest --eidrive-out wrote"
@@ -131,9 +131,9 @@ def _finished(path: Path, number: int) -> StoredRun:
     )
 
 
-def _interrupted(location: Path, number: int) -> Iterator[StoredRun]:
-    """Yield the runs with a partial recording only, unless it ends before their settings."""
-    for path in unfinished_runs([location]):
+def _interrupted(location: Path, first: int) -> Iterator[StoredRun]:
+    """Yield the runs with a partial recording only, numbered from `first` on, unless it ends before their settings."""
+    for number, path in enumerate(unfinished_runs([location]), first):
         try:
             metadata = open_recording(path).metadata
             text = metadata["settings"]

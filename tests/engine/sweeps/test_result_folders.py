@@ -40,6 +40,16 @@ def test_settings_that_vary_are_the_axes(runs: Path) -> None:
     )
 
 
+def test_runs_are_in_the_order_of_their_paths(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    """The first text is the reference of a comparison."""
+    channels = ["80211p_urban", "congested", "ideal", "latency_300ms", "none"]
+    for channel in reversed(channels):
+        eidrive("run", scenario, "--channel", channel, "--no-record", "--out", tmp_path / "runs" / channel)
+    rows = list(stored_runs([tmp_path / "runs"]))
+    assert [(row.number, row.point["channel"]) for row in rows] == list(enumerate(channels))
+    assert compare_values([tmp_path / "runs"], "channel")[0].first == "80211p_urban"
+
+
 def test_folders_are_compared_as_stores(eidrive: Eidrive, runs: Path) -> None:
     (between,) = compare_values([runs], "Speed")
     assert between.comparison is not None
