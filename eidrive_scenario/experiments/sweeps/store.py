@@ -54,6 +54,8 @@ of a larger size to that of the file. Settings of the library have ratios of 3 t
 _STEPS, _SMALL_STEPS, _STEPS_PER_BYTE = 100_000, 10_000_000, 50
 """Steps of SQLite between two checks of their number, number that every file may take, and further ones per byte of the
 file. A run takes about 50 steps and at least 1 kB."""
+_OTHER_FILE = "give a file of `eidrive sweep --store`, or a new one for a sweep"
+"""Hint for a file that is no store; commands that read stores and sweeps give it."""
 _INSERT = f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 12)})"
 
 
@@ -297,7 +299,7 @@ def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
 def _check_format(path: Path, connection: sqlite3.Connection) -> None:
     application = connection.execute("PRAGMA application_id").fetchone()[0]
     if application != APPLICATION:
-        raise _error("the file is not a store of a sweep", "give a new file", path)
+        raise _error("the file is not a store of a sweep", _OTHER_FILE, path)
     held = connection.execute("PRAGMA user_version").fetchone()[0]
     if held != FORMAT:
         hint = "read it with the version that wrote it, or give a new file"
@@ -328,7 +330,7 @@ def _usable(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        raise _error(f"cannot use the store: {_reason(error)}", "give a new file", path) from error
+        raise _error(f"cannot use the store: {_reason(error)}", _OTHER_FILE, path) from error
 
 
 def _reason(error: sqlite3.Error) -> str:
