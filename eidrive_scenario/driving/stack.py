@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -44,7 +44,7 @@ class StackContext:
     roads: RoadNetwork | None
     seed: int
     dt: float
-    channel: str | Path | Mapping[str, Any] | None = None
+    channel: str | os.PathLike[str] | Mapping[str, Any] | None = None
     detector: str | None = None
     fusion: str | None = None
     cooperate: tuple[str, ...] | None = None

@@ -325,7 +325,7 @@ def _checked(name: str, value: Any, types: tuple[type, ...], expected: str) -> A
     # bool is a subclass of int, but True is not a number of seconds
     if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
         raise SettingError(Diagnostic(f"{name} is {quoted(value)}", f"give {expected}"))
-    return value
+    return Path(value) if isinstance(value, os.PathLike) else value
 
 
 def _is_assignment(value: object) -> TypeGuard[Assignment]:
@@ -340,7 +340,7 @@ def _several(given: Any) -> list[Any]:
     """Return the entries of a value that may be a single one."""
     if given is None:
         return []
-    if isinstance(given, str | Path):
+    if isinstance(given, str | os.PathLike):
         return [given]
     if isinstance(given, Set):  # its order differs between processes
         return sorted(given, key=str)
@@ -352,7 +352,9 @@ def _yaml_source(setting: str, value: Any, hint: str) -> YamlSource:
         from eidrive_scenario.files.yaml_text import flow_yaml
 
         return flow_yaml(value, setting=setting)
-    if isinstance(value, Path) or (isinstance(value, str) and value.strip()):
+    if isinstance(value, os.PathLike):
+        return Path(value)
+    if isinstance(value, str) and value.strip():
         return value
     raise SettingError(Diagnostic(f"{setting} is {quoted(value)}", hint))
 

@@ -161,7 +161,7 @@ class RunSettings:
     positive.
     """
 
-    channel: str | Path | Mapping[str, Any] | None = _option(
+    channel: str | os.PathLike[str] | Mapping[str, Any] | None = _option(
         Text((*_PLACE, Mapping), "the name, the file or the mapping of a channel profile", (".yaml", ".yml")),
         "Channel profile: name, file or YAML; none: no cooperation.",
         commands=_with_batches("Channel profile of all runs."),
@@ -175,7 +175,7 @@ class RunSettings:
     detector: str | None = _selection("detector", "stations", _RUN_AND_DATASET)
     fusion: str | None = _selection("fusion method", "stations", _RUN_AND_DATASET)
     planner: str | None = _selection("planner", "driven stations", {"run": {}, "check": {}, "dataset": _RARE})
-    weather: str | Path | None = _option(
+    weather: str | os.PathLike[str] | None = _option(
         Text(_PLACE, "the name or the file of a weather preset", None),
         "Weather preset: name or file.",
         commands={"run": {}, "dataset": {}},
@@ -228,7 +228,9 @@ class RunSettings:
             help="give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable"
         ),
     )
-    criteria: str | Path | Mapping[str, Any] | Iterable[str | Path | Mapping[str, Any]] | None = _option(
+    criteria: (
+        str | os.PathLike[str] | Mapping[str, Any] | Iterable[str | os.PathLike[str] | Mapping[str, Any]] | None
+    ) = _option(
         Criteria(),
         "Further criteria: '{collision: {of: Ego}}'; repeatable.",
         flag="--criterion",

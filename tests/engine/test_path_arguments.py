@@ -74,6 +74,14 @@ def test_paths_of_other_libraries_are_read_and_written(tmp_path: Path) -> None:
     assert result.command == f"eidrive run {SCENARIO} --seed 1 --time-limit 0.1"
 
 
+def test_settings_have_paths_of_other_libraries_as_paths(tmp_path: Path) -> None:
+    profile, stack, criteria = (tmp_path / name for name in ("profile.yaml", "stack.yaml", "criteria.yaml"))
+    settings = RunSettings(
+        channel=OtherPath(str(profile)), drive={"Ego": OtherPath(str(stack))}, criteria=OtherPath(str(criteria))
+    )
+    assert settings == RunSettings(channel=profile, drive={"Ego": stack}, criteria=criteria)
+
+
 @pytest.mark.parametrize("lock", [common.write_atomically, common.exclusive])
 def test_output_path_may_be_a_text(lock: Callable[..., AbstractContextManager[object]], tmp_path: Path) -> None:
     with lock(str(tmp_path / "out.txt")):

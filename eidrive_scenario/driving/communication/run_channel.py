@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,7 @@ class RunChannel:
         """Number of received messages that are too old for their receiver, by sender and receiver."""
 
     def select(
-        self, source: str | Path | Mapping[str, Any], *, origin: str, line: int | None, scope: Scope | None
+        self, source: str | os.PathLike[str] | Mapping[str, Any], *, origin: str, line: int | None, scope: Scope | None
     ) -> None:
         """Replace the channel by that of a profile, which continues the statistics.
 
