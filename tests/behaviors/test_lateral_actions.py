@@ -153,6 +153,20 @@ def test_lane_offset_respects_the_lateral_acceleration(scene: RunScene) -> None:
 
 
 @pytest.mark.element("LaneOffsetAction")
+@pytest.mark.parametrize(("stopped", "center"), [(1.0, -2.0), (3.0, -6.0)])
+@pytest.mark.parametrize("number", ["-2", "1"])
+def test_offset_after_a_stopped_lane_change_refers_to_the_current_lane(
+    scene: RunScene, stopped: float, center: float, number: str
+) -> None:
+    """The change over 4 m takes 4 s: before its half the actor is in its old lane, after it in the new one."""
+    to_center = offset('<AbsoluteTargetLaneOffset value="0"/>')
+    played = scene(8, ("Ego", change(lane(number))), ("Ego", to_center, after(stopped - 0.05)))
+    side = 1.0 if number == "-2" else -1.0
+    assert played.at(8.0).y == pytest.approx(-2.0 + side * (center + 2.0))
+    assert played.at(8.0).yaw == pytest.approx(0.0)
+
+
+@pytest.mark.element("LaneOffsetAction")
 def test_lane_offset_continuous_and_relative_follows_the_reference(scene: RunScene) -> None:
     played = scene(
         6,

@@ -153,6 +153,14 @@ class LaneChangeAction(ActionBehaviour):
         self.actor.motion.set_lateral_step(LateralStep(wanted, 0.0 if arrived else None, distance=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
 
+    def terminate(self, new_status: Status) -> None:
+        """Let the actor follow the lane that it is in if the action is stopped before the target lane is reached."""
+        followed = self.actor.motion.location
+        if self.status is Status.RUNNING and new_status is Status.INVALID and followed and self.actor.present:
+            here = self.context.location(self.actor.name)
+            if here is not None and here.road == followed.road:
+                self.actor.motion.set_reference_lane(here.lane)
+
     def _switch_reference_lane(self) -> None:
         """Continue from the new offset after a teleport, or after the neighbor of an ended lane became the target."""
         motion, transition = self.actor.motion, self._transition
