@@ -19,6 +19,7 @@ from eidrive_scenario.roads.network import fastest as fastest
 from eidrive_scenario.roads.network import fewest_junctions as fewest_junctions
 from eidrive_scenario.roads.network import random_costs as random_costs
 from eidrive_scenario.roads.objects import PlacedObject as PlacedObject
+from eidrive_scenario.roads.objects import lines as lines
 from eidrive_scenario.roads.objects import outlines as outlines
 from eidrive_scenario.roads.objects import placed_objects as placed_objects
 from eidrive_scenario.roads.routing.distance import Chain as Chain

@@ -53,12 +53,17 @@ def crosswalks(network: RoadNetwork) -> tuple[Array, ...]:
 def outlines(network: RoadNetwork, road_object: RoadObject) -> list[Array]:
     """Return the outlines of an object on the ground as polygons (M, 3), by default from its length and width."""
     if road_object.outlines:
-        return [_corners(network, road_object, outline) for outline in road_object.outlines if len(outline) >= 3]
+        return [_corners(network, road_object, outline) for outline in road_object.outlines]
     if road_object.length <= 0.0 or road_object.width <= 0.0:
         return []
     x, y = 0.5 * road_object.length, 0.5 * road_object.width
     rectangle = tuple(Corner(False, a * x, b * y, 0.0, 0.0) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
     return [_corners(network, road_object, rectangle)]
+
+
+def lines(network: RoadNetwork, road_object: RoadObject) -> list[Array]:
+    """Return the linear features of an object on the ground as lines (M, 3)."""
+    return [_corners(network, road_object, line) for line in road_object.lines]
 
 
 def _corners(network: RoadNetwork, road_object: RoadObject, outline: tuple[Corner, ...]) -> Array:

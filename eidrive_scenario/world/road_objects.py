@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.roads import PlacedObject, Pose, RoadNetwork, Signal, outlines, placed_objects
+from eidrive_scenario.roads import PlacedObject, Pose, RoadNetwork, Signal, lines, outlines, placed_objects
 from eidrive_scenario.world.actor import Vector3
 
 SIZES: Mapping[str, tuple[float, float, float]] = {
@@ -122,9 +122,7 @@ def buildings(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Bui
         road_object = placed.object
         if road_object.type != "building" or road_object.id in without:
             continue
-        height = max(
-            [placed.height or STOREY, *(corner.height for outline in road_object.outlines for corner in outline)]
-        )
+        height = _height(placed) or STOREY
         for pose, length, width in footprint(roads, placed):
             center = (pose.x, pose.y, pose.z + height / 2)
             yield Building(
@@ -191,9 +189,7 @@ def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObj
     if kind is None:
         return
     usual = SIZES[kind]
-    height = (
-        max([placed.height, *(corner.height for outline in road_object.outlines for corner in outline)]) or usual[2]
-    )
+    height = _height(placed) or usual[2]
     if height < LEAST:
         return
     name = road_object.name or f"{kind} {road_object.id}"
@@ -209,25 +205,39 @@ def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObj
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
 
 
+def _height(placed: PlacedObject) -> float:
+    """Return the height of an object, or the maximum height at its corners [m]; 0 if the map omits them."""
+    outlines_and_lines = (*placed.object.outlines, *placed.object.lines)
+    return max([placed.height, *(corner.height for corners in outlines_and_lines for corner in corners)])
+
+
 def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, float, float]]:
     """Return the boxes on the ground of an object: pose of the center of the base, length and width [m].
 
-    It is the box around its outlines, or a wall along each edge of an outline that covers too little of that box.
+    It is the box around its outlines, or a wall along each edge of an outline that covers too little of that box, and a
+    wall along each part of a linear feature.
     """
     road_object = placed.object
-    if not road_object.outlines or road_object.repeats:
+    if road_object.repeats or not (road_object.outlines or road_object.lines):
         return [(placed.pose, placed.length, placed.width)]
+    walls = [wall for line in lines(roads, road_object) for wall in _walls(line)]
+    if not road_object.outlines:
+        return walls
     box = bounding_box(roads, placed)
     polygons = outlines(roads, road_object)
     if len(polygons) == 1 and len(polygons[0]) > CONVEX and _area(polygons[0]) < FILLED * box[1] * box[2]:
-        corners = polygons[0]
-        return list(map(_wall, corners, np.roll(corners, -1, axis=0)))
-    return [box]
+        return [*walls, *_walls(np.concatenate([polygons[0], polygons[0][:1]]))]
+    return [*walls, box]
 
 
 def _area(polygon: Array) -> float:
     x, y = polygon[:, 0], polygon[:, 1]
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0)
+
+
+def _walls(line: Array) -> list[tuple[Pose, float, float]]:
+    """Return a wall along each part of a line, without parts of length 0: an outline may repeat its first corner."""
+    return [wall for wall in map(_wall, line[:-1], line[1:]) if wall[1] > 0.0]
 
 
 def _wall(start: Array, end: Array) -> tuple[Pose, float, float]:

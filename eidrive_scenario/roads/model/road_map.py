@@ -50,7 +50,11 @@ class Repeat(msgspec.Struct, frozen=True):
 
 
 class RoadObject(msgspec.Struct, frozen=True):
-    """Object at a road, such as a barrier, pole, tree, building, crosswalk or parking space."""
+    """Object at a road, such as a barrier, pole, tree, building, crosswalk or parking space.
+
+    outlines  corners of areas
+    lines     corners of linear features: outlines with closed="false"
+    """
 
     id: str
     name: str
@@ -69,6 +73,7 @@ class RoadObject(msgspec.Struct, frozen=True):
     height: float
     radius: float
     outlines: tuple[tuple[Corner, ...], ...] = ()
+    lines: tuple[tuple[Corner, ...], ...] = ()
     repeats: tuple[Repeat, ...] = ()
 
 

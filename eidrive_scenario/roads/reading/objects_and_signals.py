@@ -129,8 +129,13 @@ def read_object(road: str, element: etree._Element, collector: AttributeReader) 
         if abs(number(name)) > limit:
             collector.report_error(element, f"<object> has {name}={number(name):g}", f"{hint} {limit:g}")
     collector.spend(element, "objects", 1, MAX_OBJECTS)
-    outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
-    corners = [tuple(_read_corners(outline, collector)) for outline in outlines]
+    areas: list[tuple[Corner, ...]] = []
+    lines: list[tuple[Corner, ...]] = []
+    for outline in (*element.iterfind("outline"), *element.iterfind("outlines/outline")):
+        is_line = outline.get("closed") is not None and not collector.flag(outline, "closed")
+        corners = tuple(_read_corners(outline, collector))
+        if len(corners) >= (2 if is_line else 3):
+            (lines if is_line else areas).append(corners)
     return RoadObject(
         id=element.get("id", ""),
         name=element.get("name", ""),
@@ -148,7 +153,8 @@ def read_object(road: str, element: etree._Element, collector: AttributeReader) 
         width=number("width"),
         height=number("height"),
         radius=number("radius"),
-        outlines=tuple(outline for outline in corners if len(outline) >= 3),
+        outlines=tuple(areas),
+        lines=tuple(lines),
         repeats=tuple(_read_repeat(repeat, element, collector) for repeat in element.iterfind("repeat")),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -79,6 +80,24 @@ def test_outline_determines_position_and_size() -> None:
     corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2)))
     piece = only(f'type="obstacle" s="50" t="-10" zOffset="0"><outline>{corners}</outline>')
     assert (piece.pose.x, piece.pose.y, piece.length, piece.width, piece.height) == (53.0, -9.0, 6.0, 2.0, 1.2)
+
+
+def test_open_outline_is_a_wall_along_its_line() -> None:
+    """OpenDRIVE 1.8, table 88: an outline that is not closed is a linear feature, not an area."""
+    corners = "".join(f'<cornerRoad s="{s}" t="{t}" dz="0" height="1"/>' for s, t in ((40, -6), (60, -6), (60, 6)))
+    outline = f'<outlines><outline closed="false">{corners}</outline></outlines>'
+    bodies = road_object_bodies(network(f'type="barrier" s="50" t="-6" zOffset="0">{outline}'))
+    walls = [(body.pose.x, body.pose.y, body.pose.h, body.length, body.height) for body in bodies]
+    assert walls == [pytest.approx((50, -6, 0, 20, 1)), pytest.approx((60, 0, math.pi / 2, 12, 1))]
+
+
+@pytest.mark.parametrize("is_repeated", [False, True])
+def test_outline_that_repeats_its_first_corner_is_the_same(is_repeated: bool) -> None:
+    """An L of two arms of 2 m has six walls."""
+    points = [(0, 0), (10, 0), (10, 2), (2, 2), (2, 8), (0, 8), *[(0, 0)] * is_repeated]
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="4"/>' for u, v in points)
+    bodies = road_object_bodies(network(f'type="wall" s="50" t="-16" zOffset="0"><outline>{corners}</outline>'))
+    assert [body.length for body in bodies] == pytest.approx([10, 2, 8, 6, 2, 8])
 
 
 # Signals
