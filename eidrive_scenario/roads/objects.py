@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.roads.model.location import Pose
-from eidrive_scenario.roads.model.road_map import Corner, RoadObject
+from eidrive_scenario.roads.model.road_map import Corner, Repeat, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
 
 LONGEST_PART = 5.0
@@ -100,8 +100,30 @@ def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedO
         for i in range(count):
             ds = (i + 0.5) * part if gapless else i * part
             share = ds / repeat.length if repeat.length > 0.0 else 0.0
-            ends = repeat.t, repeat.width, repeat.height, repeat.z_offset, repeat.size, repeat.radius
-            t, width, height, z, length, radius = (a + (b - a) * share for a, b in ends)
+            ends = repeat.width, repeat.height, repeat.size, repeat.radius
+            width, height, length, radius = (a + (b - a) * share for a, b in ends)
             length, width = 2.0 * radius or length or road_object.length, 2.0 * radius or width or road_object.width
-            pose = _pose(network, road_object, repeat.s + ds, t, z)
-            yield PlacedObject(road_object, pose, part if gapless else length, width, height or road_object.height)
+            pose = _pose_in_repetition(network, road_object, repeat, ds)
+            if gapless:
+                # Parts meet at their ends also on bends, and where t changes.
+                start, end = (_pose_in_repetition(network, road_object, repeat, x * part) for x in (i, i + 1))
+                dx, dy = end.x - start.x, end.y - start.y
+                length = math.hypot(dx, dy)
+                pose = pose._replace(x=start.x + 0.5 * dx, y=start.y + 0.5 * dy, h=math.atan2(dy, dx))
+            yield PlacedObject(road_object, pose, length, width, height or road_object.height)
+
+
+def _pose_in_repetition(network: RoadNetwork, road_object: RoadObject, repeat: Repeat, ds: float) -> Pose:
+    """Return the pose of a repeated object `ds` after the start of the repetition [m]."""
+
+    def pose_at(ds: float) -> Pose:
+        share = ds / repeat.length if repeat.length > 0.0 else 0.0
+        t, z = (a + (b - a) * share for a, b in (repeat.t, repeat.z_offset))
+        return _pose(network, road_object, repeat.s + ds, t, z)
+
+    pose = pose_at(ds)
+    if not repeat.detached or repeat.length <= 0.0:
+        return pose
+    ends, share = (pose_at(0.0), pose_at(repeat.length)), ds / repeat.length
+    x, y, z = (a + (b - a) * share for a, b in zip(*(end[:3] for end in ends), strict=True))
+    return pose._replace(x=x, y=y, z=z)

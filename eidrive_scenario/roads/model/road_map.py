@@ -36,6 +36,7 @@ class Repeat(msgspec.Struct, frozen=True):
 
     length  extent of the repetition along the road [m]
     size, radius, …  values of the first and of the last object [m]; `size` is their length
+    detached         whether the objects are on the straight line between the first and the last one
     """
 
     s: float
@@ -47,6 +48,7 @@ class Repeat(msgspec.Struct, frozen=True):
     z_offset: tuple[float, float]
     size: tuple[float, float]
     radius: tuple[float, float]
+    detached: bool
 
 
 class RoadObject(msgspec.Struct, frozen=True):

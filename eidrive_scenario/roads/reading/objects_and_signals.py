@@ -201,4 +201,5 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, collector: Att
         z_offset=pair("zOffset"),
         size=pair("length"),
         radius=pair("radius"),
+        detached=collector.flag(repeat, "detachFromReferenceLine"),
     )

@@ -91,6 +91,33 @@ def test_repeated_object_is_placed_along_the_road() -> None:
 
 
 @pytest.mark.parametrize(
+    ("curvature", "t", "detached", "length"),
+    [
+        (0.02, (-8.0, -8.0), "false", 10 * 2 * 58.0 * math.sin(2.5 / 50.0)),
+        (0.0, (0.0, -20.0), "false", math.hypot(50.0, 20.0)),
+        (0.02, (-8.0, -8.0), "true", 2 * 58.0 * math.sin(0.5)),
+    ],
+    ids=["bend of 50 m radius", "oblique", "straight beside a bend"],
+)
+def test_parts_of_a_continuous_object_meet(
+    curvature: float, t: tuple[float, float], detached: str, length: float
+) -> None:
+    """OpenDRIVE 1.8, table 87: with distance 0 the object is a continuous feature. Ten parts are chords of the arc."""
+    repeat = (
+        f'<repeat s="0" length="50" distance="0" tStart="{t[0]}" tEnd="{t[1]}" detachFromReferenceLine="{detached}"/>'
+    )
+    rail = f'<objects><object id="1" type="barrier" s="0" t="0" height="1" width="0.3">{repeat}</object></objects>'
+    road = road_xml(length=50.0, extra=rail).replace("<line/>", f'<arc curvature="{curvature}"/>')
+    parts = list(placed_objects(RoadNetwork.parse(map_xml(road))))
+    along = np.array([(math.cos(part.pose.h), math.sin(part.pose.h)) for part in parts])
+    along *= np.array([[0.5 * part.length] for part in parts])
+    centers = np.array([part.pose[:2] for part in parts])
+    assert (centers + along)[:-1] == pytest.approx((centers - along)[1:])
+    assert (centers - along)[0] == pytest.approx((0.0, t[0]))
+    assert sum(part.length for part in parts) == pytest.approx(length)
+
+
+@pytest.mark.parametrize(
     ("size", "repeat", "expected"),
     [
         ('radius="0.5"', "", [1.0, 1.0, 1.0]),
