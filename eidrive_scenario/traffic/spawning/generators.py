@@ -103,7 +103,7 @@ class MaintainedTraffic(TrafficGenerator):
 
 @dataclass
 class Swarm(MaintainedTraffic):
-    """Traffic around an entity, between a circle and an ellipse, both `offset` [m] ahead of it along its x axis.
+    """Traffic between a circle around an entity and an ellipse, whose center is `offset` [m] ahead along its x axis.
 
     The whole ring is filled once. Cars outside the ellipse are removed and replaced near its edge, at sites from which
     they drive inwards relative to the entity.
@@ -131,25 +131,24 @@ class Swarm(MaintainedTraffic):
         if self.members:
             names = list(self.members)
             x, y = population.fleet.positions(names)
-            _, share = self._distances(center, x, y)
-            for name in compress(names, share > 1.0):
+            for name in compress(names, self._shares(center, x, y) > 1.0):
                 population.despawn(name)
         self.fill(population, partial(self._spawn_one, population, center), 1 if self._filled else ATTEMPTS)
         self._filled = True
 
-    def _distances(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return the distances from the center [m] and the shares of the axes of the ellipse."""
+    def _shares(self, center: CentralObject, x: Array, y: Array) -> Array:
+        """Return the shares of the axes of the ellipse."""
         cos, sin = math.cos(center.heading), math.sin(center.heading)
         dx, dy = x - center.x - self.offset * cos, y - center.y - self.offset * sin
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
-        return np.hypot(ahead, left), np.hypot(ahead / max(self.major, 1e-9), left / max(self.minor, 1e-9))
+        return np.hypot(ahead / max(self.major, 1e-9), left / max(self.minor, 1e-9))
 
     def _spawn_one(self, population: Population, center: CentralObject) -> bool:
         rng = self.rng(population)
         participant = self.mixture.draw(rng)
         sites = population.ground.for_body(participant)
-        distance, share = self._distances(center, sites.x, sites.y)
-        fit = (distance >= self.inner) & (share <= 1.0)
+        share = self._shares(center, sites.x, sites.y)
+        fit = (np.hypot(sites.x - center.x, sites.y - center.y) >= self.inner) & (share <= 1.0)
         fit &= self._direction(rng, center, sites) & self._sector(rng, center, sites)
         speed = population.starting_speed(sites, participant)
         if self.speeds is not None:

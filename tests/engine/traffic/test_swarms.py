@@ -15,7 +15,10 @@ from eidrive_scenario.world.actor import Placement
 
 @pytest.mark.exhaustive
 def test_swarm_is_complete_in_first_step_and_keeps_its_number() -> None:
-    """Cars may be outside the ellipse in the step in which they leave it, and are missing in the next one."""
+    """The minimum distance refers to the entity, the offset to the ellipse (1.3.1, TrafficSwarmAction).
+
+    Cars may be outside the ellipse in the step in which they leave it, and are missing in the next one.
+    """
     scene = Scene()
     instance = swarm(scene)
     counts = []
@@ -23,7 +26,7 @@ def test_swarm_is_complete_in_first_step_and_keeps_its_number() -> None:
         middle = scene.ego.x + 20.0
         for name, (_, place) in changes.additions.items():
             share = math.hypot((place.x - middle) / 300.0, (place.y + 1.75) / 100.0)
-            assert math.hypot(place.x - middle, place.y + 1.75) >= 50.0
+            assert math.hypot(place.x - scene.ego.x, place.y - scene.ego.y) >= 50.0
             assert share <= 1.0
             assert number == 0 or share > 0.5, name
         inside = [math.hypot((p.x - middle) / 300.0, (p.y + 1.75) / 100.0) for p in changes.placements.values()]
