@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from eidrive_behaviors.conditions.values import satisfies
+from openscenario_xml import catalog_xml, parameters_xml, scenario_xml
 from recorded_scene import RunScene, first_start
+from storyboard_xml import act_xml, condition_xml, event_xml, global_xml, group_xml, maneuver_xml, time_xml, trigger_xml
 from street_scene import NOTHING
+from whole_run import RecordedRun
 
 from eidrive_scenario.api.actions import model, satisfies_rule
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 
 @pytest.mark.element("ParameterCondition")
@@ -17,6 +24,35 @@ def test_parameter_and_user_defined_value_conditions(scene: RunScene) -> None:
     outside = value.format('<UserDefinedValueCondition name="button" rule="equalTo" value="pressed"/>')
     assert first_start(scene(0.2, ("Ego", NOTHING, level))) == 0.0
     assert first_start(scene(0.2, ("Ego", NOTHING, outside))) is None
+
+
+def when_parameter_is(value: str) -> str:
+    condition = f'<ParameterCondition parameterRef="Level" rule="equalTo" value="{value}"/>'
+    return trigger_xml(condition_xml(f"<ByValueCondition>{condition}</ByValueCondition>"))
+
+
+@pytest.mark.element("ParameterCondition")
+def test_parameter_condition_refers_to_the_innermost_declaration(tmp_path: Path) -> None:
+    """A parameter is visible in the element that declares it, and hides those of the same name outside of it."""
+    own = maneuver_xml("".join(event_xml(f"own {value}", NOTHING, when_parameter_is(value)) for value in "1237"))
+    entry = maneuver_xml(
+        f"{parameters_xml(Level=('double', '9'))}{event_xml('entry', NOTHING, when_parameter_is('3'))}"
+    )
+    add = """<ParameterAction parameterRef="Level"><ModifyAction><Rule><AddValue value="5"/></Rule></ModifyAction>
+      </ParameterAction>"""
+    later = maneuver_xml(event_xml("add", global_xml(add), trigger_xml(condition_xml(time_xml(0.5)))), "later")
+    assigned = """<CatalogReference catalogName="c" entryName="maneuver"><ParameterAssignments>
+      <ParameterAssignment parameterRef="Level" value="3"/></ParameterAssignments></CatalogReference>"""
+    groups = group_xml(own, name="own") + group_xml(later, name="later") + group_xml(assigned, name="of catalog")
+    story = f'<Story name="story">{parameters_xml(Level=("double", "2"))}{act_xml(groups)}</Story>'
+    (tmp_path / "c.xosc").write_bytes(catalog_xml("c", entry))
+    path = tmp_path / "s.xosc"
+    places = '<ManeuverCatalog><Directory path="."/></ManeuverCatalog>'
+    path.write_bytes(scenario_xml(declarations=parameters_xml(Level=("double", "1")), catalogs=places, story=story))
+    record = RecordedRun()
+    Simulation(load_scenario(path), settings=RunSettings(time_limit=1.0), observers=[record]).run()
+    begun = {name: record.begun(name) for name in ("own 1", "own 2", "own 3", "own 7", "entry")}
+    assert begun == {"own 1": [], "own 2": [0.0], "own 3": [], "own 7": [pytest.approx(0.55)], "entry": [0.0]}
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,10 @@ class ValueAction(ActionBehaviour):
     @property
     def value(self) -> str:
         """Current value; empty without one."""
-        values = self.context.parameters if self.kind == "parameter" else self.context.variables
-        return values.get(self.ref, "")
+        parent = self.parent_element
+        if isinstance(parent, model.ParameterAction):
+            return self.context.parameter(parent) or ""
+        return self.context.variables.get(parent.variable_ref, "")
 
     def set_value(self, value: str) -> None:
         """Set the value."""

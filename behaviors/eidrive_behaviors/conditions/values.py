@@ -107,7 +107,7 @@ class ParameterCondition(TextCondition):
 
     def current(self, context: ConditionContext) -> str | None:
         """Return the current value."""
-        return context.parameters.get(self.element.parameter_ref)
+        return context.parameter(self.element)
 
 
 class VariableCondition(TextCondition):

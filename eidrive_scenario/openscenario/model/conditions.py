@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Any
 
 from eidrive_scenario.openscenario.model.declarations import (
     EntityName,
@@ -10,7 +11,7 @@ from eidrive_scenario.openscenario.model.declarations import (
     StoryboardElementName,
     VariableName,
 )
-from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, attribute, child
+from eidrive_scenario.openscenario.model.element import ALL, Choice, Element, about, attribute, child
 from eidrive_scenario.openscenario.model.entities import ByObjectType, EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     AngleType,
@@ -227,6 +228,7 @@ class ParameterCondition(Element):
     parameter_ref: ParameterName
     rule: Rule
     value: str
+    scope: Any = about(None)
 
 
 class VariableCondition(Element):

@@ -76,8 +76,8 @@ ABOUT = frozenset({"line", "source", "scope", "sibling_index"})
 """Fields with the location of an element, not with its content.
 
 line, source   line and file
-scope          parameters (a Scope) that are visible to references inside a text of the element; None for a property
-               without a reference, or with a single reference, which the reader resolves
+scope          parameters (a Scope) that are visible to the name of a parameter and to references inside a text of the
+               element; None for a property without a reference, or with a single reference, which the reader resolves
 sibling_index  place among the children of the parent, where elements of several classes are ordered
 """
 

@@ -246,6 +246,7 @@ class ParameterAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets or modifies a parameter (deprecated since 1.2: use a variable)."""
 
     parameter_ref: ParameterName
+    scope: Any = about(None)
     set_action: ParameterSetAction | None = child(deprecated="1.2")
     modify_action: ParameterModifyAction | None = child(deprecated="1.2")
 

@@ -124,6 +124,9 @@ class Reader:
         self._text(node, content, values)
         if cls is model.Property or cls is model.CustomCommandAction:
             self._keep_scope(node, scope, values)
+        elif cls is model.ParameterCondition or cls is model.ParameterAction:
+            self._scope_uses += 1
+            values["scope"] = scope
         repeated: dict[str, list[model.Element]] = {}
         for child in children:
             self._child(node, child, content, scope, values, repeated)

@@ -105,6 +105,17 @@ class ConditionContext:
         """Background traffic; None before its first instance starts."""
         self.position_cache = PositionCache()
 
+    def parameter(self, element: model.ParameterCondition | model.ParameterAction) -> str | None:
+        """Return the value of the parameter to which an element refers: that which an action has set, otherwise that of
+        the scenario, story or maneuver that declares it. None if it is unknown.
+        """
+        name = element.parameter_ref
+        value = self.parameters.get(name)
+        if element.scope is None or value != self.scenario.parameters.get(name):
+            return value
+        text: str | None = element.scope.text(name)
+        return text
+
     @property
     def time(self) -> float:
         """Simulated time [s]."""
