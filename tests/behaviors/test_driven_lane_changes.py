@@ -10,6 +10,7 @@ import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import object_xml, road_file_xml, scenario_xml
 from storyboard_xml import (
+    condition_xml,
     end_xml,
     init_xml,
     lane_position_xml,
@@ -17,6 +18,8 @@ from storyboard_xml import (
     speed_xml,
     story_xml,
     teleport_xml,
+    time_xml,
+    trigger_xml,
 )
 
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
@@ -30,10 +33,19 @@ def change_xml(lane: int, *, dimension: str = "time", value: float = 4, offset: 
     <LaneChangeTarget><AbsoluteTargetLane value="{lane}"/></LaneChangeTarget></LaneChangeAction></LateralAction>"""
 
 
-def drive(folder: Path, action: str, *, init: str = "", seconds: float = 25, right: int = 2) -> tuple[Any, list[float]]:
-    """Return time, x, y and speed of Ego, driven at 15 m/s in lane -1, with an action after 2 s; and when
-    the action completed [s].
+def acquire(s: float) -> str:
+    position = f"<Position>{lane_position_xml(-1, s)}</Position>"
+    return private_xml(f"<RoutingAction><AcquirePositionAction>{position}</AcquirePositionAction></RoutingAction>")
+
+
+def drive(
+    folder: Path, action: str, *, init: str = "", seconds: float = 25, right: int = 2, stopped: float = 1e3
+) -> tuple[Any, list[float]]:
+    """Return time, x, y and speed of Ego, driven at 15 m/s in lane -1, with an action from 2 s until its act stops;
+    and when the action completed [s].
     """
+    story = story_xml(action=action, condition='<SimulationTimeCondition rule="greaterThan" value="2"/>')
+    stop = trigger_xml(condition_xml(time_xml(stopped)), kind="StopTrigger")
     (folder / "road.xodr").write_text(map_xml(road_xml(lanes=lanes_xml(right=right), length=800.0)))
     path = folder / "a.xosc"
     path.write_bytes(
@@ -41,7 +53,7 @@ def drive(folder: Path, action: str, *, init: str = "", seconds: float = 25, rig
             road=road_file_xml("road.xodr"),
             entities=object_xml("Ego"),
             init=init_xml("Ego", teleport_xml(lane_position_xml(-1, 20.0)), speed_xml(15), init),
-            story=story_xml(action=action, condition='<SimulationTimeCondition rule="greaterThan" value="2"/>'),
+            story=story.replace("</Act>", f"{stop}</Act>"),
             stop=end_xml(seconds),
         )
     )
@@ -76,6 +88,16 @@ def test_lane_change_of_a_driven_vehicle_completes_in_the_new_lane(tmp_path: Pat
     assert float(np.interp(done, rows[:, 0], rows[:, 2])) == pytest.approx(-1.5 * WIDTH, abs=0.3)
 
 
+@pytest.mark.parametrize("route", ["", acquire(700.0)])
+def test_driven_vehicle_returns_if_its_lane_change_is_stopped(tmp_path: Path, route: str) -> None:
+    """After 1 of 4 s it has 0.5 m of 3.5 m."""
+    rows, (done,) = drive(tmp_path, change_xml(-2), init=route, seconds=12, stopped=3.0)
+    time, y = rows[:, 0], rows[:, 2]
+    assert done == pytest.approx(3.0, abs=0.06)
+    assert y.min() > -WIDTH
+    assert np.abs(y[time > 9.0] + 0.5 * WIDTH).max() < 0.1
+
+
 def test_offset_in_the_new_lane_is_kept(tmp_path: Path) -> None:
     rows, _ = drive(tmp_path, change_xml(-2, offset=0.5), seconds=20)
     assert np.abs(rows[rows[:, 0] > 12.0, 2] - (0.5 - 1.5 * WIDTH)).max() < 0.2
@@ -90,11 +112,7 @@ def test_driven_vehicle_keeps_its_direction_in_an_oncoming_lane(tmp_path: Path) 
 @pytest.mark.exhaustive
 def test_route_continues_in_the_new_lane_to_its_end(tmp_path: Path) -> None:
     """The route of 380 m ends at s = 400 m, where the vehicle stops."""
-    goal = private_xml(
-        "<RoutingAction><AcquirePositionAction><Position>"
-        f"{lane_position_xml(-1, 400.0)}</Position></AcquirePositionAction></RoutingAction>"
-    )
-    rows, _ = drive(tmp_path, change_xml(-2), init=goal, seconds=50)
+    rows, _ = drive(tmp_path, change_xml(-2), init=acquire(400.0), seconds=50)
     assert rows[-1, 3] == pytest.approx(0.0, abs=0.05)
     assert 380.0 < rows[-1, 1] < 410.0
     assert rows[-1, 2] == pytest.approx(-1.5 * WIDTH, abs=0.3)

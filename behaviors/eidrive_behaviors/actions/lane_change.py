@@ -90,6 +90,7 @@ class LaneChangeAction(ActionBehaviour):
         self._roads = self.require_roads()
         self._lane = 0
         self._path: LanePath | None = None
+        self._goal_before = Goal()
         self._limited_offset: RateLimitedValue | None = None
         self._delay_warning = DelayWarning(self)
 
@@ -154,12 +155,16 @@ class LaneChangeAction(ActionBehaviour):
         return Status.SUCCESS if arrived else Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        """Let the actor follow the lane that it is in if the action is stopped before the target lane is reached."""
-        followed = self.actor.motion.location
-        if self.status is Status.RUNNING and new_status is Status.INVALID and followed and self.actor.present:
-            here = self.context.location(self.actor.name)
-            if here is not None and here.road == followed.road:
-                self.actor.motion.set_reference_lane(here.lane)
+        """Let the actor follow the lane that it is in, or its earlier path, if the action is stopped."""
+        if self.status is not Status.RUNNING or new_status is not Status.INVALID or not self.actor.present:
+            return
+        goal, followed = self.actor.goal, self.actor.motion.location
+        if goal is not None and self._path is not None and goal.path is self._path.points:
+            before = self._goal_before
+            self.actor.set_goal(replace(goal, path=before.path, lap=before.lap, is_route=before.is_route))
+        here = self.context.location(self.actor.name)
+        if followed is not None and here is not None and here.road == followed.road:
+            self.actor.motion.set_reference_lane(here.lane)
 
     def _switch_reference_lane(self) -> None:
         """Continue from the new offset after a teleport, or after the neighbor of an ended lane became the target."""
@@ -247,9 +252,11 @@ class LaneChangeAction(ActionBehaviour):
                 return Status.SUCCESS
             if error < STRAYED:
                 return Status.RUNNING
+        goal = self.actor.goal or Goal()
+        if self._path is None or goal.path is not self._path.points:
+            self._goal_before = goal
         self._path = self._plan_path(here)
         if self._path is not None:
-            goal = self.actor.goal or Goal()
             lap = None if self.actor.motion.route is None else goal.lap
             self.actor.set_goal(replace(goal, path=self._path.points, lap=lap, is_route=False))
         return Status.RUNNING
