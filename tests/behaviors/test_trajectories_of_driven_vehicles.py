@@ -72,6 +72,18 @@ def test_trajectory_of_driven_vehicle_ends_at_its_end(run: Run) -> None:
     assert row(played, ended, "Ego")[0] == pytest.approx(219.0, abs=1.5)
 
 
+@pytest.mark.parametrize(("stopped", "y"), [(100.0, -6.0), (1.5, -2.0)])
+def test_driven_vehicle_leaves_a_trajectory_that_is_stopped(run: Run, stopped: float, y: float) -> None:
+    """From lane -1 (y = -2) it leads to lane -2 (y = -6); an action on the lateral domain stops it in lane -1."""
+    offset = """<LateralAction><LaneOffsetAction continuous="false"><LaneOffsetActionDynamics dynamicsShape="step"/>
+      <LaneOffsetTarget><AbsoluteTargetLaneOffset value="0"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>"""
+    way = curve(world(100.0, -2.0), world(180.0, -6.0), world(400.0, -6.0))
+    played = run(
+        8.0, ("Ego", follow(way, "follow")), ("Ego", private_xml(offset), after(stopped)), ego=(-1, 100.0, 15.0)
+    )
+    assert row(played, 8.0, "Ego")[1] == pytest.approx(y, abs=0.1)
+
+
 def test_trajectory_behind_a_driven_vehicle_does_not_end_and_warns(run: Run) -> None:
     """Ego starts 370 m beyond the end of the trajectory, and driving stacks do not turn around."""
     played = run(1.0, ("Ego", follow(STRAIGHT), after(0.25)), ego=(-1, 590.0, 10.0))

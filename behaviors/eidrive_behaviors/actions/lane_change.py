@@ -155,14 +155,12 @@ class LaneChangeAction(ActionBehaviour):
         return Status.SUCCESS if arrived else Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        """Let the actor follow the lane that it is in, or its earlier path, if the action is stopped."""
+        """Let the actor follow the lane that it is in, or its route, if the action is stopped."""
         if self.status is not Status.RUNNING or new_status is not Status.INVALID or not self.actor.present:
             return
-        goal, followed = self.actor.goal, self.actor.motion.location
-        if goal is not None and self._path is not None and goal.path is self._path.points:
-            before = self._goal_before
-            self.actor.set_goal(replace(goal, path=before.path, lap=before.lap, is_route=before.is_route))
-        here = self.context.location(self.actor.name)
+        if self._path is not None:
+            self.actor.end_path(self._path.points, self._goal_before)
+        here, followed = self.context.location(self.actor.name), self.actor.motion.location
         if followed is not None and here is not None and here.road == followed.road:
             self.actor.motion.set_reference_lane(here.lane)
 

@@ -43,14 +43,17 @@ MISSED = 10.0
 class DrivenTrajectory:
     """Goal of a driven vehicle on a trajectory, from an arc length on [m].
 
-    s  arc length of the vehicle [m], within the trajectory
+    s       arc length of the vehicle [m], within the trajectory
+    path    (M, 3) points [m]
+    before  goal before this path
     """
 
     def __init__(self, layout: TrajectoryCurve, s: float) -> None:
         self.s = s
         self._away = 0.0
         self._layout = layout
-        self._path = _points(layout, s)
+        self.path = _points(layout, s)
+        self.before = Goal()
         self._lap = _points(layout, 0.0) if layout.closed else None
 
     def move(self, pose: Pose) -> float:
@@ -78,7 +81,9 @@ class DrivenTrajectory:
 
     def goal(self, before: Goal | None, speed: float | None) -> Goal:
         """Return the goal with this path; a target speed [m/s] replaces that of the goal before."""
-        goal = replace(before or Goal(), path=self._path, lap=self._lap, is_route=False)
+        if before is not None and before.path is not self.path:
+            self.before = before
+        goal = replace(before or Goal(), path=self.path, lap=self._lap, is_route=False)
         return goal if speed is None else replace(goal, speed=speed, acceleration=0.0)
 
 
@@ -119,6 +124,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._pursuit: PathPursuit | None = None
         self._run: RateLimitedValue | None = None
         self._followed: TrajectoryProgress | None = None
+        self._driven: DrivenTrajectory | None = None
         self._trajectory = self._resolve_trajectory()
         self._timing = self.action.time_reference.timing
         shape = self._trajectory.shape.chosen()
@@ -172,7 +178,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._heading = motion.pose.h if present else None
         """Heading before the action [rad]; None for an actor that the trajectory adds to the world."""
         self._put: Pose | None = None
-        self._driven: DrivenTrajectory | None = None
+        self._driven = None
         self._pursuit = self._run = None
         self._begun = self._direction_known = self._teleports = self._is_late = False
         if self._timing is not None and not (self._follows_limits and present):
@@ -252,8 +258,11 @@ class FollowTrajectoryAction(ActionBehaviour):
     def terminate(self, new_status: Status) -> None:
         """Remove the progress along the trajectory, so that no distance refers to it any more.
 
-        From now on, the speed of the actor refers to its heading.
+        From now on, the speed of the actor refers to its heading. If the action is stopped, a driven vehicle leaves the
+        trajectory.
         """
+        if new_status is Status.INVALID and self._driven is not None:
+            self.actor.end_path(self._driven.path, self._driven.before)
         if self._followed is not None:
             motion = self.actor.motion
             motion.set_speed(motion.speed_along_heading)

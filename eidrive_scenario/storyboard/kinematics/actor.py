@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+from msgspec.structs import replace
+
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_agent_controller
@@ -100,6 +103,16 @@ class Actor:
     def set_goal(self, goal: Goal) -> None:
         """Set the request to its agent."""
         self._goal = goal
+
+    def end_path(self, path: Array, before: Goal) -> None:
+        """End a path of the request to its agent: the route of an earlier request continues, without one the lane.
+
+        A path that another request has replaced has ended already.
+        """
+        goal = self._goal
+        if goal is not None and goal.path is path:
+            route = before if before.is_route else Goal()
+            self._goal = replace(goal, path=route.path, lap=route.lap, is_route=route.is_route)
 
     @property
     def progress(self) -> TrajectoryProgress | None:
