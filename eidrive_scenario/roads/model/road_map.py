@@ -227,12 +227,15 @@ class Road:
 
     @cached_property
     def directions(self) -> Mapping[int, int]:
-        """+1 if traffic drives in the direction of s, else -1, by lane id; +1 for lane 0."""
+        """+1 if traffic drives in the direction of s, else -1, by lane id; +1 for lane 0.
+
+        An id has one direction: that of the first section in which it is a lane for cars, if there is any.
+        """
         directions = {0: 1}
-        for section in self.sections:
-            for number, lane in section.lanes.items():
-                usual = self._usual_direction(number)
-                directions.setdefault(number, -usual if lane.direction == "reversed" else usual)
+        lanes = [lane for section in self.sections for lane in section.lanes.values()]
+        for lane in sorted(lanes, key=lambda lane: not lane.drivable):
+            usual = self._usual_direction(lane.id)
+            directions.setdefault(lane.id, -usual if lane.direction == "reversed" else usual)
         return directions
 
     def driving_direction(self, lane_id: int) -> int:

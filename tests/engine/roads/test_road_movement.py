@@ -14,6 +14,10 @@ def lane(number: int, link: str = "", width: str = 'a="3" b="0" c="0" d="0"') ->
     return f'<lane id="{number}" type="driving"><link>{link}</link><width sOffset="0" {width}/></lane>'
 
 
+def reversed_lane(number: int) -> str:
+    return lane(number).replace("<lane ", '<lane direction="reversed" ')
+
+
 def chained() -> RoadNetwork:
     """Return road a along x, and road b with opposite reference line: its lane +1 continues lane -1 of a."""
     a = road_xml(
@@ -42,6 +46,19 @@ def test_advance_onto_reversed_road_keeps_lateral_position() -> None:
     back = network.advance(end, -30.0)
     assert back is not None
     assert back == pytest.approx(start)
+
+
+@pytest.mark.parametrize("kind", ["sidewalk", "shoulder"])
+def test_reversed_lane_has_its_direction_behind_a_sidewalk_of_its_id(kind: str) -> None:
+    """OpenDRIVE 1.8: traffic of a reversed lane drives against the usual direction; here at s = 100 to 200."""
+    beside = lane(-2).replace("driving", kind)
+    sections = section_xml("", lane(-1) + beside) + section_xml("", lane(-1) + reversed_lane(-2), s=100.0)
+    network = RoadNetwork.parse(map_xml(road_xml("a", length=200.0, lanes=sections)))
+    assert [network.driving_direction("a", number) for number in (-1, -2)] == [1, -1]
+    end = network.advance(network.location("a", -2, 180.0), 30.0)
+    assert end is not None
+    assert end.s == pytest.approx(150.0)
+    assert abs(network.pose(end).h) == pytest.approx(math.pi)
 
 
 def test_advance_beyond_end_of_road_is_none() -> None:
