@@ -23,12 +23,12 @@ def jammer(x: float, power: float) -> dict[str, list[dict[str, float]]]:
 def test_received_power_is_that_of_friis_and_adds_up() -> None:
     """20 lg(4 pi d f / c) with c = 3e8 m/s: 87.86 dB at 100 m and 5.9 GHz."""
     positions = np.array([[100.0, 0.0, 1.5], [200.0, 0.0, 1.5]])
-    one = RadioProfile.model_validate({**FREE, **jammer(0.0, 33.0)}).jamming_power(positions)
+    power = RadioProfile.model_validate({**FREE, **jammer(0.0, 33.0)}).jamming_power(positions)
     loss = 20.0 * math.log10(4.0 * math.pi * 100.0 * 5.9e9 / 3e8)
-    assert 10.0 * math.log10(one[0]) == pytest.approx(33.0 + 3.0 - loss)
-    assert one[0] / one[1] == pytest.approx(4.0)
+    assert 10.0 * math.log10(power[0]) == pytest.approx(33.0 + 3.0 - loss)
+    assert power[0] / power[1] == pytest.approx(4.0)
     two = {"jammers": 2 * jammer(0.0, 33.0)["jammers"]}
-    assert RadioProfile.model_validate({**FREE, **two}).jamming_power(positions) == pytest.approx(2.0 * one)
+    assert RadioProfile.model_validate({**FREE, **two}).jamming_power(positions) == pytest.approx(2.0 * power)
 
 
 @pytest.mark.parametrize("stations", [2, 6])
