@@ -52,19 +52,23 @@ class AverageFusion(FusionMethod):
 
 def _label_objects(reports: Sequence[Detections]) -> list[int]:
     """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""
-    means, counts = reports[0].boxes[:, :3].copy(), np.ones(len(reports[0]))
-    labels = list(range(len(means)))
+    # Single numbers: for the few objects of a station, arrays take longer.
+    means: list[list[float]] = reports[0].boxes[:, :3].tolist()
+    counts, labels = [1] * len(means), list(range(len(means)))
     for report in reports[1:]:
         centers = report.boxes[:, :3]
-        label = np.full(len(centers), -1)
-        for known_object, box in associate(means, centers, GATE):
-            label[box] = known_object
-            counts[known_object] += 1.0
-            means[known_object] += (centers[box] - means[known_object]) / counts[known_object]
-        fresh = np.flatnonzero(label < 0)
-        label[fresh] = len(means) + np.arange(len(fresh))
-        means, counts = np.concatenate([means, centers[fresh]]), np.append(counts, np.ones(len(fresh)))
-        labels += label.tolist()
+        associated = {box: label for label, box in associate(np.array(means), centers, GATE)}
+        for box, center in enumerate(centers.tolist()):
+            label = associated.get(box, len(means))
+            if label == len(means):
+                means.append(center)
+                counts.append(1)
+            else:
+                counts[label] += 1
+                means[label] = [
+                    mean + (value - mean) / counts[label] for mean, value in zip(means[label], center, strict=True)
+                ]
+            labels.append(label)
     return labels
 
 

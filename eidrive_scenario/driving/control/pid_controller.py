@@ -166,17 +166,20 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
 
     The heading is interpolated between the midpoints of segments, so that the steering is continuous.
     """
-    segments = [
-        (x0, y0, dx, dy, dx * dx + dy * dy)
+    segments = (
+        (x0, y0, x1 - x0, y1 - y0, (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
         for (x0, y0), (x1, y1) in pairwise(points)
-        for dx, dy in [(x1 - x0, y1 - y0)]
-    ]
+    )
     nearest, share = nearest_segment(segments, x, y)
-    x0, y0, dx, dy, _ = segments[nearest]
-    heading = math.atan2(dy, dx)
-    left = (dx * (y - y0) - dy * (x - x0)) / math.hypot(dx, dy)
+    heading = _heading(points, nearest)
+    (x0, y0), (x1, y1) = points[nearest], points[nearest + 1]
+    left = ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) / math.hypot(x1 - x0, y1 - y0)
     neighbor = nearest + 1 if share > 0.5 else nearest - 1
-    if 0 <= neighbor < len(segments):
-        _, _, dx, dy, _ = segments[neighbor]
-        heading += abs(share - 0.5) * wrap_angle(math.atan2(dy, dx) - heading)
+    if 0 <= neighbor < len(points) - 1:
+        heading += abs(share - 0.5) * wrap_angle(_heading(points, neighbor) - heading)
     return heading, left
+
+
+def _heading(points: list[list[float]], index: int) -> float:
+    (x0, y0), (x1, y1) = points[index], points[index + 1]
+    return math.atan2(y1 - y0, x1 - x0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from itertools import accumulate
 from typing import NamedTuple
@@ -92,7 +92,7 @@ class PlannedPath:
         return segment_distance(x, y, x0, y0, x0 + dx, y0 + dy)
 
 
-def nearest_segment(segments: Sequence[Sequence[float]], x: float, y: float) -> tuple[int, float]:
+def nearest_segment(segments: Iterable[Sequence[float]], x: float, y: float) -> tuple[int, float]:
     """Return the index of the segment that is nearest to a point, and the share of it before its nearest place.
 
     The search ends where the distance has increased by LEADS_AWAY.
