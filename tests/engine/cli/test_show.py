@@ -9,6 +9,7 @@ from typing import get_args
 
 import pytest
 from command_fixtures import Eidrive
+from lxml import html
 from report_table import report_data
 
 from eidrive_scenario.cli.show import Names
@@ -192,7 +193,8 @@ def test_view_writes_page_beside_recording(eidrive: Eidrive, passing_by: Path, t
     assert result.exit_code == 0, result.output
     (page,) = tmp_path.rglob("recording.html")
     assert result.stdout.strip() == str(page)
-    assert "<html" in page.read_text(encoding="utf-8")
+    verdict = html.fromstring(page.read_bytes()).get_element_by_id("verdict").text_content()
+    assert "Ego and Parked came within 5.00 m (center to center) at 2.00 s, boxes within 3.00 mlimit 3.00 m" in verdict
 
 
 def test_view_of_parent_folder_requires_single_run(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
