@@ -75,7 +75,7 @@ def _of_model(owner: str, model: type[BaseModel], above: str = "") -> Iterator[P
         key = f"{above}{field.alias or name}"
         text = texts.get(name, "")
         units = [*_UNIT.findall(text), *(unit for end, unit in _SUFFIXES.items() if name.endswith(end)), ""]
-        words = re.sub(r" +([;,.])", r"\1", _UNIT.sub("", text)).removesuffix(".")
+        words = re.sub(r" +([;,.])(?!\w)", r"\1", _UNIT.sub("", text)).removesuffix(".")
         description = textwrap.shorten(words, LONGEST, placeholder=" …")
         yield Property(owner, key, type_text(field.annotation), _default(field), units[0], description)
         models = [nested for nested in _models(field.annotation) if nested is not model]

@@ -102,6 +102,8 @@ def test_list_of_properties_shows_type_default_and_unit(eidrive: Eidrive) -> Non
     assert rows["criterion min_distance", "at_least"][2] == "m"
     assert rows["criterion comfort", "jerk"] == ["number", "8.37", "m/s³"]
     assert {key for owner, key in rows if owner == "station"} >= set(AgentSettings.model_fields)
+    texts = {(owner, key): rest[-1] for owner, key, *rest in cells}
+    assert texts["detector ssd", "device"].startswith("`cuda` executes .npz and .pt")
 
 
 def test_list_of_properties_names_extensions_that_do_not_load(eidrive: Eidrive) -> None:
