@@ -417,7 +417,7 @@ class Decider:
         A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
         """
         motion = self._motion(situation, scene, profile, stops)
-        beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
+        beside = situation.line.lanes_beside(situation.s + VIEWED)
         outlook = Outlook(situation.line, scene, beside)
         is_current = self._current is not None and self._current.name == profile.name
         has_begun = self._passes and is_current

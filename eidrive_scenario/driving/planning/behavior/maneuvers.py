@@ -123,10 +123,6 @@ class Situation(msgspec.Struct, frozen=True):
         limit = float(np.interp(place, self.line.along, self.limits))
         return max(min(math.sqrt(self.speed**2 + gain), self.wanted, limit), self.speed)
 
-    def lanes_at(self, s: float) -> int:
-        """Return the index of the point of the line at a distance along it."""
-        return self.line.index_at(s)
-
 
 SLOWER = 2.0
 """Difference to the wanted speed from which on a slower vehicle is passed [m/s]."""
@@ -188,7 +184,7 @@ class _Obstacle(NamedTuple):
         """Return objects with the lanes at four places from `begin` to `end` [m]."""
         step = (end - begin) / 3.0
         places = (begin, begin + step, begin + 2.0 * step, end)
-        return cls(objects, begin, end, [situation.line.lanes_beside(situation.lanes_at(s)) for s in places])
+        return cls(objects, begin, end, [situation.line.lanes_beside(s) for s in places])
 
     @property
     def fastest(self) -> float:
@@ -219,7 +215,7 @@ def passing_profiles(
     if not may_pass(situation, scene, body):
         profile = None if obstacle is None else _around(situation, settings, obstacle, body, _overtaking(situation))
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
-    beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
+    beside = situation.line.lanes_beside(situation.s + 10.0)
     faster, overtaking = beside.faster, beside.overtaking
     moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
@@ -295,7 +291,7 @@ def _evasions(
     The first lane is away from those of the opposite direction.
     """
     places = (situation.s + 10.0, head_on.s)
-    here, there = (situation.line.lanes_beside(situation.lanes_at(s)) for s in places)
+    here, there = (situation.line.lanes_beside(s) for s in places)
     evasions = []
     if situation.kind_of(head_on.owner) in VULNERABLE:
         obstacle = _meeting(situation, head_on, body)
@@ -345,7 +341,7 @@ def _behind_neighbor(
     last = max(beside, key=attrgetter("front"))
     end = max(last.front + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
     name = f"pass {situation.kind_of(last.owner)} on the {'left' if side > 0 else 'right'}"
-    border = _border(situation.line.lanes_beside(situation.lanes_at(end)), side, body)
+    border = _border(situation.line.lanes_beside(end), side, body)
     back = _length_at(situation, settings, end, abs(d), is_hasty=abs(d) > border)
     return LateralProfile(name, (s, end, end + back), (d, d, 0.0), slope, side, border)
 
@@ -419,7 +415,7 @@ def _is_parked(situation: Situation, hypothesis: Present, body: Body) -> bool:
 
 def _overtaking(situation: Situation) -> int:
     """Return the side for overtaking at the vehicle."""
-    return situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0)).overtaking
+    return situation.line.lanes_beside(situation.s + 10.0).overtaking
 
 
 def _is_steady(situation: Situation, hypothesis: Present) -> bool:

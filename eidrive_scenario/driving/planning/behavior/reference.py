@@ -184,8 +184,9 @@ class ReferenceLine:
         dx, dy = x - px, y - py
         return self._distances[index] + dx * tx + dy * ty, dy * tx - dx * ty
 
-    def lanes_beside(self, index: int) -> LanesBeside:
-        """Return the lanes at a point of the line."""
+    def lanes_beside(self, s: float) -> LanesBeside:
+        """Return the lanes at a distance along the line [m]."""
+        index = self.index_at(s)
         lanes = self._beside.get(index)
         if lanes is None:
             lanes = self._beside[index] = self._lanes_at(index)
