@@ -23,7 +23,6 @@ from eidrive_scenario.evaluation.criteria_parser import (
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads
-from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.files.yaml_text import read_yaml_source
 from eidrive_scenario.openscenario import Scenario
@@ -63,17 +62,15 @@ def command_key(command: CustomCommandAction | CustomCommand) -> CommandKey:
 
 def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
     """Return the profile of a command `eidrive.channel`, None for no cooperation. Raise SettingError."""
-    folders = (library_path() / "channels",)
-    return load_profile(command.content, folders, origin=command.source, line=command.line, scope=command.scope)
+    return load_profile(command.content, origin=command.source, line=command.line, scope=command.scope)
 
 
 def profile_files(scenario: Scenario) -> Iterator[Path]:
     """Yield the files of the channel profiles that a scenario selects."""
     for command in scenario.custom_commands:
         if command.type == CHANNEL:
-            folders = (library_path() / "channels",)
             with suppress(SettingError):  # of an invalid reference, which `check_commands` reports
-                path = profile_file(command.content, folders, origin=command.source, scope=command.scope)
+                path = profile_file(command.content, origin=command.source, scope=command.scope)
                 yield from () if path is None else (path,)
 
 

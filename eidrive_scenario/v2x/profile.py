@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.extensions.library import library_path, names
 from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_settings, settings_type_of
 from eidrive_scenario.files.bounded import is_regular_file, path_argument
@@ -38,7 +39,6 @@ class ChannelProfile(Settings):
 
 def load_profile(
     source: str | os.PathLike[str] | Mapping[str, Any],
-    folders: Sequence[Path] = (),
     *,
     origin: str = "",
     line: int | None = None,
@@ -46,9 +46,8 @@ def load_profile(
 ) -> ChannelProfile | None:
     """Return a validated profile, by name, by path, from YAML text or from a mapping; None for no cooperation.
 
-    source  YAML mapping as text (`{delay: {kind: constant, seconds: 0.3}}`), name of a `.yaml` file in one of
-            `folders`, or path relative to the folder of `origin`, to the working directory or to `folders`; the first
-            match applies
+    source  YAML mapping as text (`{delay: {kind: constant, seconds: 0.3}}`), name of a profile of the library, or path
+            relative to the folder of `origin`, to the working directory or to the library; the first match applies
     origin, line  file and line of the source, for messages
     scope   parameters for references `$name` and `${expression}` in settings; `source` may also be such a reference
 
@@ -71,14 +70,11 @@ def load_profile(
             message = "channel name is empty"
             raise SettingError(Diagnostic(message, "expected a profile such as `ideal`, or `none`", origin, line))
         source = Path(text)
-    path = _find(source, Path(origin).parent, folders)
+    path = _find(source, Path(origin).parent)
     if path is None:
-        names = {path.stem for folder in folders for suffix in SUFFIXES for path in folder.glob(f"*{suffix}")} | {
-            NO_COOPERATION
-        }
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
         message = f"no {kind} {quoted(str(source))}"
-        hint = file_suggestion(source, SUFFIXES, names, folder=Path(origin).parent)
+        hint = file_suggestion(source, SUFFIXES, [*names("channels"), NO_COOPERATION], folder=Path(origin).parent)
         if is_regular_file(source):
             message, hint = f"file {quoted(str(source))} is not a channel profile", "expected a file name in .yaml"
         raise SettingError(Diagnostic(message, hint, origin, line))
@@ -86,9 +82,7 @@ def load_profile(
     return _parse(data, path.stem, str(path), 1, lines, scope, folder=path.parent)
 
 
-def profile_file(
-    source: str | Path, folders: Sequence[Path] = (), *, origin: str = "", scope: Scope | None = None
-) -> Path | None:
+def profile_file(source: str | Path, *, origin: str = "", scope: Scope | None = None) -> Path | None:
     """Return the file of a profile that `load_profile` reads; None for a YAML text, and if there is no such file.
 
     Raise SettingError for an invalid reference.
@@ -96,7 +90,7 @@ def profile_file(
     source = _named_by_reference(source, origin, None, scope)
     if isinstance(source, str) and _is_inline(source.strip()):
         return None
-    return _find(Path(str(source).strip()), Path(origin).parent, folders)
+    return _find(Path(str(source).strip()), Path(origin).parent)
 
 
 def _named_by_reference(source: str | Path, origin: str, line: int | None, scope: Scope | None) -> str | Path:
@@ -114,20 +108,25 @@ def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel |
     """Return the channel of a profile; None without a profile.
 
     previous  channel that is replaced during a run; its messages in flight keep their outcome
+
+    Raise SettingError for an object that is no profile, such as its name.
     """
     if profile is None:
         return None
+    if not isinstance(profile, ChannelProfile):
+        raise SettingError(Diagnostic(f"profile is {quoted(profile)}", "give the result of load_profile"))
     channel: Channel = construct(registry("channels").load(profile.model, Channel), profile, seed)
     if previous is not None:
         channel.continue_from(previous)
     return channel
 
 
-def _find(source: Path, beside: Path, folders: Sequence[Path]) -> Path | None:
+def _find(source: Path, beside: Path) -> Path | None:
+    library = library_path() / "channels"
     if source.suffix in SUFFIXES:
-        candidates = [beside / source, source, *(folder / source for folder in folders)]
+        candidates = [beside / source, source, library / source]
     else:
-        candidates = [folder / f"{source}{suffix}" for folder in folders for suffix in SUFFIXES]
+        candidates = [library / f"{source}{suffix}" for suffix in SUFFIXES]
     return next((path for path in candidates if is_regular_file(path)), None)
 
 

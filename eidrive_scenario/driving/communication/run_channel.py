@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.errors import InvalidResult, SettingError
-from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
@@ -48,7 +47,7 @@ class RunChannel:
 
         Raise SettingError, with origin and line, if the profile is invalid or cannot continue the channel.
         """
-        profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
+        profile = load_profile(source, origin=origin, line=line, scope=scope)
         try:
             self.active = build_channel(profile, self._seed, previous=self._last)
         except SettingError as error:

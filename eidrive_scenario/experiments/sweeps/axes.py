@@ -16,7 +16,6 @@ import numpy as np
 
 from eidrive_scenario.base.randomness import integer_key
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted
-from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.model import ParameterType
 from eidrive_scenario.run_options import OPTIONS, RunSettings
@@ -219,7 +218,7 @@ def settings_at(point: Point, base: RunSettings, profile: Mapping[str, Any] | No
 def _profile_of(point: Point, profile: Mapping[str, Any] | None, changes: Mapping[str, Scalar]) -> Mapping[str, Any]:
     """Return the profile that a point changes. Raise SettingError if there is none."""
     if CHANNEL in point:
-        selected = load_profile(str(point[CHANNEL]), [library_path() / "channels"])
+        selected = load_profile(str(point[CHANNEL]))
         profile = None if selected is None else selected.model_dump(mode="json", exclude_unset=True)
     if profile is None:
         message = f"{CHANNEL}.{next(iter(changes))}: the runs have no channel"

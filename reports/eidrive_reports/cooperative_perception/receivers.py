@@ -308,7 +308,7 @@ class Receiver:
             cooperates_with=tuple(factory.senders) if arm.cooperates else (),
             pose_noise=condition.pose_noise,
         )
-        channel = build_channel(load_profile(condition.channel, []), factory.seed)
+        channel = build_channel(load_profile(condition.channel), factory.seed)
         assert channel is not None
         self._channel = channel
         self._scans = 0

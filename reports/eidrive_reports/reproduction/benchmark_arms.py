@@ -11,7 +11,7 @@ from typing import Any
 
 from eidrive_reports.studies import group_by
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, registry
-from eidrive_scenario.api.experiments import describe_scenarios, library_path, resolve_scenario
+from eidrive_scenario.api.experiments import describe_scenarios, resolve_scenario
 from eidrive_scenario.api.run import RunSettings
 from eidrive_scenario.api.v2x import load_profile
 
@@ -126,7 +126,7 @@ def channel_of(text: str) -> BenchmarkChannel:
     """
     match = _SHARED.fullmatch(text)
     if match is None:
-        load_profile(text, (library_path() / "channels",), origin="--channels")
+        load_profile(text, origin="--channels")
         return BenchmarkChannel(text, text)
     rate, stations = float(match[1]), int(match[2])
     if not 0.0 < rate <= RATE or not 2 <= stations <= MOST_STATIONS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,8 @@ from eidrive_scenario.v2x.radio.channel import RadioChannel
 LIBRARY = Path(__file__).parents[3] / "xosc" / "channels"
 
 
-def composed(source: object, folders: tuple[Path, ...] = (LIBRARY,)) -> ComposedProfile:
-    profile = load_profile(source, folders)  # type: ignore[arg-type]
+def composed(source: str | Path | Mapping[str, object]) -> ComposedProfile:
+    profile = load_profile(source)
     assert isinstance(profile, ComposedProfile)
     return profile
 
@@ -27,7 +28,7 @@ def test_build_channel_of_every_library_profile_has_its_model() -> None:
     assert {"none", "ideal", "latency_300ms", "error_30pct", "paper_latency_300ms", "paper_error_30pct"} <= names
     assert {"80211p_urban", "cv2x_highway", "5g_uu", "bursty", "congested"} <= names
     for name in names:
-        profile = load_profile(name, [LIBRARY])
+        profile = load_profile(name)
         channel = build_channel(profile, 0)
         if name == "none":
             assert profile is None
@@ -60,8 +61,14 @@ def test_load_profile_accepts_mapping_yaml_text_and_file(tmp_path: Path) -> None
     file = tmp_path / "mine.yaml"
     file.write_text("delay:\n  kind: constant\n  seconds: 0.1\nown_perception: true\n")
     mapping = {"delay": {"kind": "constant", "seconds": 0.1}, "own_perception": True}
-    for source, name in ((text, "custom"), (mapping, "custom"), (file, "mine"), (str(file), "mine"), ("mine", "mine")):
-        profile = composed(source, (tmp_path,))
+    sources: list[tuple[str | Path | Mapping[str, object], str]] = [
+        (text, "custom"),
+        (mapping, "custom"),
+        (file, "mine"),
+        (str(file), "mine"),
+    ]
+    for source, name in sources:
+        profile = composed(source)
         assert profile.delay == ConstantDelay(seconds=0.1)
         assert profile.own_perception
         assert profile.name == name
@@ -98,7 +105,7 @@ INVALID = [
 @pytest.mark.parametrize(("source", "message"), INVALID, ids=[row[0][:60] for row in INVALID])
 def test_load_profile_invalid_text_raises_with_position_and_hint(source: str, message: str) -> None:
     with pytest.raises(SettingError) as caught:
-        load_profile(source, [LIBRARY], origin="scenario.xosc", line=12)
+        load_profile(source, origin="scenario.xosc", line=12)
     assert str(caught.value).startswith("scenario.xosc:12: ")
     assert message in str(caught.value)
 
@@ -107,9 +114,9 @@ def test_load_profile_of_other_file_or_long_text_raises(tmp_path: Path) -> None:
     file = tmp_path / "mine.txt"
     file.write_text("model: composed\n")
     with pytest.raises(SettingError, match=r"mine.txt' is not a channel profile; expected a file name in .yaml"):
-        load_profile(str(file), [LIBRARY])
+        load_profile(str(file))
     with pytest.raises(SettingError, match="no channel profile 'xxx"):
-        load_profile("x" * 300, [LIBRARY])
+        load_profile("x" * 300)
 
 
 def test_load_profile_invalid_file_raises_with_path_and_line(tmp_path: Path) -> None:
@@ -196,6 +203,6 @@ def test_load_profile_with_invalid_delay_trace_raises(
 
 def test_load_profile_missing_file_raises_with_suggestion() -> None:
     with pytest.raises(SettingError, match=r"--channel: no file 'latency_300mss.yaml'; did you mean 'latency_300ms'\?"):
-        load_profile("latency_300mss.yaml", [LIBRARY], origin="--channel")
+        load_profile("latency_300mss.yaml", origin="--channel")
     with pytest.raises(SettingError, match="--channel: channel name is empty"):
-        load_profile(" ", [LIBRARY], origin="--channel")
+        load_profile(" ", origin="--channel")
