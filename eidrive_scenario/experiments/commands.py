@@ -14,11 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from eidrive_scenario.base.randomness import checked_seed
 from eidrive_scenario.extensions.library import library_path, name_of, resolve_scenario
 from eidrive_scenario.extensions.project import portable_path, selected_project
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.run_options import OPTIONS, RunSettings
+from eidrive_scenario.run_options import OPTIONS, RunSettings, checked_settings
 from eidrive_scenario.simulation.result import RunResult
 
 
@@ -27,8 +28,9 @@ def command_of(scenario: str | os.PathLike[str], seed: int, settings: RunSetting
 
     scenario  path or library name
 
-    Raise SettingError if there is no such scenario.
+    Raise SettingError if there is no such scenario, and for a seed or settings of another type.
     """
+    seed, settings = checked_seed(seed), checked_settings(settings)
     path = resolve_scenario(scenario)
     project = selected_project()
     words = ["eidrive", *([] if project is None else ["--project", str(project)]), "run", _scenario(path)]

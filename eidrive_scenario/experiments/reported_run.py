@@ -8,12 +8,13 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.errors import Diagnostic, InputError, quoted
 from eidrive_scenario.simulation.result import typed
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 _OF_REPORT = ("folder", "replay", "axes", "sweep")
 """Fields that are no part of a result."""
+_EXPECTED = "give an object that eidrive run --json prints, such as RunResult.as_json()"
 
 
 OUTCOMES = ("failed", "did not finish", "not judged", "passed")
@@ -106,6 +107,8 @@ def parse_run(result: Mapping[str, Any] | ReportedRun, source: str | Path = "") 
     """
     if isinstance(result, ReportedRun):
         return result
+    if not isinstance(result, Mapping):
+        raise InputError(Diagnostic(f"result is {quoted(result)}", _EXPECTED, str(source)))
     try:
         return ReportedRun.model_validate({key: value for key, value in result.items() if key not in _OF_REPORT})
     except ValidationError as error:
@@ -114,7 +117,7 @@ def parse_run(result: Mapping[str, Any] | ReportedRun, source: str | Path = "") 
         raise InputError(
             Diagnostic(
                 f"result: {key[:200]!r}: {first['msg'].lower()}",
-                "give an object that eidrive run --json prints",
+                _EXPECTED,
                 str(source),
             )
         ) from error

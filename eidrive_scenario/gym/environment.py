@@ -21,7 +21,7 @@ from eidrive_scenario.gym.settings import (
 )
 from eidrive_scenario.gym.station_interface import RewardSettings, StationInterface, parse_mapping, sum_terms
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
-from eidrive_scenario.run_options import checked_settings
+from eidrive_scenario.run_options import Switch, checked_settings
 from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
 
 if TYPE_CHECKING:
@@ -43,6 +43,13 @@ def _check_steps(max_steps: int | None, ticks_per_step: int) -> None:
             raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a positive integer"))
 
 
+def checked_mapping(name: str, value: Any) -> Mapping[str, Any]:
+    """Return an argument that is a mapping; an empty one for None. Raise SettingError for another object."""
+    if value is not None and not isinstance(value, Mapping):
+        raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a mapping of names to values"))
+    return {} if value is None else value
+
+
 def _stations(
     chosen: Sequence[str] | None, controllable: Sequence[str], drivers: Sequence[str], *, single: bool
 ) -> tuple[str, ...]:
@@ -51,6 +58,8 @@ def _stations(
         message = "the scenario has no station"
         raise SettingError(Diagnostic(message, "give an entity a driving stack: RunSettings(drive='Ego')"))
     if chosen is not None:
+        if not isinstance(chosen, Sequence):
+            raise SettingError(Diagnostic(f"stations is {quoted(chosen)}", "give a list of station names"))
         unknown = next((name for name in chosen if name not in controllable), None)
         if unknown is not None:
             message = f"the scenario has no station {quoted(unknown)}"
@@ -118,6 +127,7 @@ class ScenarioEnvironment:
         rewarded = parse_mapping(RewardSettings, reward, "reward")
         self._source = scenario if isinstance(scenario, Scenario | ConcreteRun) else load_scenario(scenario)
         _check_steps(max_steps, ticks_per_step)
+        Switch().check("terminate_on_collision", terminate_on_collision)
         self._settings = checked_settings(settings)
         self._ticks_per_step = ticks_per_step
         self._duration = None if max_steps is None else max_steps * ticks_per_step * self._settings.dt
@@ -167,17 +177,14 @@ class ScenarioEnvironment:
         Return the first observations by agent; and seed, time [s] and parameters. The steps are counted from that tick
         on. Raise SettingError for unknown options, and for the reward of a criterion that the run does not have.
         """
+        given = checked_mapping("options", options)
+        parameters = checked_mapping("parameters", given.get("parameters"))
         self.close()
         self._left = set()
-        given = options or {}
         unknown = next((key for key in given if key not in OPTIONS), None)
         if unknown is not None:
             raise SettingError(Diagnostic(f"reset has the option {quoted(unknown)}", suggestion(str(unknown), OPTIONS)))
-        settings, parameters = self._settings, given.get("parameters", {})
-        if not isinstance(parameters, Mapping):
-            raise SettingError(Diagnostic(f"parameters is {quoted(parameters)}", "give a mapping of names to values"))
-        if parameters:
-            settings = replace(settings, parameters={**settings.parameters, **parameters})
+        settings = replace(self._settings, parameters={**self._settings.parameters, **parameters})
         episode = self._new_episode(given.get("seed", drawn_seed), settings)
         try:
             criteria = [*EXITS, *(criterion.name for criterion in episode.simulation.criteria)]
@@ -242,6 +249,7 @@ class ScenarioEnvironment:
 
     def _check_agents(self, actions: Mapping[str, Any]) -> None:
         """Raise SettingError unless the actions are those of the agents."""
+        checked_mapping("actions", actions)
         missing = next((name for name in self.agents if name not in actions), None)
         if missing is not None:
             raise SettingError(Diagnostic(f"agent {missing!r} has no action", "give an action of each agent"))

@@ -6,7 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Unpack
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.gym.environment import MAX_SEED, OPTIONS, EnvironmentOptions, Outcome, ScenarioEnvironment
+from eidrive_scenario.gym.environment import (
+    MAX_SEED,
+    OPTIONS,
+    EnvironmentOptions,
+    Outcome,
+    ScenarioEnvironment,
+    checked_mapping,
+)
 from eidrive_scenario.gym.libraries import INSTALL, gymnasium, spaces
 from eidrive_scenario.gym.settings import METADATA
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
@@ -60,7 +67,7 @@ class EidriveParallelEnv(ScenarioEnvironment, ParallelEnv[str, Any, Any]):  # ty
         """
         if seed is not None:
             self._generator, _ = gymnasium.utils.seeding.np_random(seed)
-        supported = {key: value for key, value in (options or {}).items() if key in OPTIONS}
+        supported = {key: value for key, value in checked_mapping("options", options).items() if key in OPTIONS}
         absent = Diagnostic("no controlled station enters the world", "select other stations")
         observations, info = self._start(int(self._generator.integers(MAX_SEED)), supported, absent)
         return observations, {name: dict(info) for name in observations}

@@ -65,8 +65,10 @@ def variations(scenario: Scenario) -> Mapping[str, Distribution]:
     """Return the distribution of each parameter that this scenario draws, by its name.
 
     The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise InputError with
-    file and line of every error in the commands.
+    file and line of every error in the commands, SettingError for an object that is no scenario, such as its path.
     """
+    if not isinstance(scenario, Scenario):
+        raise SettingError(Diagnostic(f"scenario is {quoted(scenario)}", "give the result of load_scenario"))
     distributions = _variations.get(scenario)
     if distributions is None:
         distributions = _variations[scenario] = _read_variations(scenario)

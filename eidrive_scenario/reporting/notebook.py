@@ -47,7 +47,7 @@ class Picture:
 
     def write(self, path: str | PathLike[str]) -> None:
         """Write the figure in the format of the suffix of a path. Raise SettingError for another suffix."""
-        write_figure(self.figure, path_argument(path, "path"))
+        write_figure(self.figure, path)
 
     def _repr_svg_(self) -> str:
         text = io.StringIO()

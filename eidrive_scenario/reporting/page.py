@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from eidrive_scenario.files.atomic import write_atomically
+from eidrive_scenario.files.bounded import path_argument
 
 
 @cache
@@ -34,14 +36,15 @@ def render_page(template: str | Path, **values: Any) -> str:
     return environment.from_string(template.read_text(encoding="utf-8")).render(**values)
 
 
-def write_page(out: Path, template: str | Path, **values: Any) -> Path:
-    """Render a template to the file `out`, create its folder if necessary, and return `out`.
+def write_page(out: str | os.PathLike[str], template: str | Path, **values: Any) -> Path:
+    """Render a template to the file `out`, create its folder if necessary, and return its path.
 
     Raise SettingError if the file cannot be written.
     """
-    with write_atomically(out) as stream:
+    page = path_argument(out, "out")
+    with write_atomically(page) as stream:
         stream.write(render_page(template, **values).encode(errors="replace"))
-    return out
+    return page
 
 
 def png_address(png: bytes) -> str:

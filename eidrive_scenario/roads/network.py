@@ -6,12 +6,12 @@ Routes have the length as cost, or one of the costs here: travel time, junctions
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, cached_property, lru_cache
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.errors import Diagnostic, suggestion
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.roads.geometry import poses
 from eidrive_scenario.roads.geometry.locator import REACH, Locator
 from eidrive_scenario.roads.geometry.tables import RoadTables
@@ -71,12 +72,13 @@ class RoadNetwork:
         self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
 
     @classmethod
-    def load(cls, path: str | Path) -> RoadNetwork:
+    def load(cls, path: str | os.PathLike[str]) -> RoadNetwork:
         """Return the network of an OpenDRIVE file. Raise RoadError with all diagnostics.
 
         A network is immutable. Runs share it, including cached results, while the content of the file is unchanged.
         """
-        return _loaded(read_road_text(Path(path)), str(path))
+        location = path_argument(path, "path")
+        return _loaded(read_road_text(location), str(location))
 
     @classmethod
     def parse(cls, text: str | bytes, source: str = "<memory>") -> RoadNetwork:

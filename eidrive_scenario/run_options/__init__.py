@@ -5,6 +5,7 @@ from eidrive_scenario.run_options.forms import Criteria as Criteria
 from eidrive_scenario.run_options.forms import Form as Form
 from eidrive_scenario.run_options.forms import Seconds as Seconds
 from eidrive_scenario.run_options.forms import Stacks as Stacks
+from eidrive_scenario.run_options.forms import Switch as Switch
 from eidrive_scenario.run_options.forms import YamlSource as YamlSource
 from eidrive_scenario.run_options.forms import as_setting_text as as_setting_text
 from eidrive_scenario.run_options.forms import check_seconds as check_seconds

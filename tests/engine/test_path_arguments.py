@@ -9,10 +9,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
-from eidrive_scenario.api import common, experiments, report, run, v2x
+from eidrive_scenario.api import common, experiments, pages, report, run, v2x
 from eidrive_scenario.api.run import RunSettings, run_and_save
-from eidrive_scenario.errors import SettingError
+from eidrive_scenario.errors import InputError, SettingError
 
 SCENARIO = "coop/scenario_1"
 BRIEF = RunSettings(time_limit=0.1)
@@ -45,6 +46,11 @@ FUNCTIONS: list[tuple[Callable[..., object], str]] = [
     (report.show, "run"),
     (partial(report.write_replay, out="replay.html"), "recording"),
     (partial(report.write_report, "runs"), "out"),
+    (partial(pages.write_run_report, []), "out"),
+    (partial(pages.write_page, template="report.html.jinja"), "out"),
+    (partial(pages.write_replays, []), "beside"),
+    (partial(pages.write_figure, Figure()), "path"),
+    (common.RoadNetwork.load, "path"),
 ]
 
 
@@ -80,6 +86,21 @@ def test_settings_have_paths_of_other_libraries_as_paths(tmp_path: Path) -> None
         channel=OtherPath(str(profile)), drive={"Ego": OtherPath(str(stack))}, criteria=OtherPath(str(criteria))
     )
     assert settings == RunSettings(channel=profile, drive={"Ego": stack}, criteria=criteria)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: run.variations(SCENARIO), "scenario is 'coop/scenario_1'; give the result of load_scenario"),  # type: ignore[arg-type]
+        (lambda: v2x.build_channel("ideal", 1), "profile is 'ideal'; give the result of load_profile"),  # type: ignore[arg-type]
+        (lambda: experiments.command_of(SCENARIO, 1, {"dt": 0.1}), r"settings is {'dt': 0.1}; give RunSettings"),  # type: ignore[arg-type]
+        (lambda: experiments.command_of(SCENARIO, [1], BRIEF), r"the seed is \[1\]; give an integer"),  # type: ignore[arg-type]
+        (lambda: pages.write_run_report([5], "page"), r"result is 5; .* such as RunResult.as_json\(\)"),  # type: ignore[list-item]
+    ],
+)
+def test_object_of_a_related_kind_is_reported_with_the_expected_one(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call()
 
 
 @pytest.mark.parametrize("lock", [common.write_atomically, common.exclusive])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,6 +25,7 @@ from matplotlib.path import Path as Outline
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.atomic import write_atomically
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.reporting.drawing.canvas import LONGEST_LABEL, Canvas, Points
 from eidrive_scenario.reporting.drawing.top_view import GROUND, STATION, TRUTH, WHITE, Window
 
@@ -294,18 +296,19 @@ def paper_style() -> Iterator[None]:
         yield
 
 
-def write_figure(figure: Figure, path: Path, resolution: float = RESOLUTION) -> None:
+def write_figure(figure: Figure, path: str | os.PathLike[str], resolution: float = RESOLUTION) -> None:
     """Write a figure as PNG, SVG or PDF by the suffix of its file. Raise SettingError for another suffix, or if it
     cannot be written.
 
     resolution  of a PNG file [dots per inch]
     """
-    check_format("path", path)
-    suffix = path.suffix.lower()
+    location = path_argument(path, "path")
+    check_format("path", location)
+    suffix = location.suffix.lower()
     buffer = io.BytesIO()
     with paper_style():
         figure.savefig(buffer, format=suffix[1:], dpi=resolution, metadata=_NO_METADATA[suffix])
-    with write_atomically(path) as stream:
+    with write_atomically(location) as stream:
         stream.write(buffer.getvalue())
 
 

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.reported_run import ReportedRun
-from eidrive_scenario.files.bounded import load_json
+from eidrive_scenario.files.bounded import load_json, path_argument
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
@@ -353,11 +353,12 @@ MOST = 200
 """Maximum number of replays of a report; runs that did not pass come first."""
 
 
-def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[ReportedRun], list[str]]:
+def write_replays(runs: Sequence[ReportedRun], beside: str | os.PathLike[str]) -> tuple[list[ReportedRun], list[str]]:
     """Write the replay of each run with a recording into a folder `beside` the report.
 
     Return the runs with the addresses of their replays, and the reasons for which recordings have none.
     """
+    folder = path_argument(beside, "beside") / FOLDER
     linked = list(runs)
     omitted: list[str] = []
     taken: set[str] = set()
@@ -367,13 +368,13 @@ def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[Repor
         if run.folder is not None and (run.folder / RECORDING).is_file()
     ]
     if recordings:
-        write_page(beside / FOLDER / LIBRARY, "replay/library.js.jinja", three=three_library())
+        write_page(folder / LIBRARY, "replay/library.js.jinja", three=three_library())
     for index, recording in recordings[:MOST]:
         name = recording.parent.name
         while name in taken:
             name += "-"
         taken.add(name)
-        page = beside / FOLDER / f"{name}.html"
+        page = folder / f"{name}.html"
         try:
             make_replay(open_recording(recording), page, library=LIBRARY)
         except InputError as error:

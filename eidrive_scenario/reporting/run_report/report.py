@@ -19,6 +19,7 @@ from eidrive_scenario.base.installation import ENGINE
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedRun, parse_run
 from eidrive_scenario.experiments.statistics.intervals import Summary, summarize
+from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.rates import (
     parameter_matrix,
@@ -51,7 +52,7 @@ EXPIRED = "messages.expired"
 
 def write_run_report(
     results: Iterable[Mapping[str, Any] | ReportedRun],
-    out: Path,
+    out: str | os.PathLike[str],
     *,
     omitted: Sequence[str] = (),
     unjudged: Sequence[str] = (),
@@ -68,7 +69,8 @@ def write_run_report(
     Runs are grouped by the settings in which those of a scenario differ. A run in several folders is listed and counted
     once. Raise InputError without results, or for an invalid result.
     """
-    page = out if out.suffix == ".html" else out / "report.html"
+    location = path_argument(out, "out")
+    page = location if location.suffix == ".html" else location / "report.html"
     given = [parse_run(result) for result in results]
     if not given:
         raise InputError(Diagnostic("no result to report", "give at least one run", str(out)))

@@ -97,6 +97,8 @@ def test_options_of_reset_select_seed_and_parameters_of_the_run() -> None:
     assert (info["seed"], info["parameters"]["EgoOffset"]) == (7, "0.25")
     with pytest.raises(SettingError, match="reset has the option 'sed'; did you mean 'seed'"):
         env.reset(options={"sed": 7})
+    with pytest.raises(SettingError, match="options is 5; give a mapping"):
+        env.reset(options=5)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="EgoOfset"):
         env.reset(options={"parameters": {"EgoOfset": 0.25}})
     env.close()
@@ -172,6 +174,7 @@ def test_vectorized_episodes_are_those_of_single_environments(mode: str) -> None
         ({"observation": {"route": {"points": 30}}}, "points x spacing is above 59 m"),
         ({"reward": 3}, "reward is 3; give a mapping or RewardSettings"),
         ({"max_steps": 0}, "max_steps is 0; give a positive integer"),
+        ({"terminate_on_collision": "no"}, "terminate_on_collision is 'no'; give True or False"),
         ({"render_mode": "human"}, "render_mode is 'human'"),
         ({"settings": RunSettings(channel="idel")}, "idel"),
     ],

@@ -22,6 +22,8 @@ def test_agents_are_the_driving_stations_by_default() -> None:
     assert EidriveParallelEnv(SEVERAL).possible_agents == ["Ego"]
     with pytest.raises(SettingError, match="the scenario has no station 'Bus'"):
         EidriveParallelEnv(SEVERAL, stations=["Bus"])
+    with pytest.raises(SettingError, match="stations is 5; give a list of station names"):
+        EidriveParallelEnv(SEVERAL, stations=5)  # type: ignore[arg-type]
 
 
 def test_episode_of_one_agent_is_that_of_the_single_environment() -> None:
@@ -47,4 +49,8 @@ def test_actions_of_other_agents_are_errors() -> None:
         env.step({})
     with pytest.raises(SettingError, match="'RSU' is not an agent"):
         env.step({"Ego": [0.0], "RSU": 1})
+    with pytest.raises(SettingError, match="actions is 1; give a mapping"):
+        env.step(1)  # type: ignore[arg-type]
+    with pytest.raises(SettingError, match="options is 1; give a mapping"):
+        env.reset(options=1)  # type: ignore[arg-type]
     env.close()
