@@ -124,7 +124,7 @@ def _judge(recording: Recording, others: Any) -> Judgement:
     for frame in recording.frames(skipped.append):
         for command in frame.commands if others is None else ():
             if command.type == CRITERION:
-                add(parse_criteria(command.content, context, source=source))
+                add(_criteria_of_run(command.content, context, recording))
             elif command.type in EXITS:
                 exit_command = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)
         observer.observe(frame)
@@ -154,6 +154,17 @@ def _judge(recording: Recording, others: Any) -> Judgement:
         end,
         tuple(warnings),
     )
+
+
+def _criteria_of_run(text: str, context: CriteriaContext, recording: Recording) -> tuple[CriterionDeclaration, ...]:
+    """Return the criteria of a command of the run. Raise SettingError for those that only its extensions know."""
+    try:
+        return parse_criteria(text, context)
+    except SettingError as error:
+        run = recording.metadata.get("command") or "the run"
+        hint = f"judge it with the extensions of {run}, or with other criteria (--criterion)"
+        source = str(recording.path)
+        raise SettingError([Diagnostic(entry.message, hint, source) for entry in error.diagnostics]) from error
 
 
 def _differences(judged: Sequence[Verdict], recorded: Sequence[Verdict]) -> list[str]:

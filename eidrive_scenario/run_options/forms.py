@@ -112,7 +112,7 @@ class Senders(Form):
         stations = tuple(given) if isinstance(given, Iterable) else (given,)
         if not all(isinstance(station, str) for station in stations):
             raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a tuple of station names"))
-        return stations
+        return tuple(dict.fromkeys(stations))
 
     def parse(self, flag: str, given: str | None) -> tuple[str, ...] | None:
         if given is None:

@@ -78,7 +78,7 @@ def test_parameters_of_another_type_raise() -> None:
         load_scenario(ONE, cast("Any", 3))
 
 
-@pytest.mark.parametrize("senders", [["RSU"], {"RSU"}, ("RSU",)])
+@pytest.mark.parametrize("senders", [["RSU"], {"RSU"}, ("RSU",), ["RSU", "RSU"]])
 def test_senders_as_any_collection_give_equal_settings(senders: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -11,20 +11,22 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
 import pytest
 from criteria_values import CRITERIA
 from scenario_1 import ONE
 
 from eidrive_scenario.errors import InputError, SettingError
-from eidrive_scenario.evaluation.criteria_parser import declaration_text, declare_criteria, parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import CRITERION, declaration_text, declare_criteria, parse_criteria
 from eidrive_scenario.experiments.judgement import INCOMPLETE, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.files.atomic import partial_path
 from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.frame import ExecutedCommand
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.simulation import RunResult, RunSettings
-from eidrive_scenario.simulation.recorded_outcome import OUTCOME, recorded_outcome
+from eidrive_scenario.simulation.recorded_outcome import CONTEXT, OUTCOME, recorded_outcome
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 STORY = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
@@ -198,6 +200,20 @@ def test_differing_verdict_is_a_warning(tmp_path: Path) -> None:
     recorder.close()
     (warning,) = judge_recording(tmp_path / "changed.mcap").warnings
     assert warning.startswith("verdict 'min_distance' differs from that of the run")
+
+
+def test_unknown_criterion_of_the_run_is_reported_with_its_command(tmp_path: Path) -> None:
+    command = "eidrive --project demo run cut_in.xosc --seed 1"
+    recorder = Recorder(tmp_path / "r.mcap", metadata={CONTEXT: "{}", "command": command})
+    result = run_and_save(PASSING_BY, out=tmp_path / "run")
+    assert result.recording is not None
+    for frame in read_recording(result.recording).frames():
+        recorder.observe(msgspec.structs.replace(frame, commands=(ExecutedCommand(CRITERION, "keep_gap: {}", 0.0),)))
+    recorder.close()
+    hint = f"judge it with the extensions of {command}, or with other criteria (--criterion)"
+    with pytest.raises(SettingError) as caught:
+        judge_recording(tmp_path / "r.mcap")
+    assert str(caught.value) == f"{tmp_path / 'r.mcap'}: unknown criterion 'keep_gap'; {hint}"
 
 
 @pytest.fixture
