@@ -165,7 +165,6 @@ class Reader(threading.Thread):
 
 
 @pytest.mark.process
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_interruption_of_live_run_ends_the_page(start: Callable[..., subprocess.Popen[str]]) -> None:
     """The run would take three hours."""
     process = start("coop/scenario_1", "--live", "--live-speed", "0.001")
@@ -181,7 +180,6 @@ def test_interruption_of_live_run_ends_the_page(start: Callable[..., subprocess.
 
 
 @pytest.mark.process
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("more", [[], ["--wall-limit", "60"]])
 def test_interruption_after_the_end_keeps_the_exit_code(
     start: Callable[..., subprocess.Popen[str]], passing_by: Path, more: list[str]
@@ -199,7 +197,6 @@ def test_interruption_after_the_end_keeps_the_exit_code(
 
 
 @pytest.mark.process
-@pytest.mark.skipif(os.name == "nt", reason="a program in the variable BROWSER is a shell script")
 def test_live_run_opens_its_address_in_the_browser(
     start: Callable[..., subprocess.Popen[str]], passing_by: Path, tmp_path: Path
 ) -> None:
