@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -64,7 +64,7 @@ def declared_settings(
     for sender in cooperate or ():
         if sender not in controllers:
             what = "selection without stations" if sender in selections.declared else "no station"
-            hint = suggestion(sender, [*controllers, *selections.declared])
+            hint = _sender_hint(sender, selections, controllers)
             diagnostics.append(Diagnostic(f"{what} {sender!r}", hint, "--cooperate"))
     if diagnostics:
         raise SettingError(diagnostics)
@@ -192,16 +192,21 @@ def _without_selections(
     return tuple(expanded)
 
 
+def _sender_hint(sender: str, selections: EntitySelections, stations: Iterable[str]) -> str:
+    if sender in selections.declared:
+        return "give one of its members a driving stack"
+    return suggestion(sender, [*stations, *selections.declared])
+
+
 def _unknown_senders(
     name: str, settings: AgentSettings, selections: EntitySelections, controllers: Mapping[str, Controller]
 ) -> list[Diagnostic]:
     line = property_line(controllers[name], "cooperates_with")
-    others = [other for other in (*controllers, *selections.declared) if other != name]
     return [
         Diagnostic(
             f"{name!r} cooperates with {sender!r}, which "
             + ("is a selection without stations" if sender in selections.declared else "is no station"),
-            suggestion(sender, others),
+            _sender_hint(sender, selections, [other for other in controllers if other != name]),
             controllers[name].source,
             line,
         )

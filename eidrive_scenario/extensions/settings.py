@@ -112,8 +112,8 @@ def _diagnostic(
         hint = suggestion("", _tags(model, loc, key))
         return Diagnostic(f"setting {path + '.' + key!r} is missing", hint, source, key_line)
     message = f"setting {path!r} is {quoted(detail['input'])}"
-    if kind in _NO_MAPPING:
-        return Diagnostic(message, "a mapping is expected: {key: value, …}", source, key_line)
+    if kind in _COLLECTIONS:
+        return Diagnostic(message, _COLLECTIONS[kind], source, key_line)
     text = detail["msg"]
     hint = text.removeprefix("Value error, ") if kind == "value_error" else text.lower()
     return Diagnostic(message if path else "settings contradict each other", hint, source, key_line)
@@ -158,7 +158,11 @@ def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tup
             yield from _immense(inner, (*path, index))
 
 
-_NO_MAPPING = frozenset({"model_type", "model_attributes_type", "dict_type"})
+_COLLECTIONS = {
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "a mapping is expected: {key: value, …}"),
+    **dict.fromkeys(("tuple_type", "list_type"), "a list is expected: [value, …]"),
+}
+"""Hints by the type of the error of a value that is no mapping or no list."""
 
 
 def _typed_path(loc: tuple[int | str, ...], data: Any) -> str:

@@ -52,7 +52,7 @@ def test_option_accepts_a_selection(tmp_path: Path) -> None:
     ("senders", "message"),
     [
         ("mast", "'mast', which is no station; did you mean 'masts'"),
-        ("trucks", "'trucks', which is a selection without stations"),
+        ("trucks", "'trucks', which is a selection without stations; give one of its members a driving stack"),
         ("ring", "selection 'ring' is a member of itself"),
     ],
 )
@@ -60,7 +60,7 @@ def test_selection_without_stations_is_an_error(tmp_path: Path, senders: str, me
     with pytest.raises(InputError, match=message):
         simulate(listening_to(tmp_path, senders, MASTS, TRUCKS, RING), "ideal", time_limit=0.1)
     if senders == "trucks":
-        with pytest.raises(InputError, match="--cooperate: selection without stations 'trucks'"):
+        with pytest.raises(InputError, match="--cooperate: selection without stations 'trucks'; give one"):
             simulate(listening_to(tmp_path, "none", TRUCKS), "ideal", time_limit=0.1, cooperate=("trucks",))
 
 

@@ -93,6 +93,7 @@ INVALID = [
         "{model: radio, technology: cv2x_mode4, data_rate_mbps: 12}",
         "data_rate_mbps has no effect with technology cv2x_mode4",
     ),
+    ("{model: radio, jammers: {x: 30, y: 0}}", "'jammers' is {'x': 30, 'y': 0}; a list is expected: [value, …]"),
     ("{model: compsed}", "unknown channel model 'compsed'; did you mean 'composed'?"),
     ("[1, {2: 3}]", "channel profile is not a mapping (got list)"),
     ("{a: [}", "not valid YAML"),
