@@ -147,7 +147,7 @@ def _read(cls: type[Element], version: Version) -> Rules:
         None if isinstance(content, All) else automaton(group),
         MappingProxyType(other_attributes),
         MappingProxyType(other_children),
-        "in any order " + ", ".join(children) if isinstance(content, All) else _describe_group(group),
+        "in any order " + ", ".join(children) if isinstance(content, All) else _describe_content(group),
         _required_choice(cls, spelling, version),
     )
 
@@ -218,6 +218,10 @@ def _required_choice(cls: type[Element], spelling: dict[str, str], version: Vers
         choices = [part for part in parts if isinstance(part, Choice)]
         lenient = any(part.empty_until and version <= parse_version(part.empty_until) for part in choices)
     return tuple(spelling[name] for name in alternatives(cls) if name in spelling) if lenient else ()
+
+
+def _describe_content(group: Group) -> str:
+    return _describe_group(group) + " in this order" * (len(group.parts) > 1 and not group.exclusive)
 
 
 def _describe_group(group: Group) -> str:

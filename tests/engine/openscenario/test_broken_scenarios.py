@@ -37,7 +37,9 @@ EXPECTED = {
     "unknown_element": [(39, "unknown element SpeedActionDynamic in SpeedAction; did you mean 'SpeedActionDynamics'?")],
     "unknown_parameter": [(41, "unknown parameter $Sped; did you mean 'Speed'?")],
     "wrong_number": [(41, "value of AbsoluteTargetSpeed is 'fast', which is not a number")],
-    "wrong_order": [(19, "FrontAxle is not allowed here; Axles contains FrontAxle, RearAxle, AdditionalAxle")],
+    "wrong_order": [
+        (19, "FrontAxle is not allowed here; Axles contains FrontAxle, RearAxle, AdditionalAxle… in this order")
+    ],
     "wrong_word": [(39, "'sinusodial', which is not a literal of DynamicsShape; did you mean 'sinusoidal'?")],
     "xml_bomb": [(2, "document type declaration")],
 }
