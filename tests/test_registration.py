@@ -26,7 +26,8 @@ from eidrive_scenario.api.driving import Planner, VehicleController
 from eidrive_scenario.api.fusion import FusionMethod
 from eidrive_scenario.api.perception import Detector, Sensor, TrackingMethod
 from eidrive_scenario.api.v2x import Channel
-from eidrive_scenario.extensions.registry import GROUPS, Registry
+from eidrive_scenario.extensions.project import GROUPS
+from eidrive_scenario.extensions.registry import Registry
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 PREFIX = "eidrive_scenario."

@@ -140,8 +140,8 @@ def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
 
     They are not imported for their files alone, because scenarios of others must not execute code.
     """
-    from eidrive_scenario.extensions.project import conftest_above, unused_project
-    from eidrive_scenario.extensions.registry import GROUPS, singular
+    from eidrive_scenario.extensions.project import GROUPS, conftest_above, unused_project
+    from eidrive_scenario.extensions.registry import singular
 
     unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model"))
     sources = dict.fromkeys(

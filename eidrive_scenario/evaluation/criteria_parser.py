@@ -21,7 +21,7 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
 from eidrive_scenario.extensions.registry import construct, registry
-from eidrive_scenario.extensions.settings import parse_settings
+from eidrive_scenario.extensions.settings import parse_settings, settings_type_of
 from eidrive_scenario.files.yaml_text import flow_yaml, key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import CRITERION_PREFIX, criteria_of, property_entries
@@ -259,15 +259,14 @@ def _declare(
     if kind not in criteria:
         raise SettingError(Diagnostic(f"unknown criterion {kind!r}", suggestion(kind, criteria), source, line))
     criterion_type = criteria.load(kind, Criterion)
+    settings_type = settings_type_of("criteria", kind, criterion_type, CriterionSettings)
     settings = {} if settings is None else settings
     if not isinstance(settings, dict):
-        fields = criterion_type.settings_type.model_fields.items()
+        fields = settings_type.model_fields.items()
         hint = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
         message = f"criterion {kind!r}: settings are not a mapping (got {settings!r})"
         raise SettingError(Diagnostic(message, hint, source, line))
-    parsed = parse_settings(
-        criterion_type.settings_type, settings, source=source, line=line, lines=lines, origins=origins
-    )
+    parsed = parse_settings(settings_type, settings, source=source, line=line, lines=lines, origins=origins)
     return CriterionDeclaration(kind, criterion_type, parsed)
 
 

@@ -20,7 +20,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import Diagnostic, EidriveError, InvalidResult, SettingError, quoted
 from eidrive_scenario.evaluation.violation_state import LOOKBACK, describe_violation
 from eidrive_scenario.extensions.registry import registry
-from eidrive_scenario.extensions.settings import Settings
+from eidrive_scenario.extensions.settings import Settings, settings_type_of
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.messages.message import LinkEvent
@@ -320,7 +320,8 @@ def describe_criteria() -> Iterator[tuple[str, str, str, str]]:
     for name in criteria:
         try:
             criterion_type: type[Criterion] = criteria.load(name, Criterion)
-            yield name, criterion_type.unit or "-", _settings(criterion_type.settings_type), _definition(criterion_type)
+            settings_type = settings_type_of("criteria", name, criterion_type, CriterionSettings)
+            yield name, criterion_type.unit or "-", _settings(settings_type), _definition(criterion_type)
         except EidriveError as error:
             yield name, "-", "", f"{criteria.value(name)}: {str(error).splitlines()[0]}"
 

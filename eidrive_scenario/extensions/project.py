@@ -19,13 +19,29 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file
 
 VARIABLE = "EIDRIVE_PROJECT"
 """Environment variable with the folder of the project, which other processes of a command inherit."""
 _FILE = "pyproject.toml"
 _GROUP = "eidrive_scenario."
+_KEYS = ("pythonpath", "modules")
+GROUPS = (
+    "actions",
+    "conditions",
+    "criteria",
+    "detectors",
+    "channels",
+    "fusion",
+    "planners",
+    "sensors",
+    "controllers",
+    "trackers",
+    "vehicle_controllers",
+    "commands",
+)
+"""Kinds of extensions: their entry points are in the groups `eidrive_scenario.KIND`."""
 
 
 def select_project(folder: Path) -> None:
@@ -123,16 +139,22 @@ def entry_points_of(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
     """Return the entry points of the project in a folder as `project_entry_points`."""
     path = folder / _FILE
     content = _table(path) or {}
+    unknown = next((key for key in content.get("tool", {}).get("eidrive", {}) if key not in _KEYS), None)
+    if unknown is not None:
+        raise _error(path, f"unknown setting {quoted(f'tool.eidrive.{unknown}')}", suggestion(unknown, _KEYS))
     folders = _texts(path, content, "pythonpath", 'write a list of folders, such as ["."]')
     groups = content.get("project", {}).get("entry-points", {})
     by_group: dict[str, tuple[EntryPoint, ...]] = {}
     for group, points in groups.items() if isinstance(groups, dict) else ():
         if not group.startswith(_GROUP) or not isinstance(points, dict):
             continue
+        kind = group.removeprefix(_GROUP)
+        if kind not in GROUPS:
+            raise _error(path, f"unknown group of entry points {quoted(group)}", suggestion(kind, GROUPS))
         for name, value in points.items():
             if not isinstance(value, str) or ":" not in value or EntryPoint.pattern.match(value) is None:
                 raise _error(path, f"entry point {name}: {quoted(str(value))}", "write package.module:Object")
-        by_group[group.removeprefix(_GROUP)] = tuple(EntryPoint(name, value, group) for name, value in points.items())
+        by_group[kind] = tuple(EntryPoint(name, value, group) for name, value in points.items())
     for relative in reversed(folders):
         if (directory := str((folder / relative).resolve())) not in sys.path:
             sys.path.insert(0, directory)

@@ -13,22 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, quoted, suggestion
-from eidrive_scenario.extensions.project import entry_points_of, modules_of, project_entry_points, selected_project
-
-GROUPS = (
-    "actions",
-    "conditions",
-    "criteria",
-    "detectors",
-    "channels",
-    "fusion",
-    "planners",
-    "sensors",
-    "controllers",
-    "trackers",
-    "vehicle_controllers",
-    "commands",
+from eidrive_scenario.extensions.project import (
+    GROUPS,
+    entry_points_of,
+    modules_of,
+    project_entry_points,
+    selected_project,
 )
+
 _SINGULAR = {
     "criteria": "criterion",
     "fusion": "fusion method",
@@ -234,7 +226,7 @@ def use_project(folder: str) -> None:
     Raise SettingError for an invalid project, and RegistryError if another extension has one of the names.
     """
     for kind, points in entry_points_of(Path(folder)).items():
-        for point in points if kind in GROUPS else ():
+        for point in points:
             registry(kind).add(point.name, point.value)
     _import_modules(Path(folder))
 

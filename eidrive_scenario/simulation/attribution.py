@@ -23,8 +23,8 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from eidrive_scenario.base.wall_limit import Limit, LimitReached, current_limit
 from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
+from eidrive_scenario.extensions.project import GROUPS
 from eidrive_scenario.extensions.registry import (
-    GROUPS,
     Registration,
     is_built_in,
     registration,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from eidrive_scenario.extensions.registry import GROUPS
+from eidrive_scenario.extensions.project import GROUPS
 
 GUIDE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

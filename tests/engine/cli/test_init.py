@@ -141,11 +141,16 @@ def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive
     [
         ("[tool.eidrive]\npythonpath = 3\n", "tool.eidrive.pythonpath"),
         ('[tool.eidrive]\n[project.entry-points."eidrive_scenario.criteria"]\ngap = "no object"\n', "entry point gap"),
+        (
+            '[tool.eidrive]\n[project.entry-points."eidrive_scenario.criterion"]\ngap = "a:B"\n',
+            "unknown group of entry points 'eidrive_scenario.criterion'; did you mean 'criteria'?",
+        ),
+        ("[tool.eidrive]\npythonpth = []\n", "unknown setting 'tool.eidrive.pythonpth'; did you mean 'pythonpath'?"),
         ("[tool.eidrive\n", "is not TOML"),
         ("eidrive = " + "[" * 100_000, "is nested too deeply"),
         ("[project]\nname = 3\n", ""),
     ],
-    ids=["pythonpath", "entry point", "syntax", "nesting", "other"],
+    ids=["pythonpath", "entry point", "group", "key", "syntax", "nesting", "other"],
 )
 def test_invalid_table_of_project_is_reported(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "pyproject.toml").write_text(text)

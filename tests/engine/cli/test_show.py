@@ -16,7 +16,8 @@ from eidrive_scenario.cli.show import Names
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.experiments.sweeps.store import ResultStore
 from eidrive_scenario.extensions.library import library_path
-from eidrive_scenario.extensions.registry import GROUPS, register, registry
+from eidrive_scenario.extensions.project import GROUPS
+from eidrive_scenario.extensions.registry import register, registry
 
 
 def test_help_lists_commands_without_importing_engine() -> None:

@@ -223,6 +223,12 @@ def test_extension_that_cannot_be_loaded_is_named(
         run(tmp_path, detector=detector)
 
 
+def test_criterion_with_settings_of_another_type_is_named(package: Path, tmp_path: Path) -> None:
+    expected = r"criterion 'plain_settings' .* \(expected a class derived from CriterionSettings\)"
+    with pytest.raises(RegistryError, match=expected):
+        run(tmp_path, criterion="plain_settings: {}")
+
+
 def test_planner_with_another_constructor_is_named(package: Path, tmp_path: Path) -> None:
     error = error_of(tmp_path, planner="planner_arguments")
     assert error.place.name == "planner_arguments"

@@ -86,7 +86,7 @@ POINTS = {
         "controller_text": "ControllerText",
     },
     "channels": {"faulty": "FaultyChannel"},
-    "criteria": {"faulty": "FaultyCriterion"},
+    "criteria": {"faulty": "FaultyCriterion", "plain_settings": "PlainSettingsCriterion"},
     "actions": {"faulty.action": "FaultyAction"},
     "conditions": {"faulty.condition": "FaultyCondition"},
 }

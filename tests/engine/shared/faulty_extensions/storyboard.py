@@ -37,6 +37,10 @@ class FaultyCriterion(Criterion):
         return None if self.fault == "metrics" else {}
 
 
+class PlainSettingsCriterion(FaultyCriterion):
+    settings_type = dict
+
+
 class FaultyAction(ActionBehaviour):
     def update(self):
         match self.action.content:
