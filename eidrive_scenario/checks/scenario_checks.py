@@ -9,7 +9,15 @@ from pathlib import Path
 from eidrive_scenario.checks.road_rules import ROAD_FILE_RULES, ROAD_RULES, RoadFileContext, RoadLintContext
 from eidrive_scenario.checks.rule import CheckReport, Level, Rule, S
 from eidrive_scenario.checks.scenario_rules import RULES
-from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError, suggestion
+from eidrive_scenario.errors import (
+    ConstraintError,
+    Diagnostic,
+    InputError,
+    ScenarioError,
+    SettingError,
+    quoted,
+    suggestion,
+)
 from eidrive_scenario.evaluation.criteria_parser import unsupported_criteria
 from eidrive_scenario.openscenario import (
     ConcreteRun,
@@ -57,7 +65,9 @@ def run_rules(
 
 
 def check_rule_names(ignored: Collection[str]) -> None:
-    """Raise SettingError if `ignored` has an unknown name."""
+    """Raise SettingError if `ignored` has an unknown name, or is no collection of names."""
+    if isinstance(ignored, str) or not isinstance(ignored, Collection):
+        raise SettingError(Diagnostic(f"ignored is {quoted(ignored)}", "give a list of rules"))
     names = {rule.name for rule in ALL_RULES}
     for name in ignored:
         if name not in names:

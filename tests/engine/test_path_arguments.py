@@ -92,6 +92,7 @@ def test_settings_have_paths_of_other_libraries_as_paths(tmp_path: Path) -> None
     ("call", "message"),
     [
         (lambda: run.variations(SCENARIO), "scenario is 'coop/scenario_1'; give the result of load_scenario"),  # type: ignore[arg-type]
+        (lambda: run.check_scenario(SCENARIO, "road-link"), "ignored is 'road-link'; give a list of rules"),
         (lambda: v2x.build_channel("ideal", 1), "profile is 'ideal'; give the result of load_profile"),  # type: ignore[arg-type]
         (lambda: experiments.command_of(SCENARIO, 1, {"dt": 0.1}), r"settings is {'dt': 0.1}; give RunSettings"),  # type: ignore[arg-type]
         (lambda: experiments.command_of(SCENARIO, [1], BRIEF), r"the seed is \[1\]; give an integer"),  # type: ignore[arg-type]

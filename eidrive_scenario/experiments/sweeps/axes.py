@@ -317,7 +317,10 @@ def points_of(axes: Sequence[Axis], design: str, samples: int | None, seed: int)
         raise SettingError(Diagnostic(f"--design {design} without --vary", "give the axes of the design"))
     if samples is None or not 1 <= samples <= MOST_POINTS:
         raise SettingError(
-            Diagnostic(f"--design {design}: --samples is {samples}", f"expected 1 to {MOST_POINTS} combinations")
+            Diagnostic(
+                f"--design {design}: --samples is {'missing' if samples is None else samples}",
+                f"expected 1 to {MOST_POINTS} combinations",
+            )
         )
     from scipy.stats import qmc
 

@@ -53,7 +53,7 @@ def test_sampled_designs_depend_on_seed_only(design: str) -> None:
         (AXES, "random", 3, "unknown design"),
         (AXES, "grid", None, "interval in a grid"),
         (AXES[2:], "grid", 4, "no effect"),
-        (AXES, "lhs", None, "--samples"),
+        (AXES, "lhs", None, "--samples is missing"),
         (AXES, "sobol", 0, "--samples"),
         ((), "lhs", 3, "without --vary"),
         (tuple(Axis(str(k), tuple(range(100))) for k in range(4)), "grid", None, "combinations"),
