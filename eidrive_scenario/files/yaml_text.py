@@ -5,13 +5,20 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Hashable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 import yaml
+from yaml.composer import Composer
+from yaml.constructor import SafeConstructor
+from yaml.parser import Parser
+from yaml.reader import Reader
+from yaml.resolver import Resolver
+from yaml.scanner import Scanner
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import is_regular_file, read_regular_file, reason_of
@@ -28,25 +35,26 @@ MAX_DIGITS = 40
 
 _QUOTED = re.compile(r"'[^']{2,}'|\"[^\"]{2,}\"")
 """Pattern of quoted words in messages of YAML; quoted single characters, such as an expected comma, are not matched."""
+_COMMON = re.compile(r"[\w \n.,:;+\-/()\[\]{}'\"#]*", re.ASCII)
+"""Texts that both parsers read alike: libyaml accepts tabs, byte order marks and question marks at more places."""
 _ALIAS = "anchors and aliases are not supported"
 _MERGE = "merge keys are not supported"
 _LONG_NUMBER = f"a number has more than {MAX_DIGITS} digits"
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe loader of YAML that rejects duplicate keys and aliases; the base class expands aliases without limit.
+class _Loader(Composer, SafeConstructor, Resolver):
+    """Safe loader that rejects duplicate keys and aliases, which PyYAML expands without limit. A parser is added."""
 
-    An expression `${…}` is a single text inside braces and brackets too, where YAML reads its brace as a mapping.
-    """
-
-    def __init__(self, stream: str) -> None:
-        super().__init__(stream)
+    def __init__(self) -> None:
+        Composer.__init__(self)
+        SafeConstructor.__init__(self)
+        Resolver.__init__(self)
         self._depth = 0
         self._count = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Compose a node; raise MarkedYAMLError for aliases, which may be recursive, and for exceeded limits."""
-        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        event: Any = self.peek_event()  # type: ignore[attr-defined]
         self._count += 1
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
             raise yaml.MarkedYAMLError(problem=_ALIAS, problem_mark=event.start_mark)
@@ -58,26 +66,6 @@ class _Loader(yaml.SafeLoader):
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
         return node
-
-    def scan_plain(self) -> yaml.ScalarToken:
-        """Scan a scalar without quotes; an expression `${…}` is one scalar."""
-        if self.flow_level and self.prefix(2) == "${":
-            length = self._length_of_expression()
-            if length:
-                start = self.get_mark()
-                text = self.prefix(length)
-                self.forward(length)
-                self.allow_simple_key = False
-                return yaml.ScalarToken(text, False, start, self.get_mark(), "'")
-        token: yaml.ScalarToken = super().scan_plain()
-        return token
-
-    def _length_of_expression(self) -> int:
-        """Return the number of characters up to the closing brace; 0 if there is none in this line."""
-        length = 2
-        while self.peek(length) not in "\0\r\n{}":
-            length += 1
-        return length + 1 if self.peek(length) == "}" else 0
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen = set()
@@ -106,10 +94,56 @@ class _Loader(yaml.SafeLoader):
     def construct_undefined(self, node: yaml.Node) -> NoReturn:
         raise yaml.constructor.ConstructorError(None, None, "tags are not supported", node.start_mark)
 
+    yaml_constructors: ClassVar[dict[str | None, Any]] = {
+        **SafeConstructor.yaml_constructors,
+        "tag:yaml.org,2002:int": construct_yaml_int,
+        "tag:yaml.org,2002:float": construct_yaml_float,
+        None: construct_undefined,
+    }
 
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
-_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_yaml_float)
-_Loader.add_constructor(None, _Loader.construct_undefined)
+
+class _TextLoader(_Loader, Reader, Scanner, Parser):
+    """Loader with the parser in Python.
+
+    An expression `${…}` is a single text inside braces and brackets too, where YAML reads its brace as a mapping.
+    """
+
+    def __init__(self, stream: str) -> None:
+        Reader.__init__(self, stream)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+        super().__init__()
+
+    def scan_plain(self) -> yaml.ScalarToken:
+        """Scan a scalar without quotes; an expression `${…}` is one scalar."""
+        if self.flow_level and self.prefix(2) == "${":
+            length = self._length_of_expression()
+            if length:
+                start = self.get_mark()
+                text = self.prefix(length)
+                self.forward(length)
+                self.allow_simple_key = False
+                return yaml.ScalarToken(text, False, start, self.get_mark(), "'")
+        token: yaml.ScalarToken = super().scan_plain()
+        return token
+
+    def _length_of_expression(self) -> int:
+        """Return the number of characters up to the closing brace; 0 if there is none in this line."""
+        length = 2
+        while self.peek(length) not in "\0\r\n{}":
+            length += 1
+        return length + 1 if self.peek(length) == "}" else 0
+
+
+if yaml.__with_libyaml__:
+    from yaml._yaml import CParser
+
+    class _FastLoader(_Loader, CParser):
+        """Loader with the parser of libyaml, which reads a frame of OPV2V four times as fast."""
+
+        def __init__(self, stream: str) -> None:
+            CParser.__init__(self, stream)
+            super().__init__()
 
 
 def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = True) -> Any:
@@ -174,12 +208,15 @@ def _parsed(text: str) -> tuple[Any, dict[str, int]]:
 
 
 def _parse(text: str) -> tuple[Any, dict[str, int]]:
-    loader = _Loader(text)
-    try:
-        node = loader.get_single_node()
-        data = None if node is None else loader.construct_document(node)
-    finally:
-        loader.dispose()
+    if yaml.__with_libyaml__ and _COMMON.fullmatch(text):
+        with suppress(yaml.YAMLError, ValueError):  # the other parser describes the error
+            return _loaded(_FastLoader(text))
+    return _loaded(_TextLoader(text))
+
+
+def _loaded(loader: _Loader) -> tuple[Any, dict[str, int]]:
+    node = loader.get_single_node()
+    data = None if node is None else loader.construct_document(node)
     return data, _lines_of(node)
 
 
