@@ -63,10 +63,6 @@ class Channel(ABC):
         return 0.0
 
     @abstractmethod
-    def in_flight(self) -> int:
-        """Return the number of messages in flight."""
-
-    @abstractmethod
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         """Return the statistics of every link, by (sender, receiver)."""
 
@@ -96,9 +92,6 @@ class QueuedChannel(Channel):
 
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         return self._links.deliver(receiver, now)
-
-    def in_flight(self) -> int:
-        return self._links.in_flight()
 
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         return self._links.statistics(now, self.channel_busy_ratio)

@@ -87,9 +87,6 @@ class SharedMemory(Channel):
         self._messages = [entry for entry in self._messages if receiver not in entry[1]]
         return tuple(ReceivedMessage(message, sent) for message, _, sent in due)
 
-    def in_flight(self) -> int:
-        return len(self._messages)
-
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         return {}
 

@@ -120,10 +120,6 @@ class RadioChannel(QueuedChannel):
         self._advance(now)
         return super().deliver(receiver, now)
 
-    def in_flight(self) -> int:
-        undecided = sum(len(transmission.receivers) for transmission in [*self._access.waiting, *self._open])
-        return super().in_flight() + undecided
-
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         self._counters.flush_into(self._links)
         return super().statistics(now)

@@ -212,10 +212,6 @@ class Links:
             self.counters(sender, receiver).count_loss(ABSENT)
         self._reception_log.end_links(receiver, self._now)
 
-    def in_flight(self) -> int:
-        """Return the number of messages in flight on all links."""
-        return sum(len(queue) for queue in self._queues.values())
-
     def statistics(
         self, now: float, channel_busy_ratio: Callable[[str], float | None] = lambda station: None
     ) -> dict[tuple[str, str], LinkStatistics]:
