@@ -61,7 +61,8 @@ class EarlyFusion(CovarianceIntersectionFusion):
         if not readings.lidars:
             return ()
         points = np.concatenate([reading.world_points for reading in readings.lidars.values()])
-        return (compress(points, readings.time, self.settings.cell),)
+        duration = max(reading.duration for reading in readings.lidars.values())
+        return (compress(points, readings.time, self.settings.cell, duration),)
 
     def add_payload(self, sender: str, payload: Payload, body: Array) -> None:
         """Store a received cloud. An out-of-sequence cloud does not replace a newer one."""

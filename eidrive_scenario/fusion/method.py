@@ -75,7 +75,7 @@ class FusionMethod(ABC):
         return ()
 
     def add_payload(self, sender: str, payload: Payload, body: Array) -> None:  # noqa: B027 - optional
-        """Store received sensor data within this age, without those on the ego body (7,) at their time."""
+        """Store received sensor data within this age, without those on the ego body (7,) while they were measured."""
 
     def merge_readings(self, readings: Readings, alone: Detections | None = None) -> Readings:
         """Return the readings of a station with the received sensor data that are not too old.

@@ -150,7 +150,7 @@ class LidarReading(msgspec.Struct, frozen=True):
     points (N, 3) in the sensor frame [m], intensity (N,) in [0, 1]; pose (4, 4) sensor to world; ring (N,) number of
     the channel, 0 the highest; azimuth (N,) of the head at the measurement, from the x axis of the sensor to the left
     [rad]; rows (N,) row in the view of the actor with the point, the true label of datasets that no detector may read:
-    -1 (GROUND) for the ground and buildings, -2 (NOTHING) for the air
+    -1 (GROUND) for the ground and buildings, -2 (NOTHING) for the air; duration from the first to the last point [s]
     """
 
     points: Array
@@ -159,6 +159,7 @@ class LidarReading(msgspec.Struct, frozen=True):
     ring: NDArray[np.int32] = msgspec.field(default_factory=lambda: np.empty(0, dtype=np.int32))
     azimuth: Array = msgspec.field(default_factory=lambda: np.empty(0))
     rows: NDArray[np.int32] = msgspec.field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    duration: float = 0.0
 
     @property
     def world_points(self) -> Array:

@@ -89,11 +89,25 @@ class OwnBody:
                 return stored
         return self._poses[0]
 
-    def box(self, time: float) -> Array:
-        """Return the box (7,) of the outline at that time, with a margin that covers objects on the body."""
-        _, (_, _, z, yaw), body, *_ = self.at(time)
+    def box(self, time: float, duration: float = 0.0) -> Array:
+        """Return the box (7,) that covers the outline in the last `duration` seconds up to that time.
+
+        It has a margin that covers objects on the body.
+        """
+        last, first = self.at(time), self.at(time - duration)
+        _, (_, _, z, yaw), (x, y, cos, sin, *_), *_ = last
         length, width, height = self._spec.size
-        return np.array([body.x, body.y, z, length + BODY_MARGIN, width + BODY_MARGIN, 4.0 * height, yaw])
+        offsets = np.array(
+            [
+                (cos * (pose.body.x - x) + sin * (pose.body.y - y), cos * (pose.body.y - y) - sin * (pose.body.x - x))
+                for pose in self._poses
+                if first.time <= pose.time <= last.time
+            ]
+        )
+        low, high = offsets.min(axis=0), offsets.max(axis=0)
+        (ahead, left), (along, across) = (low + high) / 2.0, high - low
+        x, y = x + cos * ahead - sin * left, y + sin * ahead + cos * left
+        return np.array([x, y, z, length + along + BODY_MARGIN, width + across + BODY_MARGIN, 4.0 * height, yaw])
 
     def without(self, detections: Detections) -> Detections:
         """Return received detections without those on the ego body and its trailers, for which it must not brake.

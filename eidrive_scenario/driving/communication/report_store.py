@@ -189,7 +189,7 @@ class SensorDataSharing:
             readings = replace(readings, features=None if newest is self._features else newest)
             self._features = newest
         else:
-            readings = replace(readings, lidars=self._lidars.revolutions(readings))
+            readings = replace(readings, lidars=self._lidars.newest_revolutions(readings, self._fusion.max_payload_age))
         now = readings.time
         payloads = self._fusion.payloads(readings, self._limit)
         if payloads:
@@ -280,7 +280,8 @@ class ReportStore:
                 longest = self._fusion.max_payload_age
                 # Data of the far future would replace all later ones of their sender.
                 if abs(payload.time - now) <= longest + TIME_TOLERANCE:
-                    self._fusion.add_payload(sender, payload, self._own_body.box(payload.time))
+                    duration = payload.duration if isinstance(payload, PointCloud) else 0.0
+                    self._fusion.add_payload(sender, payload, self._own_body.box(payload.time, duration))
                 elif message.kind == "features" and payload.time < now:
                     expired.append(row)
             if message.kind == "features":

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
+from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
@@ -26,6 +27,8 @@ class StationLidars:
         self._revolutions = {name: _Revolution(1.0 / lidar.rotation) for name, lidar in lidars.items()}
         self._reach = {name: (math.radians(lidar.field_of_view) / 2.0, lidar.range) for name, lidar in lidars.items()}
         """Half the field of view [rad] and the range [m] of each lidar."""
+        self._newest: dict[str, tuple[float, LidarReading]] = {}
+        """Time [s] and points of the last revolution that `newest_revolutions` returned for each lidar."""
 
     def pattern(self, name: str, reading: LidarReading) -> Pattern:
         """Return the ray pattern of a lidar."""
@@ -36,6 +39,21 @@ class StationLidars:
         return {
             name: self._revolutions[name].add(readings.time, reading) if name in self._revolutions else reading
             for name, reading in readings.lidars.items()
+        }
+
+    def newest_revolutions(self, readings: Readings, max_age: float) -> dict[str, LidarReading]:
+        """Return the last revolution of each lidar, also of those without a reading now; {} if none has a reading.
+
+        max_age  maximum age of the readings of other lidars [s]
+        """
+        now = readings.time
+        self._newest |= {name: (now, reading) for name, reading in self.revolutions(readings).items()}
+        if not readings.lidars:
+            return {}
+        return {
+            name: reading if time == now else replace(reading, duration=reading.duration + now - time)
+            for name, (time, reading) in self._newest.items()
+            if time >= now - max_age - TIME_TOLERANCE
         }
 
     def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
@@ -77,4 +95,9 @@ class _Revolution:
         rotation, origin = reading.pose[:3, :3], reading.pose[:3, 3]
         points = [(old.world_points - origin) @ rotation for _, old in list(self._parts)[:-1]]
         intensities = [old.intensity for _, old in self._parts]
-        return LidarReading(np.concatenate([*points, reading.points]), np.concatenate(intensities), reading.pose)
+        return LidarReading(
+            np.concatenate([*points, reading.points]),
+            np.concatenate(intensities),
+            reading.pose,
+            duration=time - self._parts[0][0],
+        )

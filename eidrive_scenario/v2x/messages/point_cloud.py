@@ -9,11 +9,13 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bytes, Integers
 
-_HEADER = struct.Struct("<d3iH3s3sI")
+_HEADER = struct.Struct("<dH3iH3s3sI")
 HEADER_BYTES = _HEADER.size
-"""Size of the header [bytes]: time (8), corner in cells (3 x 4), cell in mm (2), cells along y and z (2 x 3),
-points (4)."""
-_MILLIMETERS = 1000.0
+"""Size of the header [bytes]: time (8), duration in ms (2), corner in cells (3 x 4), cell in mm (2), cells along y and
+z (2 x 3), points (4)."""
+_MILLIMETERS = _MILLISECONDS = 1000.0
+_MAX_DURATION = 65_535
+"""Maximum duration [ms]."""
 _SEVEN_BITS = 7
 _MAX_BYTES = 9
 """Maximum length of one encoded step [bytes]: 63 bits."""
@@ -21,7 +23,8 @@ _MAX_BYTES = 9
 
 @dataclass(frozen=True)
 class PointCloud:
-    """Points measured at `time` [s], in the world frame by the pose estimate of the sender.
+    """Points measured in the last `duration` seconds up to `time` [s], in the world frame by the pose estimate of the
+    sender.
 
     corner  (3,) corner of the grid [m]
     cell    edge length of the cells [m], a multiple of 1 mm
@@ -35,6 +38,7 @@ class PointCloud:
     cell: float
     shape: tuple[int, int, int]
     steps: Bytes
+    duration: float = 0.0
 
     @property
     def size(self) -> int:
@@ -53,7 +57,8 @@ class PointCloud:
         low = [round(edge / self.cell) for edge in self.corner]
         along, up = (cells.to_bytes(3, "little") for cells in self.shape[1:])
         points = int((self.steps < 128).sum())
-        header = _HEADER.pack(self.time, *low, round(self.cell * _MILLIMETERS), along, up, points)
+        duration, cell = round(self.duration * _MILLISECONDS), round(self.cell * _MILLIMETERS)
+        header = _HEADER.pack(self.time, duration, *low, cell, along, up, points)
         return header + self.steps.tobytes()
 
     @classmethod
@@ -61,7 +66,7 @@ class PointCloud:
         """Return the point cloud of these bytes. Raise ValueError if they are none."""
         if len(data) < HEADER_BYTES:
             raise ValueError(f"a point cloud has at least {HEADER_BYTES} bytes (got {len(data)})")
-        time, *low, millimeters, along, up, points = _HEADER.unpack_from(data)
+        time, milliseconds, *low, millimeters, along, up, points = _HEADER.unpack_from(data)
         along, up = int.from_bytes(along, "little"), int.from_bytes(up, "little")
         steps = np.frombuffer(data, np.uint8, offset=HEADER_BYTES)
         if int((steps < 128).sum()) != points or (
@@ -74,23 +79,26 @@ class PointCloud:
         wide = int(cells[-1]) // (along * up) + 1 if points else 0
         cell = millimeters / _MILLIMETERS
         x, y, z = (edge * cell for edge in low)
-        return cls(time, (x, y, z), cell, (wide, along, up), steps)
+        return cls(time, (x, y, z), cell, (wide, along, up), steps, milliseconds / _MILLISECONDS)
 
 
-def compress(points: Array, time: float, cell: float) -> PointCloud:
+def compress(points: Array, time: float, cell: float, duration: float = 0.0) -> PointCloud:
     """Return the points (N, 3) on a grid of this cell size, one point per cell, within half a cell.
 
-    cell  edge length of the cells [m], which is rounded to mm
+    cell      edge length of the cells [m], which is rounded to mm
+    duration  from the measurement of the first point to that of the last one [s], which is rounded to ms
     """
+    duration = min(round(duration * _MILLISECONDS), _MAX_DURATION) / _MILLISECONDS
     cell = max(1, round(cell * _MILLIMETERS)) / _MILLIMETERS
     if not len(points):
-        return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))
+        return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8), duration)
     low = np.floor(points.min(axis=0) / cell).astype(np.int64)
     indices = np.floor(points / cell).astype(np.int64) - low
     wide, along, up = (indices.max(axis=0) + 1).tolist()
     occupied = np.unique((indices[:, 0] * along + indices[:, 1]) * up + indices[:, 2])
     x, y, z = (low * cell).tolist()
-    return PointCloud(time, (x, y, z), cell, (wide, along, up), _encode_numbers(np.diff(occupied, prepend=0)))
+    steps = _encode_numbers(np.diff(occupied, prepend=0))
+    return PointCloud(time, (x, y, z), cell, (wide, along, up), steps, duration)
 
 
 def _encode_numbers(numbers: Integers) -> Bytes:

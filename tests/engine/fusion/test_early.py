@@ -112,6 +112,25 @@ def test_station_shares_the_points_of_its_last_revolution() -> None:
     assert (message.points.points()[:, 2] > 0.15).sum() > 100
 
 
+def test_station_shares_the_points_of_all_lidars_at_different_rates() -> None:
+    """The lidar with 10 Hz, which alone shows the car, has no reading in the ticks of the messages."""
+    rsu = agent(RSU, sensors={"front": {"kind": "lidar"}, "rear": {"kind": "lidar", "rate": 10.0}}, message_rate=10.0)
+    ego, at, durations = agent(EGO), (40.0, 12.0, math.pi), []
+    for tick in range(-1, 6):
+        now = 0.05 * tick
+        given = {"front": readings(now, at).lidars["lidar"]}
+        if tick % 2:
+            given["rear"] = readings(now, at, car(*CAR, "fl")).lidars["lidar"]
+        sent = rsu.act(replace(readings(now, at), lidars=given), (), now, None).outbox
+        if tick % 2 == 0:
+            (message,) = sent
+            assert message.points is not None
+            durations.append(message.points.duration)
+            fused = ego.act(readings(now, (0.0, 0.0, 0.0)), [ReceivedMessage(message, now)], now, None).fused
+            assert np.linalg.norm(fused.boxes[:, :2] - CAR, axis=1).tolist() == pytest.approx([0.0], abs=0.5)
+    assert durations == [0.05] * 3
+
+
 def test_points_of_earlier_messages_are_not_merged_again() -> None:
     """The received points show one car that moves by 6 m while the lidar of the ego completes its revolution."""
     ego, rsu = agent(EGO, sensors={"lidar": {"rotation": 10.0}}), agent(RSU)
@@ -156,6 +175,19 @@ def test_early_fusion_ignores_ego_body_in_received_points(height: float) -> None
     for tick, given in enumerate(here[:-1]):
         ego.act(given, (), 0.05 * tick, None)
     assert len(ego.act(here[-1], [ReceivedMessage(sent, 0.35)], 0.35, None).fused) == 0
+
+
+def test_early_fusion_ignores_ego_body_in_all_points_of_a_revolution() -> None:
+    """The ego drives 1 m in a tick; a lidar shows its rear in one half of the revolution and its front in the other."""
+    ego, rsu = agent(EGO), agent(RSU, sensors={"lidar": {"rotation": 10.0}})
+    for tick in range(8):
+        now, x = 0.05 * tick, float(tick)
+        body = car(x + EGO.offset[0], 0.0, "fblr")
+        half = body[(body[:, 0] < x + EGO.offset[0]) == (tick % 2 == 0)]
+        (sent,) = rsu.act(readings(now, (40.0, 12.0, math.pi), half), (), now, None).outbox
+        plain = replace(sent, detections=Detections(now))
+        fused = ego.act(readings(now, (x, 0.0, 0.0)), [ReceivedMessage(plain, now)], now, None).fused
+        assert len(fused) == 0
 
 
 def test_early_fusion_ignores_old_points_and_keeps_the_newest() -> None:

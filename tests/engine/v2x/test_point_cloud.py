@@ -60,12 +60,13 @@ def test_compress_sweep_has_a_fifth_of_its_float_size() -> None:
 @pytest.mark.parametrize("cell", [0.05, 0.1, 0.2, 1.0])
 @pytest.mark.parametrize("count", [0, 1, 500])
 def test_decoded_cloud_equals_encoded_one(count: int, cell: float) -> None:
-    cloud = compress(generator(0, "bytes").uniform(-300, 300, (count, 3)), 2.5, cell)
+    cloud = compress(generator(0, "bytes").uniform(-300, 300, (count, 3)), 2.5, cell, 0.1004)
     data = cloud.encode()
     assert len(data) == cloud.size
     again = PointCloud.decode(data)
     np.testing.assert_array_equal(again.steps, cloud.steps)
     assert (again.time, again.corner, again.shape) == (cloud.time, cloud.corner, cloud.shape)
+    assert again.duration == cloud.duration == 0.1
     np.testing.assert_array_equal(again.points(), cloud.points())
     with pytest.raises(ValueError, match="point"):
         PointCloud.decode(data[:31])
