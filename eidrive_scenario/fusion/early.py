@@ -17,7 +17,9 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
 )
+from eidrive_scenario.fusion.feature_warp import Grid
 from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.v2x.messages.message import Payload
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
@@ -38,8 +40,9 @@ class EarlyFusion(CovarianceIntersectionFusion):
     """Fusion of lidar points: a station sends its points with its boxes and detects objects in all available points.
 
     Points are merged as measured, because their motion is unknown. A late point cloud therefore shows moving objects
-    twice. Boxes of stations without merged points, such as those whose points are too old, are fused by covariance
-    intersection. The station reports only objects in its own points, because receivers merge these points themselves.
+    twice. Boxes of stations without merged points, such as those whose points are too old, and boxes beyond the grid of
+    the detector are fused by covariance intersection. The station reports only objects in its own points, because
+    receivers merge these points themselves.
     """
 
     settings_type = EarlyFusionSettings
@@ -51,6 +54,10 @@ class EarlyFusion(CovarianceIntersectionFusion):
         super().__init__(settings)
         self._received: dict[str, tuple[float, Array]] = {}
         """Time and points (N, 3) of the newest cloud of each station."""
+        self._detector: Detector | None = None
+
+    def setup(self, detector: Detector) -> None:
+        self._detector = detector
 
     @property
     def max_payload_age(self) -> float:
@@ -86,5 +93,12 @@ class EarlyFusion(CovarianceIntersectionFusion):
         return replace(readings, lidars={name: LidarReading(points, intensity, first.pose)})
 
     def _select(self, reports: Sequence[Report]) -> tuple[Integers, Integers]:
-        """Omit stations whose points are merged: their objects are detected in the merged points."""
-        return super()._select([report for report in reports if report.station not in self._received])
+        """Omit objects that are detected in merged points of their stations: within the grid of the detector, if it has
+        one.
+        """
+        rows, ranks = super()._select(reports)
+        merged = np.array([station in self._received for station in self._order[1]], np.bool_)[ranks]
+        features = None if self._detector is None else self._detector.feature_map
+        if features is not None and merged.any():
+            merged &= Grid.of(features).cells(self._history.positions(rows))[1]
+        return rows[~merged], ranks[~merged]

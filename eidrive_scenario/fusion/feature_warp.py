@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Floats, Integers
+from eidrive_scenario.base.feature_map import FeatureMap
 from eidrive_scenario.base.kernels import kernel
 
 ENOUGH = 0.5
@@ -23,6 +24,12 @@ class Grid:
     yaw: float
     cell: float
     shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, features: FeatureMap) -> Grid:
+        """Return the grid of a feature map."""
+        rows, columns = features.confidence.shape
+        return cls(features.x, features.y, features.yaw, features.cell, (rows, columns))
 
     def to_world(self, coordinates: Array | Integers) -> Array:
         """Return the points (..., 2) in the world of coordinates in cells, where integers are centers of cells."""

@@ -239,12 +239,11 @@ class IntermediateFusion(CovarianceIntersectionFusion):
             return replace(readings, lidars={})
         oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
         self._received = {sender: held for sender, held in self._received.items() if held.time >= oldest}
-        rows, columns = shape = features.confidence.shape
-        self._grid = Grid(features.x, features.y, features.yaw, features.cell, (rows, columns))
+        self._grid = Grid.of(features)
         if not self._received:
             return readings
         received = np.zeros((len(self._received), *features.features.shape), np.float32)
-        present = np.zeros((len(self._received), *shape), np.bool_)
+        present = np.zeros((len(self._received), *self._grid.shape), np.bool_)
         for station, (sender, held) in enumerate(sorted(self._received.items())):
             moving = np.array([
                 (x + vx * (held.time - time), y + vy * (held.time - time), yaw, length + 2.0 * BOX_MARGIN,

@@ -11,7 +11,7 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 
-from eidrive_scenario.base.arrays import Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, ranges
 from eidrive_scenario.fusion.tracks import TRACK, Rows, rows_of, update_tracks
@@ -122,6 +122,11 @@ class ReportHistory:
             number, rows = ranges(starts, ends, np.arange(self._used))
             self._order, self._selection = stations, (rows, np.array([rank for rank, _ in present], np.int64)[number])
         return self._selection
+
+    def positions(self, rows: Integers) -> Array:
+        """Return the positions (N, 2) of rows (N,) of the table at the last reports [m]."""
+        tracks: Table = self._rows.take(rows).view(TRACK)
+        return np.asarray(tracks["mean"][:, :2])
 
     def copy_rows(self, rows: Integers, out: Rows) -> None:
         """Copy rows (N,) of the table to `out` (N,)."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cell_detector import CellDetector
 from msgspec.structs import replace
 from scenario_1 import FrameCollector, edited, simulate
 
@@ -17,6 +18,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
+from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import Simulation
@@ -221,6 +223,22 @@ def test_boxes_of_a_station_are_fused_while_its_points_are_too_old() -> None:
         readings(0.4, (0.0, 0.0, 0.0)), [ReceivedMessage(replace(sent, detections=box), 0.4)], 0.4, None
     )
     assert [round(x, -1) for x in late.fused.boxes[:, 0].tolist()] == [50.0]
+
+
+def test_boxes_of_a_station_beyond_the_grid_of_the_detector_are_fused() -> None:
+    """The grid ends 51.2 m from the ego; points of the station are merged, and it reports cars 40 m and 60 m ahead."""
+    fusion, detector = EarlyFusion(), CellDetector()
+    fusion.setup(detector)
+    own = readings(0.0, (0.0, 0.0, 0.0))
+    detector.detect(own)
+    far = readings(0.0, (50.0, 0.0, 0.0))
+    boxes = np.array([[x, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0] for x in (40.0, 60.0)])
+    seen = Detections(0.0, boxes, np.ones(2), ("car",) * 2, np.zeros((2, 2)), np.tile(0.1 * np.eye(2), (2, 1, 1)))
+    fusion.add_payload("RSU", fusion.payloads(far, 1400)[0], np.zeros(7))
+    fusion.merge_readings(own)
+    report = Report("RSU", seen, 0.0)
+    fusion.add_report(report)
+    assert fusion.fuse([report], 0.0).boxes[:, 0].tolist() == [60.0]
 
 
 def test_points_of_the_far_future_do_not_replace_later_ones() -> None:
