@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn
 
@@ -34,6 +34,7 @@ from eidrive_scenario.files.bounded import MIB, load_json, read_regular_file, re
 
 INDEX = PurePosixPath("cooperative/data_info.json")
 """Index of the pairs of frames; a folder with it is one of DAIR-V2X-C."""
+LABELS = PurePosixPath("cooperative/label_world")
 VEHICLE, INFRASTRUCTURE = "vehicle-side", "infrastructure-side"
 VEHICLE_NAME, UNIT_NAME = "Station1", "RoadsideUnit1"
 GATE = 2.5
@@ -156,27 +157,45 @@ def is_dair_v2x(folder: Path) -> bool:
 
 
 def read_scenes(folder: Path) -> Iterator[TrafficScene]:
-    """Yield the scene of each sequence of a folder. Raise SettingError for damaged files."""
+    """Yield the scene of each sequence of a folder. Raise SettingError for damaged files.
+
+    Pairs of frames without a label file are omitted: the index also lists those of the test data, which are not
+    released. The first scene has a warning about them.
+    """
     sequences: dict[str, list[_Frame]] = {}
-    for frame in _frames(folder):
-        sequences.setdefault(frame.sequence, []).append(frame)
-    for name, frames in sorted(sequences.items()):
-        yield _scene(
-            folder, f"sequence_{name}" if name else folder_name(folder), sorted(frames, key=lambda frame: frame.time)
-        )
+    frames = list(_frames(folder))
+    for frame in frames:
+        if frame is not None:
+            sequences.setdefault(frame.sequence, []).append(frame)
+    missing = frames.count(None)
+    warnings = (
+        [f"{missing} of {len(frames)} pairs of frames are omitted: {LABELS} lacks their labels"] if missing else []
+    )
+    for name, of_sequence in sorted(sequences.items()):
+        of_sequence.sort(key=lambda frame: frame.time)
+        scene = _scene(folder, f"sequence_{name}" if name else folder_name(folder), of_sequence)
+        yield replace(scene, warnings=[*warnings, *scene.warnings])
+        warnings = []
 
 
-def _frames(folder: Path) -> Iterator[_Frame]:
+def _frames(folder: Path) -> Iterator[_Frame | None]:
+    """Yield the pairs of frames of the index, None for one without a label file."""
     side = _JsonFile(folder / VEHICLE / "data_info.json")
     by_id = {PurePosixPath(side.value(entry, "pointcloud_path", (str,))).stem: entry for entry in side.entries()}
     index = _JsonFile(folder / INDEX)
     if not index.entries():
         index.fail("the index has no frame")
+    labels = {path.name for path in (folder / LABELS).iterdir()} if (folder / LABELS).is_dir() else set()
+    if not labels:
+        index.fail(f"{LABELS} has no label file")
     for number, entry in enumerate(index.entries()):
         at = f"[{number}]."
         vehicle = PurePosixPath(index.value(entry, "vehicle_pointcloud_path", (str,), at)).stem
         unit = PurePosixPath(index.value(entry, "infrastructure_pointcloud_path", (str,), at)).stem
         label = PurePosixPath(index.value(entry, "cooperative_label_path", (str,), at)).stem
+        if f"{label}.json" not in labels:
+            yield None
+            continue
         if vehicle not in by_id:
             index.fail(f"{at}vehicle_pointcloud_path: frame {quoted(vehicle)} is not in {VEHICLE}/data_info.json")
         about = by_id[vehicle]
@@ -248,7 +267,7 @@ def _unit_lidar(folder: Path, frame: _Frame) -> Array:
 
 
 def _labels(folder: Path, frame: _Frame) -> list[_Label]:
-    file = _JsonFile(folder / "cooperative" / "label_world" / f"{frame.label}.json")
+    file = _JsonFile(folder / LABELS / f"{frame.label}.json")
     labels = []
     for number, entry in enumerate(file.entries()):
         at = f"[{number}]."

@@ -430,6 +430,21 @@ def test_damaged_recording_of_dair_v2x_is_an_error(file: str, content: str, mess
         list(import_recordings(folder, tmp_path / "out"))
 
 
+def test_pairs_without_labels_are_omitted_with_a_warning(tmp_path: Path) -> None:
+    """The published index lists the pairs of the test data, of which no other file is published."""
+    folder = dair(tmp_path / "in", frames=4)
+    expected = [track.times.tolist() for track in next(read_scenes(dair(tmp_path / "two", frames=2))).tracks]
+    for number in (102, 103):
+        for path in folder.glob(f"*/**/*{number:06d}.json"):
+            path.unlink()
+    write_json(
+        folder / "vehicle-side/data_info.json", json.loads((folder / "vehicle-side/data_info.json").read_text())[:2]
+    )
+    (scene,) = read_scenes(folder)
+    assert [track.times.tolist() for track in scene.tracks] == expected
+    assert scene.warnings == ["2 of 4 pairs of frames are omitted: cooperative/label_world lacks their labels"]
+
+
 def test_missing_calibration_is_an_error_with_its_path(tmp_path: Path) -> None:
     folder = dair(tmp_path / "in", frames=1)
     (folder / "infrastructure-side/calib/virtuallidar_to_world/000300.json").unlink()
