@@ -93,7 +93,7 @@ def test_bytes_on_the_channel_are_those_of_the_encoded_messages(
         kinds
         == {
             "covariance_intersection": {("cpm", False)},
-            "early": {("cpm", True)},
+            "early": {("cpm", True), ("cpm", False)},
             "where2comm": {("cpm", False), ("features", True)},
         }[fusion]
     )

@@ -91,7 +91,8 @@ class MessageGenerator:
     ) -> tuple[Message, ...]:
         """Return the messages of this tick.
 
-        payloads  sensor data: the first CPM carries points; frames of features follow it, each in its own message, once
+        payloads  sensor data, which are sent once: the first CPM carries points; frames of features follow it, each in
+                  its own message
         interval  minimum time between two messages under congestion control [s], respected by the ETSI rules. With two
                   kinds of messages only the less recent kind is generated in a tick
         """
@@ -122,7 +123,8 @@ class MessageGenerator:
                 messages = [self._message(state, own_body(self._spec, state), now, "cam", low_frequency=low)]
             if not messages:
                 continue
-            if kind == "cpm":
+            if kind == "cpm" and payloads is not self._sent:
+                self._sent = payloads
                 messages += self._feature_messages(state, now, payloads)
                 for points in payloads:
                     if isinstance(points, PointCloud):
@@ -135,10 +137,7 @@ class MessageGenerator:
         return tuple([shift_timestamps(message, error) for message in generated])
 
     def _feature_messages(self, state: StationState, now: float, payloads: tuple[Payload, ...]) -> list[Message]:
-        """Return a message for each frame of a map, unless the frames of this map are sent already."""
-        if payloads is self._sent:
-            return []
-        self._sent = payloads
+        """Return a message for each frame of a map."""
         name, messages = self._spec.name, list[Message]()
         for frame in payloads:
             if isinstance(frame, FeatureFrame):

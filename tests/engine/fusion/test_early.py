@@ -114,6 +114,18 @@ def test_station_shares_the_points_of_its_last_revolution() -> None:
     assert (message.points.points()[:, 2] > 0.15).sum() > 100
 
 
+def test_station_sends_the_points_of_a_revolution_once() -> None:
+    """The lidar has 10 Hz, and there is a message in each tick of 0.05 s."""
+    rsu, at = agent(RSU, sensors={"lidar": {"rate": 10.0}}), (40.0, 12.0, math.pi)
+    sent = []
+    for tick in range(4):
+        given = readings(0.05 * tick, at, car(*CAR, "fl"))
+        given = given if tick % 2 == 0 else replace(given, lidars={})
+        (message,) = rsu.act(given, (), 0.05 * tick, None).outbox
+        sent.append(message.points is not None)
+    assert sent == [True, False, True, False]
+
+
 def test_station_shares_the_points_of_all_lidars_at_different_rates() -> None:
     """The lidar with 10 Hz, which alone shows the car, has no reading in the ticks of the messages."""
     rsu = agent(RSU, sensors={"front": {"kind": "lidar"}, "rear": {"kind": "lidar", "rate": 10.0}}, message_rate=10.0)
