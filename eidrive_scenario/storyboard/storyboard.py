@@ -117,6 +117,8 @@ class Storyboard:
             if not self.context.actors[name].present:
                 self.context.add_actor(name, ResolvedPosition(placed.pose))
         self._add_trailers()
+        for coupling in self._couplings:
+            self.context.let_tow(coupling.front.name, coupling.back.name)
         for actor in self.context.actors.values():
             actor.motion.initialize()
         self._update_spawns(self.context.commands)
@@ -166,7 +168,7 @@ class Storyboard:
         for coupling in self._couplings:
             front, back = coupling.front, coupling.back
             if front.present and back.present:
-                teleports = front.motion.teleported
+                teleports = front.motion.teleported or back.motion.teleported
                 pose = coupling.next_pose(next_displacement(front, view, self.dt), straight=teleports)
                 back.motion.set_towed_state(pose, front.motion)
                 placements[back.name] = back.motion.placement(teleport=teleports)
@@ -174,7 +176,7 @@ class Storyboard:
         return self._completed_commands(commands, driven)
 
     def _add_trailers(self) -> None:
-        """Add trailers with their towing vehicles, aligned; in Init they are moved there if they are elsewhere."""
+        """Place trailers that are absent or elsewhere behind their towing vehicles, aligned with them."""
         actors = self.context.actors
         trailers = [actor.trailer for actor in actors.values()]
         if trailers != self._declared_trailers:
@@ -184,7 +186,7 @@ class Storyboard:
         self.context.commands.trailers = self._trailers
         for coupling in self._couplings:
             front, back = coupling.front, coupling.back
-            if front.present and (not back.present or self.context.view.tick < 0):
+            if front.present and (not back.present or coupling.is_apart or self.context.view.tick < 0):
                 back.motion.set_speed(front.motion.speed_along_heading)
                 self.context.add_actor(back.name, ResolvedPosition(coupling.next_pose(straight=True)))
 

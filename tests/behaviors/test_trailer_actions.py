@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 
 import pytest
-from storyboard_xml import global_xml, private_xml, speed_xml
-from street_scene import after, street
+from storyboard_xml import by_entity_xml, global_xml, lane_position_xml, private_xml, speed_xml, teleport_xml
+from street_scene import NOTHING, after, street
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
@@ -28,6 +28,11 @@ DRIVE = speed_xml(10)
 ASIDE = private_xml("""<LateralAction><LaneChangeAction>
   <LaneChangeActionDynamics dynamicsShape="cubic" dynamicsDimension="time" value="3"/>
   <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
+
+
+def couple(name: str) -> str:
+    """Return the connection of a trailer."""
+    return COUPLE.replace('Trailer"', f'{name}"')
 
 
 def play(run: Run, end: float, *steps: tuple[str, ...], train: str = TRAIN) -> RecordedRun:
@@ -125,8 +130,7 @@ def test_trailer_of_two_vehicles_follows_the_first(run: Run) -> None:
     """This also holds after it tows the second one itself."""
     train = link("First", "A") + link("Second", "A") + link("A")
     placed = global_xml(PLACE.format("First", 200)) + global_xml(PLACE.format("Second", 192))
-    couple = COUPLE.replace('Trailer"', 'Second"')
-    played = run(1, ("A", couple, after(0.5)), driven=False, ego=(1, 900.0, 0.0), more=train, globally=placed)
+    played = run(1, ("A", couple("Second"), after(0.5)), driven=False, ego=(1, 900.0, 0.0), more=train, globally=placed)
     assert played.x("A") == pytest.approx([196.0] * len(played.frames))
     assert played.x("Second") == pytest.approx([192.0] * len(played.frames))
 
@@ -140,14 +144,15 @@ def test_trailer_of_two_vehicles_follows_the_first(run: Run) -> None:
          lambda x: 0.004 * max(x - 210.0, 0.0) ** 2),
     ],
 )  # fmt: skip
-def test_trailer_on_a_slope_stands_on_the_road(run: Run, elevation: str, height: Callable[[float], float]) -> None:
-    placed = global_xml(PLACE.format("Truck", 200)) + global_xml(PLACE.format("Trailer", 196))
+def test_trailers_on_a_slope_stand_on_the_road(run: Run, elevation: str, height: Callable[[float], float]) -> None:
+    placed = "".join(global_xml(PLACE.format(*place)) for place in (("Truck", 200), ("Trailer", 196), ("Last", 193)))
     played = run(
-        5, ("Truck", COUPLE), ("Truck", DRIVE), driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed,
+        5, ("Truck", COUPLE), ("Trailer", couple("Last")), ("Truck", DRIVE), driven=False, ego=(1, 900.0, 0.0),
+        more=TRAIN + link("Last"), globally=placed,
         street=street(profiles=f"<elevationProfile>{elevation}</elevationProfile>"),
     )  # fmt: skip
-    for frame in played.frames:
-        for name in ("Truck", "Trailer"):
+    for frame in played.frames[1:]:
+        for name in ("Truck", "Trailer", "Last"):
             row = frame.view.row(name)
             x, _, z = frame.view.position[row].tolist()
             assert z == pytest.approx(height(x), abs=1e-6)
@@ -182,3 +187,73 @@ def test_frames_contain_couplings_of_their_time(run: Run) -> None:
     times = [frame.view.time for frame in played.frames if frame.trailers]
     assert [times[0], times[-1]] == pytest.approx([0.6, 1.05])
     assert {tuple(frame.trailers.items()) for frame in played.frames} == {(), (("Truck", "Trailer"),)}
+
+
+@pytest.mark.element("ConnectTrailerAction")
+def test_replaced_trailer_stops_at_its_position(run: Run) -> None:
+    """The connection just after 1 s applies to the step from 1.05 s on, in which the truck is at 210.5 m."""
+    placed = "".join(global_xml(PLACE.format(*place)) for place in (("Truck", 200), ("Trailer", 196), ("Last", 206)))
+    steps = ("Truck", COUPLE), ("Truck", DRIVE), ("Truck", couple("Last"), after(1.0))
+    played = run(2, *steps, driven=False, ego=(1, 900.0, 0.0), more=TRAIN + link("Last"), globally=placed)
+    assert played.x("Trailer")[22:] == pytest.approx([206.5] * 19)
+    assert played.x("Last")[-1] == pytest.approx(played.x("Truck")[-1] - 4.0)
+
+
+FAR = teleport_xml(lane_position_xml(-2, 400.0))
+
+
+@pytest.mark.element("ConnectTrailerAction")
+@pytest.mark.parametrize("moved", ["before the connection", "while it is connected"])
+def test_distant_trailer_is_teleported_to_the_hitch(run: Run, moved: str) -> None:
+    """From a place ahead it is aligned with its vehicle, and the distance of the teleport is not covered."""
+    times = (0.2, 0.5) if moved == "before the connection" else (0.5, 0.2)
+    covered = by_entity_xml('<TraveledDistanceCondition value="50"/>', "Trailer")
+    played = play(
+        run, 4, ("Truck", DRIVE), ("Trailer", FAR, after(times[0])), ("Truck", COUPLE, after(times[1])),
+        ("Ego", NOTHING, covered),
+    )  # fmt: skip
+    assert played.x("Trailer")[20:] == pytest.approx([x - 4.0 for x in played.x("Truck")[20:]])
+    assert played.of("Trailer", "yaw")[20:] == pytest.approx([0.0] * 61)
+    assert played.begun("action 3") == []
+
+
+@pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
+def test_actions_of_a_connected_trailer_have_no_effect(run: Run) -> None:
+    """The first lane change is stopped by the connection, the second one does not start."""
+    steps = ("Trailer", speed_xml(10)), ("Trailer", ASIDE), ("Truck", DRIVE), ("Truck", COUPLE, after(0.5))
+    played = play(run, 4, *steps, ("Trailer", ASIDE, after(1.0)), ("Truck", UNCOUPLE, after(2.0)))
+    rows = [frame.view.position[frame.view.row("Trailer")] for frame in played.frames]
+    assert [float(y) for _, y, _ in rows[42:]] == pytest.approx([float(rows[42][1])] * 39)
+    assert played.of("Trailer", "speed")[42:] == [0.0] * 39
+    refused = "LaneChangeAction: not executed, as Trailer is a connected trailer, which its towing vehicle moves"
+    assert sum(refused in text for text in played.result.warnings) == 1
+
+
+@pytest.mark.element("ConnectTrailerAction")
+def test_connection_of_the_own_train_has_no_effect(run: Run) -> None:
+    played = run(
+        1, ("A", DRIVE), ("A", couple("B")), ("B", couple("A"), after(0.5)), driven=False, ego=(1, 900.0, 0.0),
+        more=link("A") + link("B"), globally=global_xml(PLACE.format("A", 200)),
+    )  # fmt: skip
+    assert played.frames[-1].trailers == {"A": "B"}
+    assert any("ConnectTrailerAction: no effect: 'A' tows 'B'" in text for text in played.result.warnings)
+    with pytest.raises(InputError, match="the reference entity is the actor itself"):
+        run(1, ("A", couple("A")), driven=False, more=link("A"))
+
+
+@pytest.mark.element("ConnectTrailerAction")
+def test_connected_station_does_not_drive(run: Run) -> None:
+    """Ego has no coupler: its reference point is at the hitch, 1 m behind that of the truck."""
+    placed = global_xml(PLACE.format("Truck", 120))
+    played = run(
+        2, ("Truck", DRIVE), ("Truck", couple("Ego"), after(0.5)), ego=(-1, 100.0, 8.0), more=TRAIN, globally=placed
+    )
+    assert played.x("Ego")[15:] == pytest.approx([x - 1.0 for x in played.x("Truck")[15:]])
+    assert played.of("Ego", "speed")[15:] == [10.0] * 26
+
+
+def test_speed_of_a_folded_trailer_refers_to_its_heading(run: Run) -> None:
+    """A trailer that is pushed folds: at the end it points backwards, and moves forwards at the speed of its truck."""
+    played = play(run, 12, ("Truck", COUPLE), ("Truck", speed_xml(-5)), ("Truck", ASIDE, after(0.5)))
+    assert abs(played.of("Trailer", "yaw")[-1]) == pytest.approx(math.pi, abs=1e-3)
+    assert played.of("Trailer", "speed")[-1] == pytest.approx(5.0, abs=1e-3)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api.actions import ActionBehaviour, model
+from eidrive_behaviors.actions.following import check_other_entity
+from eidrive_scenario.api.actions import ActionBehaviour, model, trailers_behind
 
 
 class ConnectTrailerAction(ActionBehaviour):
@@ -12,12 +13,17 @@ class ConnectTrailerAction(ActionBehaviour):
 
     action: model.ConnectTrailerAction
 
+    def configure(self) -> None:
+        """Check that the trailer is another entity."""
+        check_other_entity(self, self.action.trailer_ref)
+
     def update(self) -> Status:
-        """Connect the trailer."""
-        for other in self.context.actors.values():
-            if other.trailer == self.action.trailer_ref:
-                other.set_trailer(None)
-        self.actor.set_trailer(self.action.trailer_ref)
+        """Connect the trailer, unless it tows the actor."""
+        trailer = self.action.trailer_ref
+        if self.actor.name in trailers_behind(self.context.actors, trailer):
+            self.warn(f"no effect: {trailer!r} tows {self.actor.name!r}", "disconnect the actor first")
+        else:
+            self.context.connect_trailer(self.actor.name, trailer)
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -32,12 +38,7 @@ class DisconnectTrailerAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Disconnect the trailer."""
-        name = self.actor.trailer
-        self.actor.set_trailer(None)
-        if name is not None:
-            trailer = self.context.actors[name].motion
-            trailer.set_speed(0.0)
-            trailer.snap_to_lane()
+        self.context.disconnect_trailer(self.actor.name)
         return Status.SUCCESS
 
     def describe(self) -> str:

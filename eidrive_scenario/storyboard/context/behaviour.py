@@ -14,11 +14,15 @@ from eidrive_scenario.errors import Diagnostic, InvalidResult, ScenarioError
 from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.context.contexts import ActionContext, EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import (
+    ActionContext,
+    EntityAbsentError,
+    EntityTowedError,
+    EntityUnavailableError,
+)
 from eidrive_scenario.storyboard.kinematics.actor import Actor
-from eidrive_scenario.storyboard.state.element_states import Domain
-
-MOTION = Domain.LONGITUDINAL | Domain.LATERAL
+from eidrive_scenario.storyboard.kinematics.trailers import towing_vehicle
+from eidrive_scenario.storyboard.state.element_states import MOTION, Domain
 
 
 class ActionBehaviour(py_trees.behaviour.Behaviour):
@@ -91,6 +95,14 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         """Whether it moves an actor that is absent."""
         return bool(self.controls & MOTION) and self.actor_name is not None and not self.actor.present
 
+    def check_actor(self) -> None:
+        """Raise EntityUnavailableError if it moves an actor that is absent or towed."""
+        if self.actor_name is not None and self.controls & MOTION:
+            if self.is_actor_missing:
+                raise EntityAbsentError(self.actor_name)
+            if towing_vehicle(self.context.actors, self.actor_name) is not None:
+                raise EntityTowedError(self.actor_name)
+
     @property
     def resource(self) -> str:
         """Part of a domain that it controls, such as the name of a light; empty for the whole domain."""
@@ -129,12 +141,11 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         """Describe the action."""
         return type(self.action).__name__
 
-    def abort(self, absent: EntityAbsentError) -> str:
-        """Stop the action, as an entity that it requires is absent. Add a warning and return the reason."""
+    def abort(self, unavailable: EntityUnavailableError) -> str:
+        """Stop the action, as an entity that it requires is absent or towed. Add a warning and return the reason."""
         self.stop(Status.INVALID)
-        why = f"{absent} is absent"
-        self.warn(f"not executed, as {why}", "start it after the entity is added")
-        return why
+        self.warn(f"not executed, as {unavailable}", unavailable.hint)
+        return str(unavailable)
 
     def check_decision(self) -> None:
         """Raise InvalidResult if `update` returned no status, or set values of its actor that are not finite."""

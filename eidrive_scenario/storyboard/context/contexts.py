@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.trailers import disconnect
+from eidrive_scenario.storyboard.kinematics.trailers import disconnect, towing_vehicle
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
 from eidrive_scenario.storyboard.state.signals import Signals
@@ -43,8 +43,32 @@ def speed_change(name: str) -> MotionChange:
     return name, "speed"
 
 
-class EntityAbsentError(LookupError):
+class EntityUnavailableError(LookupError):
+    """The state of an entity, by its name, does not allow an action.
+
+    state  clause that follows the name
+    hint   proposal for the user
+    """
+
+    state: ClassVar[str]
+    hint: ClassVar[str]
+
+    def __str__(self) -> str:
+        return f"{super().__str__()} {self.state}"
+
+
+class EntityAbsentError(EntityUnavailableError):
     """The position of an entity is required, and the entity is absent."""
+
+    state = "is absent"
+    hint = "start it after the entity is added"
+
+
+class EntityTowedError(EntityUnavailableError):
+    """An action moves an entity that a towing vehicle moves."""
+
+    state = "is a connected trailer, which its towing vehicle moves"
+    hint = "disconnect the trailer first"
 
 
 @dataclass
@@ -212,12 +236,27 @@ class ActionContext(ConditionContext):
 
     def remove_actor(self, name: str) -> None:
         """Remove an actor from the world, disconnected from trailers; the actions that control it end."""
-        actor = self.actors[name]
+        actor, towing = self.actors[name], towing_vehicle(self.actors, name)
+        if towing is not None:
+            self.actors[towing].set_trailer(None)
         disconnect(self.actors, name)
         if actor.present:
             actor.leave_world()
             if self.commands.spawns.pop(name, None) is None:
                 self.commands.removals.add(name)
+
+    def connect_trailer(self, name: str, trailer: str) -> None:
+        """Connect a trailer to an actor, in place of its present one; the actions that control the trailer end."""
+        if self.actors[name].trailer != trailer:
+            disconnect(self.actors, name)
+        towing = towing_vehicle(self.actors, trailer)
+        if towing is not None:
+            self.actors[towing].set_trailer(None)
+        self.actors[name].set_trailer(trailer)
+
+    def disconnect_trailer(self, name: str) -> None:
+        """Disconnect the trailer of an actor, which stops at its position."""
+        disconnect(self.actors, name)
 
     @property
     def background_traffic(self) -> BackgroundTraffic:

@@ -12,7 +12,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.contexts import ActionContext, ControllerContext, MotionChange, speed_change
 from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
-from eidrive_scenario.storyboard.state.element_states import Domain
+from eidrive_scenario.storyboard.state.element_states import MOTION, Domain
 from eidrive_scenario.world.view import WorldView
 
 
@@ -79,9 +79,23 @@ class RuntimeContext(ActionContext, ControllerContext):
     def remove_actor(self, name: str) -> None:
         """Remove an actor from the world, disconnected from trailers, and end the actions that control it."""
         super().remove_actor(name)
-        for actor, _, occupant, holder in list(self._holders):
-            if actor == name:
-                occupant.preempt(holder, f"{name} is removed")
+        self._preempt_all(name, ~Domain.NONE, f"{name} is removed")
+
+    def connect_trailer(self, name: str, trailer: str) -> None:
+        """Connect a trailer to an actor, in place of its present one; the actions that move the trailer end."""
+        super().connect_trailer(name, trailer)
+        self.let_tow(name, trailer)
+
+    def let_tow(self, name: str, trailer: str) -> None:
+        """End the actions that move a trailer, and its controller, as the actor that tows it moves it."""
+        self._preempt_all(trailer, MOTION, f"{name} tows {trailer}")
+        self.actors[trailer].activate_controller(False, False)
+
+    def _preempt_all(self, name: str, domains: Domain, why: str) -> None:
+        """Preempt the holders of domains of an actor."""
+        for actor, held, occupant, holder in list(self._holders):
+            if actor == name and held & domains:
+                occupant.preempt(holder, why)
                 self.release_domains(holder)
 
     def step_traffic(self) -> None:

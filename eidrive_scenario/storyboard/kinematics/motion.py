@@ -127,9 +127,11 @@ class Motion(MotionState):
         self._pose, self._speed, self._rests = pose, speed, False
 
     def set_towed_state(self, pose: Pose, front: Motion) -> None:
-        """Set the pose of a trailer. It has the speed of its towing vehicle, and teleports with it."""
-        self._pose, self._speed, self._teleported = pose, front.speed_along_heading, front.teleported
-        self._rests = False
+        """Set the pose of a trailer, which teleports with its towing vehicle. Requests of the current step are void."""
+        self._pose, self._speed = pose, front.speed_along_heading * math.cos(pose.h - front.pose.h)
+        self._teleported = self._teleported or front.teleported
+        self._location = self._lateral_step = self._next_pose = self._lane_distance = None
+        self._teleport = self._crosses = self._end_of_road = self._backs = self._rests = False
 
     def clear_teleported(self) -> None:
         """Clear `teleported`, as a view shows the new pose."""

@@ -13,8 +13,8 @@ from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.world.view import WorldView
 
-AT_PLACE = 0.5
-"""Maximum distance between a vehicle and its lane location if it follows the road [m]."""
+MAX_GAP = 1.0
+"""Maximum distance between hitch and coupler at which a trailer is not teleported to the hitch [m]."""
 
 
 class Displacement(NamedTuple):
@@ -49,6 +49,15 @@ class Coupling(NamedTuple):
         coupler = back.entity.trailer_coupler if isinstance(back.entity, model.Vehicle) else None
         reach = coupler.dx if coupler is not None else 0.0
         return cls(front, back, hitch.dx if hitch is not None else 0.0, reach, bar(back.entity, reach))
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether the coupler is so far from the hitch that the trailer is teleported there."""
+        (x, y, _, h, _, _), (u, v, _, turn, _, _) = self.front.motion.pose, self.back.motion.pose
+        hitch, reach = self.hitch, self.reach
+        dx = x + hitch * math.cos(h) - u - reach * math.cos(turn)
+        dy = y + hitch * math.sin(h) - v - reach * math.sin(turn)
+        return dx * dx + dy * dy > MAX_GAP * MAX_GAP
 
     def next_pose(self, displacement: Displacement = NO_DISPLACEMENT, *, straight: bool = False) -> Pose:
         """Return the pose of the trailer behind its towing vehicle after a displacement of the vehicle.
@@ -105,14 +114,9 @@ def check_acyclic(actors: Mapping[str, Actor]) -> None:
     """Raise ScenarioError if an entity is its own trailer, directly or through others."""
     diagnostics = []
     for name, actor in actors.items():
-        train: list[str] = []
-        while actor.trailer is not None and actor.trailer in actors and actor.trailer not in train:
-            train.append(actor.trailer)
-            actor = actors[actor.trailer]
-        if name in train:
-            where = actors[name].entity
+        if name in trailers_behind(actors, name):
             message = f"entity {name!r} is its own trailer"
-            diagnostics.append(Diagnostic.at(where, message, "remove a connection"))
+            diagnostics.append(Diagnostic.at(actor.entity, message, "remove a connection"))
     if diagnostics:
         raise ScenarioError(diagnostics)
 
@@ -134,11 +138,12 @@ def next_displacement(front: Actor, view: WorldView, dt: float) -> Displacement:
 
 def _pose_on_surface(front: Actor, x: float, y: float, heading: float) -> Pose:
     """Return the pose at the same height above the road as the vehicle; without a road in the plane of the vehicle."""
-    roads, here, pose = front.motion.roads, front.motion.location, front.motion.pose
+    roads, pose = front.motion.roads, front.motion.pose
+    here = None if roads is None else roads.locate_at(pose.x, pose.y, front.motion.location, pose.z)
     if roads is not None and here is not None:
-        below, there = roads.lane_pose_at(*here[:4]), roads.locate_at(x, y, here)
-        if there is not None and math.hypot(below.x - pose.x, below.y - pose.y) < AT_PLACE:
-            ground = roads.lane_pose_at(*there[:4])
+        there = roads.locate_at(x, y, here)
+        if there is not None:
+            below, ground = roads.lane_pose_at(*here[:4]), roads.lane_pose_at(*there[:4])
             _, p, r = ground.turned(wrap_angle(heading - ground.h))[3:]
             return Pose(x, y, pose.z + ground.z - below.z, heading, p, r)
     ahead = (x - pose.x) * math.cos(pose.h) + (y - pose.y) * math.sin(pose.h)
@@ -159,11 +164,22 @@ def bar(entity: model.Element, reach: float) -> float:
     return sum(d * d for d in distances) / total if total > 0.0 else reach
 
 
+def towing_vehicle(actors: Mapping[str, Actor], name: str) -> str | None:
+    """Return the name of the vehicle that tows an actor; None without one."""
+    return next((front for front, actor in actors.items() if actor.trailer == name), None)
+
+
+def trailers_behind(actors: Mapping[str, Actor], name: str) -> list[str]:
+    """Return the names of the trailers of an actor from front to end; its own name if it is in a ring."""
+    behind: list[str] = []
+    while (trailer := actors[name].trailer) is not None and trailer in actors and trailer not in behind:
+        behind.append(trailer)
+        name = trailer
+    return behind
+
+
 def disconnect(actors: Mapping[str, Actor], name: str) -> None:
-    """Disconnect an actor that leaves from its towing vehicle and from its trailer, which stops at its position."""
-    for actor in actors.values():
-        if actor.trailer == name:
-            actor.set_trailer(None)
+    """Disconnect the trailer of an actor, which stops at its position."""
     trailer = actors.get(actors[name].trailer or "")
     actors[name].set_trailer(None)
     if trailer is not None and trailer.present:

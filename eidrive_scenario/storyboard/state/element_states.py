@@ -21,6 +21,9 @@ class Domain(Flag):
     ANIMATION = auto()
 
 
+MOTION = Domain.LONGITUDINAL | Domain.LATERAL
+
+
 class ElementState(Enum):
     """State of an element."""
 

@@ -16,7 +16,7 @@ from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import without_criteria
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition
-from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityAbsentError, EntityUnavailableError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import Domain
 from eidrive_scenario.storyboard.tree.elements import (
@@ -99,8 +99,8 @@ class InitBlock(Composite):
         for behaviour in tuple(self.running):
             try:
                 behaviour.tick_checked()
-            except EntityAbsentError as absent:
-                behaviour.abort(absent)
+            except EntityUnavailableError as unavailable:
+                behaviour.abort(unavailable)
             if behaviour.status is not Status.RUNNING:
                 self.running.remove(behaviour)
                 self.context.release_domains(behaviour)

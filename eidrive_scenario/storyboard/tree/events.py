@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from py_trees.common import Status
 
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
+from eidrive_scenario.storyboard.context.contexts import EntityUnavailableError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.elements import StoryElement, TriggeringEntities
@@ -104,8 +104,9 @@ class ActionElement(StoryElement):
         self.running: list[ActionBehaviour] = []
         self._completing: list[ActionBehaviour] = []
         """Behaviours that reach their goals in the current step; they hold their domains until its end."""
-        self._awaiting: dict[ActionBehaviour, EntityAbsentError] = {}
-        """Behaviours that start at this instant and await an entity that may enter the world at this instant."""
+        self._awaiting: dict[ActionBehaviour, EntityUnavailableError] = {}
+        """Behaviours that start at this instant and await an entity that may enter the world, or be
+        disconnected, at this instant."""
         self._decided_at: int | None = None
         for actor in self.actors:
             self.add_children(list(self.behaviours(actor)))
@@ -214,25 +215,25 @@ class ActionElement(StoryElement):
         if self._awaiting:
             self._awaiting.pop(behaviour, None)
         try:
-            if behaviour.status is not Status.RUNNING and behaviour.is_actor_missing:
-                raise EntityAbsentError(behaviour.actor_name)
+            if behaviour.status is not Status.RUNNING:
+                behaviour.check_actor()
             behaviour.tick_checked()
-        except EntityAbsentError as absent:
+        except EntityUnavailableError as unavailable:
             if self._tried_at == self.context.progress.tick:
                 behaviour.stop(Status.INVALID)
-                self._awaiting[behaviour] = absent
+                self._awaiting[behaviour] = unavailable
                 self.context.pending_actions.append(self.abort)
             else:
-                self._abort_behaviour(behaviour, absent)
+                self._abort_behaviour(behaviour, unavailable)
 
     def abort(self) -> None:
-        """Stop the behaviours whose entity has not entered the world at this instant."""
+        """Stop the behaviours whose entity is still unavailable at this instant."""
         awaiting, self._awaiting = self._awaiting, {}
-        for behaviour, absent in awaiting.items():
-            self._abort_behaviour(behaviour, absent)
+        for behaviour, unavailable in awaiting.items():
+            self._abort_behaviour(behaviour, unavailable)
 
-    def _abort_behaviour(self, behaviour: ActionBehaviour, absent: EntityAbsentError) -> None:
-        why = behaviour.abort(absent)
+    def _abort_behaviour(self, behaviour: ActionBehaviour, unavailable: EntityUnavailableError) -> None:
+        why = behaviour.abort(unavailable)
         self.context.release_domains(behaviour)
         self.preempt(behaviour, why)
 
