@@ -37,6 +37,7 @@ from eidrive_scenario.storyboard.kinematics.route import build_route as build_ro
 from eidrive_scenario.storyboard.kinematics.route import faces_traffic as faces_traffic
 from eidrive_scenario.storyboard.kinematics.route import random_route as random_route
 from eidrive_scenario.storyboard.kinematics.route import uniform_branch_selector as uniform_branch_selector
+from eidrive_scenario.storyboard.kinematics.trailers import road_train as road_train
 from eidrive_scenario.storyboard.kinematics.trailers import trailers_behind as trailers_behind
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve as TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress as TrajectoryProgress

@@ -257,3 +257,26 @@ def test_speed_of_a_folded_trailer_refers_to_its_heading(run: Run) -> None:
     played = play(run, 12, ("Truck", COUPLE), ("Truck", speed_xml(-5)), ("Truck", ASIDE, after(0.5)))
     assert abs(played.of("Trailer", "yaw")[-1]) == pytest.approx(math.pi, abs=1e-3)
     assert played.of("Trailer", "speed")[-1] == pytest.approx(5.0, abs=1e-3)
+
+
+OVERLAPPING = TRAIN.replace('TrailerCoupler dx="3"', 'TrailerCoupler dx="1.2"')
+COLLISION = by_entity_xml('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>', "Truck")
+CLEAR = by_entity_xml(
+    """<RelativeClearanceCondition oppositeLanes="false" distanceForward="5" distanceBackward="5" freeSpace="true">
+    <RelativeLaneRange from="0" to="0"/></RelativeClearanceCondition>""",
+    "Truck",
+)
+
+
+@pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
+def test_overlapping_trailer_is_no_collision_until_it_has_parted(run: Run) -> None:
+    """The truck turns back at 204.1 m, and touches the trailer, which ends at 201.9 m, after 1.7 m or 0.85 s."""
+    steps = ("Truck", COUPLE), ("Truck", speed_xml(2)), ("Truck", UNCOUPLE, after(1.0))
+    played = play(run, 3, *steps, ("Truck", speed_xml(-2), after(2.0)), ("Ego", NOTHING, COLLISION), train=OVERLAPPING)
+    assert played.begun("action 4") == pytest.approx([2.9])
+
+
+def test_clearance_of_a_vehicle_excludes_its_trailer(run: Run) -> None:
+    """Until the view after the connection the trailer, which begins 1.5 m behind the truck, is in the way."""
+    played = play(run, 1, ("Truck", COUPLE, after(0.5)), ("Ego", NOTHING, CLEAR))
+    assert played.begun("action 1") == pytest.approx([0.6])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.api.actions import ConditionContext, EntityCondition, entity_box, facing, model
+from eidrive_scenario.api.actions import ConditionContext, EntityCondition, entity_box, facing, model, road_train
 from eidrive_scenario.api.common import LaneLocation, footprint
 
 
@@ -14,7 +14,7 @@ class RelativeClearanceCondition(EntityCondition):
     The range must exist: without such a lane beside the entity there is no clearance. Lanes of oncoming traffic, with
     respect to the entity's heading, count only with `oppositeLanes`; its own lane always counts. The range is measured
     along the road from the reference point of the entity. With `freeSpace` every part of another box counts, else only
-    its reference point. Background traffic counts unless entities are named.
+    its reference point. Unless entities are named, background traffic counts, but not the rest of the own road train.
     """
 
     element: model.RelativeClearanceCondition
@@ -38,7 +38,9 @@ class RelativeClearanceCondition(EntityCondition):
         return f"clear {ahead:g} m ahead, {behind:g} m behind"
 
     def _entities_within(self, context: ConditionContext, entity: str, here: LaneLocation) -> list[str]:
-        names = [ref.entity_ref for ref in self.element.entity_ref] or list(context.view.names)
+        own = road_train(context.actors, entity)
+        names = [ref.entity_ref for ref in self.element.entity_ref]
+        names = names or [name for name in context.view.names if name not in own]
         return [
             name
             for name in names

@@ -12,7 +12,7 @@ from eidrive_scenario.api.common import overlap
 
 
 class CollisionCondition(EntityCondition):
-    """Contact of the bounding box with that of a named entity, or of any entity of a type."""
+    """Contact of the bounding box with that of a named entity, or of any entity of a type, but the own trailer."""
 
     element: model.CollisionCondition
 
@@ -42,7 +42,9 @@ class CollisionCondition(EntityCondition):
         named = [
             name
             for name in self._candidates(context)
-            if name != entity and (name in begun or overlap(box, entity_box(context, name)))
+            if name != entity
+            and not context.are_coupled(entity, name)
+            and (name in begun or overlap(box, entity_box(context, name)))
         ]
         return named if self.element.by_type is None else [*named, *self._touched_traffic(context, box, begun)]
 

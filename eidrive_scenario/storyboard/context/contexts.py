@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.trailers import disconnect, towing_vehicle
+from eidrive_scenario.storyboard.kinematics.trailers import towing_vehicle
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
 from eidrive_scenario.storyboard.state.signals import Signals
@@ -128,6 +128,13 @@ class ConditionContext:
         self.traffic: BackgroundTraffic | None = None
         """Background traffic; None before its first instance starts."""
         self.position_cache = PositionCache()
+        self.parting: set[frozenset[str]] = set()
+        """Former pairs of a vehicle and its trailer that still overlap."""
+
+    def are_coupled(self, name: str, other: str) -> bool:
+        """Whether an entity is the trailer of another one, or was and still overlaps it: they do not collide."""
+        actors = self.actors
+        return actors[name].trailer == other or actors[other].trailer == name or {name, other} in self.parting
 
     def parameter(self, element: model.ParameterCondition | model.ParameterAction) -> str | None:
         """Return the value of the parameter to which an element refers: that which an action has set, otherwise that of
@@ -238,8 +245,8 @@ class ActionContext(ConditionContext):
         """Remove an actor from the world, disconnected from trailers; the actions that control it end."""
         actor, towing = self.actors[name], towing_vehicle(self.actors, name)
         if towing is not None:
-            self.actors[towing].set_trailer(None)
-        disconnect(self.actors, name)
+            self._set_trailer(towing, None)
+        self.disconnect_trailer(name)
         if actor.present:
             actor.leave_world()
             if self.commands.spawns.pop(name, None) is None:
@@ -248,15 +255,25 @@ class ActionContext(ConditionContext):
     def connect_trailer(self, name: str, trailer: str) -> None:
         """Connect a trailer to an actor, in place of its present one; the actions that control the trailer end."""
         if self.actors[name].trailer != trailer:
-            disconnect(self.actors, name)
+            self.disconnect_trailer(name)
         towing = towing_vehicle(self.actors, trailer)
         if towing is not None:
-            self.actors[towing].set_trailer(None)
-        self.actors[name].set_trailer(trailer)
+            self._set_trailer(towing, None)
+        self._set_trailer(name, trailer)
 
     def disconnect_trailer(self, name: str) -> None:
         """Disconnect the trailer of an actor, which stops at its position."""
-        disconnect(self.actors, name)
+        trailer = self.actors.get(self.actors[name].trailer or "")
+        self._set_trailer(name, None)
+        if trailer is not None and trailer.present:
+            trailer.motion.set_speed(0.0)
+            trailer.motion.snap_to_lane()
+
+    def _set_trailer(self, name: str, trailer: str | None) -> None:
+        actor = self.actors[name]
+        if actor.trailer is not None:
+            self.parting.add(frozenset((name, actor.trailer)))
+        actor.set_trailer(trailer)
 
     @property
     def background_traffic(self) -> BackgroundTraffic:

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
+from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
@@ -14,6 +15,11 @@ from eidrive_scenario.storyboard.context.contexts import ActionContext, Controll
 from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import MOTION, Domain
 from eidrive_scenario.world.view import WorldView
+
+
+def _overlaps(view: WorldView, name: str, other: str) -> bool:
+    """Return whether the boxes of two actors overlap; False if one of them is absent."""
+    return name in view and other in view and overlap(*view.boxes[[view.row(name), view.row(other)]])
 
 
 class PreemptableAction(Protocol):
@@ -58,6 +64,7 @@ class RuntimeContext(ActionContext, ControllerContext):
             self.external_poses.update(external_poses)
         self.commands = Commands()
         self.progress.begin(view.tick, view.time)
+        self.parting = {pair for pair in self.parting if _overlaps(view, *pair)}
         moved: set[MotionChange] = set()
         rows, states = view.rows, view.states
         for name, actor in self.actors.items():

@@ -178,10 +178,8 @@ def trailers_behind(actors: Mapping[str, Actor], name: str) -> list[str]:
     return behind
 
 
-def disconnect(actors: Mapping[str, Actor], name: str) -> None:
-    """Disconnect the trailer of an actor, which stops at its position."""
-    trailer = actors.get(actors[name].trailer or "")
-    actors[name].set_trailer(None)
-    if trailer is not None and trailer.present:
-        trailer.motion.set_speed(0.0)
-        trailer.motion.snap_to_lane()
+def road_train(actors: Mapping[str, Actor], name: str) -> list[str]:
+    """Return the names of the road train of an actor from front to end: vehicles that tow it, itself and trailers."""
+    while (front := towing_vehicle(actors, name)) is not None:
+        name = front
+    return [name, *trailers_behind(actors, name)]
