@@ -139,7 +139,7 @@ class RunLog:
         key = (change.kind, change.element)
         if self._paths.setdefault(key, change.path) != change.path:
             self._ambiguous.add(key)
-        parent = change.path.rpartition("/")[0]
+        parent = change.path.removesuffix(change.element).removesuffix("/")
         suffix = f" (in {parent})" if parent and (key not in self._mentioned or key in self._ambiguous) else ""
         self._mentioned.add(key)
         return f"{kind} {change.element}{suffix}"

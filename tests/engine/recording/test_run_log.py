@@ -69,6 +69,11 @@ def test_run_log_of_equal_names_adds_parents(lines: Lines) -> None:
     ]
 
 
+def test_run_log_of_names_with_slashes_keeps_them(lines: Lines) -> None:
+    turn = StateChange(1.0, "left/right", "s/a/g/m/left/right", "event", STANDBY, START, RUNNING)
+    assert lines((turn,)) == ["    1.000 s  event left/right (in s/a/g/m) starts"]
+
+
 def test_run_log_of_skip_and_repetition_states_them(lines: Lines) -> None:
     assert lines(
         (change(1.0, "event", "e", SKIP, STANDBY, "other is running"),), (change(2.0, "event", "e", END, STANDBY),)
