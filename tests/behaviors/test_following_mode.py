@@ -101,6 +101,21 @@ def test_lane_step_in_follow_mode_takes_the_tire_time(scene: RunScene) -> None:
     assert played.when("action 0", "completeState") == pytest.approx(2.0 * math.sqrt(0.4), abs=0.05)
 
 
+@pytest.mark.element("LaneChangeAction")
+@pytest.mark.parametrize(("shape", "time"), [("cubic", 3), ("sinusoidal", 4), ("linear", 4), ("step", 0)])
+@pytest.mark.parametrize("start", [3.0, 6.0])
+def test_lane_change_in_follow_mode_while_the_speed_reverses(
+    scene: RunScene, shape: str, time: float, start: float
+) -> None:
+    """The lateral acceleration is at most the square of the speed times the largest curvature: 1.6 and 6.6 m/s²."""
+    steps = ("Ego", change(shape, time, "follow")), ("Ego", speed(-start, "linear", 2, "position"))
+    y = [row["Ego"].y for row in scene(8, *steps, ego=(-1, 300.0, start), dt=0.05).rows]
+    rates = [(after - before) / 0.05 for before, after in pairwise(y)]
+    bound = LARGEST_CURVATURE * start * start
+    assert max(abs(after - before) for before, after in pairwise(rates)) <= bound * 0.05 + 1e-6
+    assert min(y) == y[-1] == pytest.approx(-6.0)
+
+
 def test_request_within_the_limits_is_equal_in_both_modes(scene: RunScene) -> None:
     """A cubic lane change by 4 m in 4 s needs 6 · 4 / 16 m/s² = 1.5 m/s²; 5 m/s in 2 s need 2.5 m/s²."""
     actions: tuple[Callable[[str], str], ...] = (

@@ -10,7 +10,13 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, is_follow_mode, largest_curvature
+from eidrive_behaviors.actions.following import (
+    DelayWarning,
+    RateLimitedValue,
+    closing_rate,
+    is_follow_mode,
+    largest_curvature,
+)
 from eidrive_behaviors.actions.speed import describe_dynamics
 from eidrive_scenario.api.actions import (
     STEEPEST,
@@ -118,6 +124,7 @@ class LaneChangeAction(ActionBehaviour):
         if is_follow_mode(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
             self._limited_offset = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
+            self._speed = self.actor.motion.speed
 
     def _build_transition(self, start: float, target: float) -> TransitionProfile:
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
@@ -208,10 +215,21 @@ class LaneChangeAction(ActionBehaviour):
     def _limit_to_vehicle(self, limited: RateLimitedValue, wanted: float) -> float:
         vehicle, speed = self.actor.entity, self.actor.motion.speed
         assert isinstance(vehicle, model.Vehicle)
-        limited.up = limited.down = min(
-            largest_curvature(vehicle) * speed * speed, vehicle.performance.max_deceleration
-        )
-        limited.lowest, limited.highest = -abs(speed), abs(speed)
+        bound = min(largest_curvature(vehicle) * speed * speed, vehicle.performance.max_deceleration)
+        limited.up = limited.down = bound
+        limited.highest = STEEPEST * abs(speed)
+        limited.lowest = -limited.highest
+        # A transition may end faster than the vehicle can follow, which does not overshoot its target
+        rest = self._transition.target - limited.value
+        closing = closing_rate(abs(rest), bound, self.context.dt)
+        if rest > 0.0:
+            limited.highest = min(limited.highest, closing)
+        else:
+            limited.lowest = max(limited.lowest, -closing)
+        if abs(speed) < abs(self._speed) or speed * self._speed < 0.0:
+            # At the same angle to the lane the rate of a slower vehicle is lower
+            limited.rate *= max(speed / self._speed, -1.0)
+        self._speed = speed
         return limited.advance(wanted, self.context.dt)
 
     def _target_lane(self, here: LaneLocation) -> int:
