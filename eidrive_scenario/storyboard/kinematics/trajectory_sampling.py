@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import Literal
 
@@ -20,6 +20,8 @@ SPACING = 0.1
 """Distance between samples of curved shapes [m]."""
 MAX_POINTS = 20_000
 """Maximum number of samples of a curve, besides one per segment; beyond 2 km their distance is larger."""
+CLOSED = 1e-3
+"""Maximum distance between start and end of a closed trajectory without a closing line [m]."""
 
 Resolve = Callable[[model.Position], Pose]
 """Returns the current pose of a position."""
@@ -210,11 +212,36 @@ def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pos
     if isinstance(shape, model.Polyline):
         return _polyline(shape, trajectory.closed, resolve)
     if isinstance(shape, model.Clothoid):
-        return _clothoid(shape, trajectory.closed, resolve)
-    if isinstance(shape, model.ClothoidSpline):
-        return _clothoid_spline(shape, trajectory.closed, resolve, start)
-    assert isinstance(shape, model.Nurbs)
-    return _nurbs(shape, trajectory.closed, resolve)
+        curve = _clothoid(shape, trajectory.closed, resolve)
+    elif isinstance(shape, model.ClothoidSpline):
+        curve = _clothoid_spline(shape, trajectory.closed, resolve, start)
+    else:
+        assert isinstance(shape, model.Nurbs)
+        curve = _nurbs(shape, trajectory.closed, resolve)
+    return _with_closing_line(curve) if trajectory.closed else curve
+
+
+def _with_closing_line(curve: TrajectoryCurve) -> TrajectoryCurve:
+    """Return a closed curve with a line from its end to its start, covered at the mean speed of the curve.
+
+    The heading turns at both ends of the line. A curve that ends at its start has no line.
+    """
+    first, last = curve.poses[0], curve.poses[-1]
+    dx, dy, dz = first.x - last.x, first.y - last.y, first.z - last.z
+    gap = math.hypot(dx, dy)
+    if gap <= CLOSED or curve.length == 0.0:
+        return curve
+    h, p, turn = math.atan2(dy, dx), -math.atan2(dz, gap), min(ROUNDING / gap, 0.5)
+    shares = sorted({turn, 1.0 - turn})
+    line = [Pose(last.x + part * dx, last.y + part * dy, last.z + part * dz, h, p, 0.0) for part in shares]
+    ways = [gap * part for part in (*shares, 1.0)]
+    times = curve.times
+    if times is not None:
+        pause = (times[-1] - times[0]) / curve.length
+        times = (*times, *(times[-1] + way * pause for way in ways))
+    s = (*curve.s, *(curve.length + way for way in ways))
+    tangents = (*curve.tangents, *(h for _ in shares), curve.tangents[0])
+    return replace(curve, s=s, poses=(*curve.poses, *line, first), times=times, tangents=tangents)
 
 
 @dataclass(frozen=True)
@@ -235,7 +262,7 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Trajecto
     times = [vertex.time for vertex in shape.vertex]
     first, last = vertices[0].pose, vertices[-1].pose
     gap = math.hypot(first.x - last.x, first.y - last.y)
-    if closed and gap > 1e-3:
+    if closed and gap > CLOSED:
         vertices.append(vertices[0])
         instants = _times(times)
         length = sum(math.hypot(b.pose.x - a.pose.x, b.pose.y - a.pose.y) for a, b in pairwise(vertices)) - gap

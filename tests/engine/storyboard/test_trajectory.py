@@ -99,6 +99,20 @@ def test_clothoid_turns_by_its_mean_curvature() -> None:
     assert way.at_time(2.0) == pytest.approx(10.0)
 
 
+def test_closed_clothoid_returns_to_its_start_by_a_line() -> None:
+    """The half circle of radius 10 m ends at (0, 20) in 10 s; the line of 20 m down is covered at its mean speed."""
+    shape = model.Clothoid(
+        curvature=0.1, curvature_prime=0.0, length=10.0 * math.pi, start_time=0.0, stop_time=10.0, position=at(0, 0, 0.0)
+    )
+    way = sample_trajectory(trajectory(True, clothoid=shape), resolve)
+    assert way.length == pytest.approx(10.0 * math.pi + 20.0, abs=1e-3)
+    assert way.at(10.0 * math.pi + 10.0)[:4] == pytest.approx((0.0, 10.0, 0.0, -math.pi / 2), abs=1e-3)
+    assert way.at(-1.0)[:2] == pytest.approx((0.0, 1.0), abs=1e-3)
+    assert way.tangent(10.0 * math.pi + 10.0) == pytest.approx(-math.pi / 2, abs=1e-4)
+    assert way.times is not None
+    assert way.times[-1] == pytest.approx(10.0 + 20.0 / math.pi, abs=1e-3)
+
+
 @pytest.mark.element("ClothoidSpline")
 def test_clothoid_spline_segments_are_continuous() -> None:
     pieces = (
