@@ -102,7 +102,12 @@ def test_clothoid_turns_by_its_mean_curvature() -> None:
 def test_closed_clothoid_returns_to_its_start_by_a_line() -> None:
     """The half circle of radius 10 m ends at (0, 20) in 10 s; the line of 20 m down is covered at its mean speed."""
     shape = model.Clothoid(
-        curvature=0.1, curvature_prime=0.0, length=10.0 * math.pi, start_time=0.0, stop_time=10.0, position=at(0, 0, 0.0)
+        length=10.0 * math.pi,
+        curvature=0.1,
+        curvature_prime=0.0,
+        position=at(0, 0, 0.0),
+        start_time=0.0,
+        stop_time=10.0,
     )
     way = sample_trajectory(trajectory(True, clothoid=shape), resolve)
     assert way.length == pytest.approx(10.0 * math.pi + 20.0, abs=1e-3)
