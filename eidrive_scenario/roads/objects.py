@@ -19,13 +19,18 @@ LONGEST_PART = 5.0
 
 
 class PlacedObject(NamedTuple):
-    """One object in the world: pose of its base; length, width and height [m], 0 if the map omits them."""
+    """One object in the world: pose of its base; length, width and height [m], 0 if the map omits them.
+
+    shift  distance along s and t by which a repetition moves the outlines of the object [m]; None for a part of an
+           object that repeats without gaps: it has the cross section of its width and height
+    """
 
     object: RoadObject
     pose: Pose
     length: float
     width: float
     height: float
+    shift: tuple[float, float] | None = (0.0, 0.0)
 
 
 def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
@@ -44,36 +49,36 @@ def crosswalks(network: RoadNetwork) -> tuple[Array, ...]:
     """Return the outlines of all crosswalks as polygons (M, 3)."""
     return tuple(
         outline
-        for road_object in network.objects
-        if road_object.type == "crosswalk"
-        for outline in outlines(network, road_object)
+        for placed in placed_objects(network)
+        if placed.object.type == "crosswalk"
+        for outline in outlines(network, placed)
     )
 
 
-def outlines(network: RoadNetwork, road_object: RoadObject) -> list[Array]:
+def outlines(network: RoadNetwork, placed: PlacedObject) -> list[Array]:
     """Return the outlines of an object on the ground as polygons (M, 3), by default from its length and width."""
-    if road_object.outlines:
-        return [_corners(network, road_object, outline) for outline in road_object.outlines]
-    if road_object.length <= 0.0 or road_object.width <= 0.0:
+    if placed.object.outlines and placed.shift is not None:
+        return [_corners(network, placed, outline) for outline in placed.object.outlines]
+    if placed.length <= 0.0 or placed.width <= 0.0:
         return []
-    x, y = 0.5 * road_object.length, 0.5 * road_object.width
+    x, y = 0.5 * placed.length, 0.5 * placed.width
     rectangle = tuple(Corner(False, a * x, b * y, 0.0, 0.0) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
-    return [_corners(network, road_object, rectangle)]
+    return [_corners(network, placed, rectangle)]
 
 
-def lines(network: RoadNetwork, road_object: RoadObject) -> list[Array]:
+def lines(network: RoadNetwork, placed: PlacedObject) -> list[Array]:
     """Return the linear features of an object on the ground as lines (M, 3)."""
-    return [_corners(network, road_object, line) for line in road_object.lines]
+    return [] if placed.shift is None else [_corners(network, placed, line) for line in placed.object.lines]
 
 
-def _corners(network: RoadNetwork, road_object: RoadObject, outline: tuple[Corner, ...]) -> Array:
-    pose = _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset)
+def _corners(network: RoadNetwork, placed: PlacedObject, outline: tuple[Corner, ...]) -> Array:
+    pose, road, (ds, dt) = placed.pose, placed.object.road, placed.shift or (0.0, 0.0)
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     points = []
     for corner in outline:
         if corner.on_road:
-            s = min(max(corner.x, 0.0), network.roads[road_object.road].length)
-            corner_pose = network.road_pose_at(road_object.road, s, corner.y)
+            s = min(max(corner.x + ds, 0.0), network.roads[road].length)
+            corner_pose = network.road_pose_at(road, s, corner.y + dt)
             x, y, z, *_ = corner_pose
         else:
             x, y, z = pose.x + cos * corner.x - sin * corner.y, pose.y + sin * corner.x + cos * corner.y, pose.z
@@ -104,13 +109,15 @@ def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedO
             width, height, length, radius = (a + (b - a) * share for a, b in ends)
             length, width = 2.0 * radius or length or road_object.length, 2.0 * radius or width or road_object.width
             pose = _pose_in_repetition(network, road_object, repeat, ds)
+            shift = repeat.s + ds - road_object.s, repeat.t[0] + (repeat.t[1] - repeat.t[0]) * share - road_object.t
             if gapless:
                 # Parts meet at their ends also on bends, and where t changes.
                 start, end = (_pose_in_repetition(network, road_object, repeat, x * part) for x in (i, i + 1))
                 dx, dy = end.x - start.x, end.y - start.y
                 length = math.hypot(dx, dy)
                 pose = pose._replace(x=start.x + 0.5 * dx, y=start.y + 0.5 * dy, h=math.atan2(dy, dx))
-            yield PlacedObject(road_object, pose, length, width, height or road_object.height)
+            height = height or road_object.height
+            yield PlacedObject(road_object, pose, length, width, height, None if gapless else shift)
 
 
 def _pose_in_repetition(network: RoadNetwork, road_object: RoadObject, repeat: Repeat, ds: float) -> Pose:

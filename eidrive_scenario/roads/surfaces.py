@@ -14,7 +14,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road, RoadMark
 from eidrive_scenario.roads.network import RoadNetwork
-from eidrive_scenario.roads.objects import outlines
+from eidrive_scenario.roads.objects import outlines, placed_objects
 
 KINDS = {
     "driving": (0.22, 0.22, 0.24),
@@ -308,10 +308,10 @@ def _edge(road: Road, section: LaneSection, lane: Lane, s: Array) -> Array:
 
 def painted_areas(network: RoadNetwork) -> Iterator[Array]:
     """Yield painted areas among the objects as convex polygons (M, 3). Crosswalks are split into stripes."""
-    for road_object in network.objects:
-        if road_object.type in ("crosswalk", "roadMark"):
-            for outline in outlines(network, road_object):
-                yield from _stripes(outline) if road_object.type == "crosswalk" else (outline,)
+    for placed in placed_objects(network):
+        if placed.object.type in ("crosswalk", "roadMark"):
+            for outline in outlines(network, placed):
+                yield from _stripes(outline) if placed.object.type == "crosswalk" else (outline,)
 
 
 def _stripes(outline: Array) -> Iterator[Array]:

@@ -217,14 +217,13 @@ def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, floa
     It is the box around its outlines, or a wall along each edge of an outline that covers too little of that box, and a
     wall along each part of a linear feature.
     """
-    road_object = placed.object
-    if road_object.repeats or not (road_object.outlines or road_object.lines):
+    if placed.shift is None or not (placed.object.outlines or placed.object.lines):
         return [(placed.pose, placed.length, placed.width)]
-    walls = [wall for line in lines(roads, road_object) for wall in _walls(line)]
-    if not road_object.outlines:
+    walls = [wall for line in lines(roads, placed) for wall in _walls(line)]
+    if not placed.object.outlines:
         return walls
     box = bounding_box(roads, placed)
-    polygons = outlines(roads, road_object)
+    polygons = outlines(roads, placed)
     if len(polygons) == 1 and len(polygons[0]) > CONVEX and _area(polygons[0]) < FILLED * box[1] * box[2]:
         return [*walls, *_walls(np.concatenate([polygons[0], polygons[0][:1]]))]
     return [*walls, box]
@@ -249,7 +248,7 @@ def bounding_box(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float,
     """Return the box around the outlines of an object: pose of the center of its base, length and width [m]."""
     pose = placed.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
-    offset = np.concatenate(outlines(roads, placed.object))[:, :2] - (pose.x, pose.y)
+    offset = np.concatenate(outlines(roads, placed))[:, :2] - (pose.x, pose.y)
     corners = np.stack([cos * offset[:, 0] + sin * offset[:, 1], cos * offset[:, 1] - sin * offset[:, 0]], axis=1)
     low, high = corners.min(axis=0), corners.max(axis=0)
     ahead, aside = ((low + high) / 2).tolist()

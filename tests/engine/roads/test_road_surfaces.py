@@ -69,7 +69,7 @@ def test_crosswalk_is_striped_and_curb_is_raised(library: Path) -> None:
     meshes = by_kind(network)
     assert meshes["sidewalk"].vertices[:, 2] == pytest.approx(0.12)
     assert set(np.round(meshes["curb"].vertices[:, 2], 6)) == {0.0, 0.12}
-    crosswalk = next(item for item in network.objects if item.type == "crosswalk" and item.road == "3")
+    crosswalk = next(p for p in placed_objects(network) if p.object.type == "crosswalk" and p.object.road == "3")
     (ground,) = outlines(network, crosswalk)
     assert ground[:, 1].min() == pytest.approx(24.3)
     assert ground[:, 1].max() == pytest.approx(27.3)

@@ -9,6 +9,7 @@ import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
 
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.objects import crosswalks
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies, signal_heads
@@ -80,6 +81,22 @@ def test_outline_determines_position_and_size() -> None:
     corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2)))
     piece = only(f'type="obstacle" s="50" t="-10" zOffset="0"><outline>{corners}</outline>')
     assert (piece.pose.x, piece.pose.y, piece.length, piece.width, piece.height) == (53.0, -9.0, 6.0, 2.0, 1.2)
+
+
+LOCAL = [f'<cornerLocal u="{u}" v="{v}" z="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2))]
+ON_ROAD = [f'<cornerRoad s="{50 + u}" t="{v - 10}" dz="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2))]
+
+
+@pytest.mark.parametrize("corners", [LOCAL, ON_ROAD])
+def test_outline_is_moved_by_each_repetition(corners: list[str]) -> None:
+    """The outline of 6 x 2 m begins at the object, which is repeated at s = 60, 70 and 80, t = -10, -11 and -12."""
+    repeat = '<repeat s="60" length="20" distance="10" tStart="-10" tEnd="-12"/>'
+    text = f'type="obstacle" s="50" t="-10" zOffset="0">{repeat}<outline>{"".join(corners)}</outline>'
+    pieces = [(body.pose.x, body.pose.y, body.length, body.width) for body in road_object_bodies(network(text))]
+    assert pieces == [pytest.approx(piece) for piece in ((63, -9, 6, 2), (73, -10, 6, 2), (83, -11, 6, 2))]
+    crossings = crosswalks(network(text.replace("obstacle", "crosswalk")))
+    centers = [outline.mean(axis=0)[:2].tolist() for outline in crossings]
+    assert centers == [pytest.approx(center) for center in ((63, -9), (73, -10), (83, -11))]
 
 
 def test_open_outline_is_a_wall_along_its_line() -> None:
