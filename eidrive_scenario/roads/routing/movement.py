@@ -63,7 +63,7 @@ class Movement:
             if remaining <= 0.0 and (inside or s < section.end):
                 break
             following = self._next_lane(
-                road, section, lane, direction, with_traffic, offset, route=route, choose=choose, visit=visit
+                road, section, lane, direction, with_traffic, route=route, choose=choose, visit=visit
             )
             if following is None and (remaining <= 0.0 or to_end):
                 if not inside:
@@ -122,7 +122,6 @@ class Movement:
         lane: Lane,
         direction: int,
         with_traffic: bool,
-        offset: float,
         *,
         route: Route | None,
         choose: BranchSelector | None,
@@ -132,8 +131,7 @@ class Movement:
         key = LaneKey(road.id, section.index, lane.id)
         branches = self.branches(key, direction, with_traffic)
         if not branches:
-            beside = self._beside_end(road, section, lane, direction, offset)
-            return None if beside is None else (beside[0], direction, beside[1])
+            return self._beside_end(road, section, lane, direction)
         if len(branches) == 1:
             return branches[0].lane, branches[0].direction, 0.0
         chosen: Branch | None = None
@@ -163,27 +161,37 @@ class Movement:
         return road.reference.at(ahead).h if direction > 0 else road.reference.at(road.length - ahead).h + math.pi
 
     def _beside_end(
-        self, road: Road, section: LaneSection, lane: Lane, direction: int, offset: float
-    ) -> tuple[LaneKey, float] | None:
-        """Return the nearest lane of the same direction beside the end of a lane, and the change of offset.
+        self, road: Road, section: LaneSection, lane: Lane, direction: int
+    ) -> tuple[LaneKey, int, float] | None:
+        """Return the nearest lane of the same direction beside the end of a lane, in the next section or the only next
+        road, the direction in it, and the change of offset.
 
         The result is None if the road ends as well.
         """
-        index = section.index + direction
+        index, following, heading_on = section.index + direction, road, direction
+        s = s_there = section.end if direction > 0 else section.s
+        t = lane_t(road, section, lane, s)[0]
         if not 0 <= index < len(road.sections):
-            return None
-        other = road.sections[index]
-        s = section.end if direction > 0 else section.s
-        center = lane_t(road, section, lane, s)[0]
+            linked = list(self._links.beyond_road(road.id, direction))
+            if len(linked) != 1:
+                return None
+            following, heading_on = self._roads[linked[0][0]], linked[0][1]
+            index = 0 if heading_on > 0 else len(following.sections) - 1
+            s_there = 0.0 if heading_on > 0 else following.length
+            here, there = road.reference.at(s), following.reference.at(s_there)
+            x, y = here.x - there.x - t * math.sin(here.h), here.y - there.y + t * math.cos(here.h)
+            t = y * math.cos(there.h) - x * math.sin(there.h)
+        other = following.sections[index]
         choices = [
-            (abs(lane_t(road, other, candidate, s)[0] - center), number)
+            (abs(lane_t(following, other, candidate, s_there)[0] - t), number)
             for number, candidate in other.lanes.items()
-            if candidate.side == lane.side and candidate.drivable == lane.drivable
+            if candidate.side * heading_on == lane.side * direction and candidate.drivable == lane.drivable
         ]
         if not choices:
             return None
         number = min(choices)[1]
-        return LaneKey(road.id, index, number), center - lane_t(road, other, other.lanes[number], s)[0]
+        shift = t - lane_t(following, other, other.lanes[number], s_there)[0]
+        return LaneKey(following.id, index, number), heading_on, shift
 
 
 def _default_branch(branches: Sequence[Branch], road: Road) -> Branch:

@@ -170,6 +170,22 @@ def test_advance_at_lane_end_continues_on_adjacent_lane() -> None:
     assert (moved.lane, moved.s, moved.offset, moved.t) == pytest.approx((-1, 45.0, -3.0, -4.5))
 
 
+@pytest.mark.parametrize("head_on", [False, True])
+def test_advance_at_lane_end_continues_on_nearest_lane_of_the_next_road(head_on: bool) -> None:
+    """Lane -2 has no link, and its center is 4.5 m right of the axis; on road b the lanes of its direction end at 3 m.
+
+    With opposite reference lines they are on the left of the axis of b.
+    """
+    contact, x, hdg = ("end", 200.0, math.pi) if head_on else ("start", 100.0, 0.0)
+    a = road_xml("a", lanes=section_xml(lane(1), lane(-1) + lane(-2)), link=successor_xml("b", contact))
+    b = road_xml("b", x=x, hdg=hdg, lanes=section_xml(lane(1), lane(-1)))
+    network = RoadNetwork.parse(map_xml(a, b))
+    beyond = network.advance(network.location("a", -2, 90.0, 0.25), 30.0)
+    assert beyond is not None
+    assert beyond == pytest.approx(("b", 1, 80.0, 2.75, 4.25) if head_on else ("b", -1, 20.0, -2.75, -4.25))
+    assert network.pose(beyond)[:2] == pytest.approx((120.0, -4.25))
+
+
 def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it() -> None:
     """Lane -1 ends at s = 40 without a lane beside it. Lane 1 starts there, where its traffic leaves it."""
     both = section_xml(right=lane(-1)) + section_xml(lane(1), "", s=40.0)
