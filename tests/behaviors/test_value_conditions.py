@@ -55,6 +55,30 @@ def test_parameter_condition_refers_to_the_innermost_declaration(tmp_path: Path)
     assert begun == {"own 1": [], "own 2": [0.0], "own 3": [], "own 7": [pytest.approx(0.55)], "entry": [0.0]}
 
 
+@pytest.mark.element("ParameterSetAction")
+def test_parameter_action_sets_the_innermost_declaration_only(tmp_path: Path) -> None:
+    """The parameter of the scenario, and that of another story, keep their values."""
+
+    def story(name: str, declarations: str, *values: str) -> str:
+        events = "".join(event_xml(f"{name} {value}", NOTHING, when_parameter_is(value)) for value in values)
+        changed = {"own": "7", "outer": "8"}.get(name)
+        if changed is not None:
+            action = f'<ParameterAction parameterRef="Level"><SetAction value="{changed}"/></ParameterAction>'
+            events += event_xml(f"set {name}", global_xml(action), trigger_xml(condition_xml(time_xml(0.5))))
+        return f'<Story name="{name}">{declarations}{act_xml(group_xml(maneuver_xml(events)))}</Story>'
+
+    declared = {value: parameters_xml(Level=("double", value)) for value in "123"}
+    stories = (
+        story("own", declared["2"], "7", "8") + story("outer", "", "7", "8") + story("other", declared["3"], "7", "8")
+    )
+    path = tmp_path / "s.xosc"
+    path.write_bytes(scenario_xml(declarations=declared["1"], story=stories))
+    record = RecordedRun()
+    Simulation(load_scenario(path), settings=RunSettings(time_limit=1.0), observers=[record]).run()
+    begun = {name for name in ("own 7", "own 8", "outer 7", "outer 8", "other 7", "other 8") if record.begun(name)}
+    assert begun == {"own 7", "outer 8"}
+
+
 @pytest.mark.parametrize(
     ("text", "rule", "limit", "expected"),
     [

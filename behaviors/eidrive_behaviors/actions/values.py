@@ -35,10 +35,11 @@ class ValueAction(ActionBehaviour):
 
     def set_value(self, value: str) -> None:
         """Set the value."""
-        if self.kind == "parameter":
-            self.context.set_parameter(self.ref, value)
+        parent = self.parent_element
+        if isinstance(parent, model.ParameterAction):
+            self.context.set_parameter(parent, value)
         else:
-            self.context.set_variable(self.ref, value)
+            self.context.set_variable(parent.variable_ref, value)
 
 
 class SetAction(ValueAction):

@@ -120,12 +120,11 @@ class Scope:
             scope = scope.outer
         raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
 
-    def text(self, name: str) -> str | None:
-        """Return the text of the parameter of a name; None if it is unknown."""
-        parameter = self.parameters.get(name)
-        if parameter is not None:
-            return parameter.text
-        return self.outer.text(name) if self.outer is not None else None
+    def declaring(self, name: str) -> Scope | None:
+        """Return the innermost scope that declares a parameter of a name; None if it is unknown."""
+        if name in self.parameters:
+            return self
+        return self.outer.declaring(name) if self.outer is not None else None
 
     def names(self) -> set[str]:
         """Return all visible names."""

@@ -15,6 +15,7 @@ import numpy as np
 from eidrive_scenario.base.requests import Override
 from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
 from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
@@ -36,6 +37,12 @@ E = TypeVar("E", bound=model.Element)
 
 MotionChange = str | tuple[str, str]
 """Change of the state of an entity, by its name, or of its speed, by its name and `speed`."""
+
+
+def declaring_scope(element: model.ParameterCondition | model.ParameterAction) -> Scope | None:
+    """Return the scope that declares the parameter of an element, the innermost one of its name; None if unknown."""
+    scope: Scope | None = element.scope
+    return None if scope is None else scope.declaring(element.parameter_ref)
 
 
 def speed_change(name: str) -> MotionChange:
@@ -93,7 +100,7 @@ class ConditionContext:
     dt           length of the step that begins now [s]; 0 in Init
     step         time step of the run [s]
     actors       all entities of the scenario by name, present or absent
-    parameters, variables  values by name, as text
+    variables    values by name, as text; `parameter` returns those of parameters
     user_values  user-defined values that are set, by name
     environment  time of day, weather and road condition
     signals      traffic signals and their controllers
@@ -110,7 +117,8 @@ class ConditionContext:
         self.seed = seed
         self.view = _empty_view()
         self.progress = ElementStates()
-        self.parameters: Mapping[str, str] = scenario.parameters
+        self.assigned_parameters: Mapping[tuple[int, str], str] = {}
+        """Values that actions have set, by the identity of the declaring scope and name."""
         self.variables: Mapping[str, str] = scenario.variables
         network = scenario.document.road_network
         self.signals = Signals(network.traffic_signals if network is not None else None, roads)
@@ -140,12 +148,10 @@ class ConditionContext:
         """Return the value of the parameter to which an element refers: that which an action has set, otherwise that of
         the scenario, story or maneuver that declares it. None if it is unknown.
         """
-        name = element.parameter_ref
-        value = self.parameters.get(name)
-        if element.scope is None or value != self.scenario.parameters.get(name):
-            return value
-        text: str | None = element.scope.text(name)
-        return text
+        name, scope = element.parameter_ref, declaring_scope(element)
+        if scope is None:
+            return None
+        return self.assigned_parameters.get((id(scope), name), scope.parameters[name].text)
 
     @property
     def time(self) -> float:
@@ -318,9 +324,10 @@ class ActionContext(ConditionContext):
         if self.traffic is not None:
             self.traffic.stop(name)
 
-    def set_parameter(self, name: str, value: str) -> None:
-        """Set the value of a parameter."""
-        self.parameters = {**self.parameters, name: value}
+    def set_parameter(self, element: model.ParameterAction, value: str) -> None:
+        """Set the value of the parameter to which an action refers."""
+        if (scope := declaring_scope(element)) is not None:
+            self.assigned_parameters = {**self.assigned_parameters, (id(scope), element.parameter_ref): value}
 
     def set_variable(self, name: str, value: str) -> None:
         """Set the value of a variable."""
