@@ -39,6 +39,7 @@ def check_road_map(
     for road in roads.values():
         yield from _jumps(road)
         yield from _tilts(road)
+        yield from _turned(road)
         for section in road.sections:
             for lane in section.lanes.values():
                 yield from _widths(road, section, lane)
@@ -52,6 +53,17 @@ def check_road_map(
     for junction in junctions.values():
         for connection in junction.connections:
             yield from _connection(roads, junction, connection)
+
+
+def _turned(road: Road) -> Iterator[MapWarning]:
+    """Yield the lanes for cars whose direction is not read, as it differs from that of their id."""
+    for section in road.sections:
+        for lane in section.lanes.values():
+            if lane.id and lane.drivable and road.own_direction(lane) != road.directions[lane.id]:
+                where = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
+                message = f"{where} has the direction of lane {lane.id} in an earlier section, not its own"
+                hint = "give lanes of opposite directions different ids, or split the road"
+                yield MapWarning(MapRule.LANE_DIRECTION, "such lanes", message, hint, lane.line)
 
 
 def _jumps(road: Road) -> Iterator[MapWarning]:

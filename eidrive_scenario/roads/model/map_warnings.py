@@ -26,6 +26,7 @@ class MapRule(Enum):
     LANE_WIDTH = "a lane with a missing, negative or implausible width"
     LANE_SIDE = "a lane on the wrong side of the center lane"
     EMPTY_LANE_SECTION = "a lane section with only the center lane"
+    LANE_DIRECTION = "a lane whose direction differs from that of its id in another lane section"
     LANE_LAYER = "a temporary layer of lanes, which is not read"
     ROAD_LINK = "a link to a missing junction, or to a point within a road"
     ROAD_SURFACE = "a cross section that is not read, or a superelevation that is too steep"

@@ -234,9 +234,13 @@ class Road:
         directions = {0: 1}
         lanes = [lane for section in self.sections for lane in section.lanes.values()]
         for lane in sorted(lanes, key=lambda lane: not lane.drivable):
-            usual = self._usual_direction(lane.id)
-            directions.setdefault(lane.id, -usual if lane.direction == "reversed" else usual)
+            directions.setdefault(lane.id, self.own_direction(lane))
         return directions
+
+    def own_direction(self, lane: Lane) -> int:
+        """Return the direction that a lane specifies: +1 along s, else -1. `both` has the usual one."""
+        usual = self._usual_direction(lane.id)
+        return -usual if lane.direction == "reversed" else usual
 
     def driving_direction(self, lane_id: int) -> int:
         """Return `directions` of a lane, also of one that the road does not have."""

@@ -174,6 +174,17 @@ def test_temporary_lanes_are_ignored_with_a_warning(temporary_first: bool) -> No
     assert map_warnings(text.replace(layers[0], "")) == []
 
 
+@pytest.mark.parametrize(("kind", "warnings"), [("driving", 1), ("sidewalk", 0)])
+def test_direction_that_changes_along_an_id_is_a_warning(kind: str, warnings: int) -> None:
+    """The direction of an id is that of its first lane for cars."""
+    turned = lane(-1).replace("<lane ", '<lane direction="reversed" ')
+    text = map_xml(road_xml("1", lanes=section(0, lane(-1, kind=kind)) + section(40, turned)))
+    message = (
+        "lane -1 of road '1' (section at s = 40 m) has the direction of lane -1 in an earlier section, not its own"
+    )
+    assert map_warnings(text).count(("lane-direction", message)) == len(map_warnings(text)) == warnings
+
+
 def test_invalid_connections_are_warnings() -> None:
     into = '<successor elementType="junction" elementId="9"/>'
     through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
