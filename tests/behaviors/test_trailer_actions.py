@@ -245,9 +245,11 @@ def test_connection_of_the_own_train_has_no_effect(run: Run) -> None:
 def test_connected_station_does_not_drive(run: Run) -> None:
     """Ego has no coupler: its reference point is at the hitch, 1 m behind that of the truck."""
     placed = global_xml(PLACE.format("Truck", 120))
-    played = run(
-        2, ("Truck", DRIVE), ("Truck", couple("Ego"), after(0.5)), ego=(-1, 100.0, 8.0), more=TRAIN, globally=placed
+    activate = private_xml(
+        '<ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/></ControllerAction>'
     )
+    steps = ("Truck", DRIVE), ("Truck", couple("Ego"), after(0.5)), ("Ego", activate, after(1.0))
+    played = run(2, *steps, ego=(-1, 100.0, 8.0), more=TRAIN, globally=placed)
     assert played.x("Ego")[15:] == pytest.approx([x - 1.0 for x in played.x("Truck")[15:]])
     assert played.of("Ego", "speed")[15:] == [10.0] * 26
 

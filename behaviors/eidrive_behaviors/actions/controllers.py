@@ -177,6 +177,8 @@ def _without_effect(behaviour: ActionBehaviour) -> Status:
 
 def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool | None) -> None:
     """Switch the domains of an actor's eidrive controller on or off; None keeps the state of a domain."""
+    if lateral or longitudinal:
+        behaviour.check_not_towed()
     actor = behaviour.actor
     before = actor.driven
     actor.activate_controller(lateral, longitudinal)

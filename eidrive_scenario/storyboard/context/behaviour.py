@@ -100,8 +100,12 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         if self.actor_name is not None and self.controls & MOTION:
             if self.is_actor_missing:
                 raise EntityAbsentError(self.actor_name)
-            if towing_vehicle(self.context.actors, self.actor_name) is not None:
-                raise EntityTowedError(self.actor_name)
+            self.check_not_towed()
+
+    def check_not_towed(self) -> None:
+        """Raise EntityTowedError if a towing vehicle moves the actor during the run."""
+        if self.context.dt > 0.0 and towing_vehicle(self.context.actors, self.actor.name) is not None:
+            raise EntityTowedError(self.actor.name)
 
     @property
     def resource(self) -> str:
