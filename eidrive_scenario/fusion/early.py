@@ -20,6 +20,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
 from eidrive_scenario.fusion.feature_warp import Grid
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.lidar.segmentation import is_of_surface
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.v2x.messages.message import Payload
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
@@ -67,7 +68,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
         """Return the points of all lidars of a station, whose readings are those of whole revolutions."""
         if not readings.lidars:
             return ()
-        points = np.concatenate([reading.world_points for reading in readings.lidars.values()])
+        points = np.concatenate([_surface_points(reading) for reading in readings.lidars.values()])
         duration = max(reading.duration for reading in readings.lidars.values())
         return (compress(points, readings.time, self.settings.cell, duration),)
 
@@ -85,7 +86,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
         if not readings.lidars or not self._received:
             return readings
         name, first = next(iter(readings.lidars.items()))
-        own = [reading.world_points for other, reading in readings.lidars.items() if other != name]
+        own = [_surface_points(reading) for other, reading in readings.lidars.items() if other != name]
         received = [points for _, (_, points) in sorted(self._received.items())]
         offset = np.concatenate([*own, *received]) - first.pose[:3, 3]
         points = np.concatenate([first.points, offset @ first.pose[:3, :3]])
@@ -102,3 +103,8 @@ class EarlyFusion(CovarianceIntersectionFusion):
         if features is not None and merged.any():
             merged &= Grid.of(features).cells(self._history.positions(rows))[1]
         return rows[~merged], ranks[~merged]
+
+
+def _surface_points(reading: LidarReading) -> Array:
+    """Return the points (N, 3) in the world without those of fog, rain and snow: a merged cloud has no intensity."""
+    return reading.world_points[is_of_surface(reading.points, reading.intensity)]

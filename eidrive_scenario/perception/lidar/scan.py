@@ -13,7 +13,7 @@ from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, Pattern
 from eidrive_scenario.perception.geometry.size_priors import LARGEST
 from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box
-from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, ground_height
+from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, ground_height, is_of_surface
 from eidrive_scenario.sensing.readings import LidarReading
 
 NEARER = 0.5
@@ -44,6 +44,7 @@ class Scan:
         ground = ground_height(points, foot)
         above = points[:, 2] - ground
         standing = (above > CLEARANCE) & (above < LARGEST[2] + OVERHEAD)
+        standing[standing] = is_of_surface(reading.points[standing], reading.intensity[standing])
         if keep is not None:
             standing[standing] = keep(self.frame.to_world(points[standing, :2]))
         self.points = points[standing]

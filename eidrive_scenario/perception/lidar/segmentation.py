@@ -1,4 +1,4 @@
-"""Segmentation of lidar points: points of the ground, and clusters of the others."""
+"""Segmentation of lidar points: points of the air and of the ground, and clusters of the others."""
 
 from __future__ import annotations
 
@@ -6,9 +6,32 @@ import math
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.base.randomness import generator
+
+FAINT, FAINT_NEAR = 0.03, 2.5e-4
+"""Intensity, and intensity over the square of the distance [1/m²], below which a point may be of the air. Fog with a
+visibility of 90 m returns less than 1.1e-4 with all but one ray in a thousand, in proportion to its density, and beyond
+10 m 0.03 or less with 98 %."""
+AIR, CLOSE, SEVERAL = 25.0, 5.0, 5
+"""Maximum distance of points of the air [m], and distance within which there are several of them if there are any [m]:
+the nearest fog and drops return most, and surfaces so near are not that faint."""
+
+
+def is_of_surface(points: Array, intensity: Array) -> Bools:
+    """Return which points (N, 3) in the frame of the sensor are of surfaces, and not of fog, rain or snow.
+
+    Returns of the air are near and faint (Park, Kim and Kim, Fast and accurate desnowing algorithm for LiDAR point
+    clouds, IEEE Access 8, 2020), but so are some of dark surfaces at grazing incidence. Therefore they are omitted only
+    if the air surrounds the sensor. If no intensity (N,) is measured, and all are 0, all points are of surfaces.
+    """
+    distance = np.linalg.norm(points, axis=1)
+    faint: Bools = (intensity < np.minimum(FAINT_NEAR * distance**2, FAINT)) & (distance < AIR)
+    if np.count_nonzero(faint & (distance < CLOSE)) < SEVERAL or not intensity.any():
+        return np.ones(len(points), dtype=bool)
+    return ~faint
+
 
 SECTORS = 24
 """Number of sectors around the sensor."""

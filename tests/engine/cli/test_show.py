@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from command_fixtures import Eidrive
@@ -196,7 +196,8 @@ def test_view_writes_page_beside_recording(eidrive: Eidrive, passing_by: Path, t
     assert result.exit_code == 0, result.output
     (page,) = tmp_path.rglob("recording.html")
     assert result.stdout.strip() == str(page)
-    verdict = html.fromstring(page.read_bytes()).get_element_by_id("verdict").text_content()
+    shown: Any = html.fromstring(page.read_bytes())
+    verdict = shown.get_element_by_id("verdict").text_content()
     assert "Ego and Parked came within 5.00 m (center to center) at 2.00 s, boxes within 3.00 mlimit 3.00 m" in verdict
 
 

@@ -15,6 +15,7 @@ from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.weather import Weather
 
 Size = tuple[float, float, float]
 CAR: Size = (4.892, 1.837, 1.49)
@@ -67,10 +68,15 @@ MAST = ActorSpec("Mast", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
 
 
 def readings(
-    things: list[Thing], sensors: Mapping[str, SensorSettings], *, mast: tuple[float, float, float] | None = None
+    things: list[Thing],
+    sensors: Mapping[str, SensorSettings],
+    *,
+    mast: tuple[float, float, float] | None = None,
+    weather: Weather | None = None,
 ) -> Readings:
     """Return the readings of the first object at time 0, or of a mast at x, y, yaw."""
     with World(None, dt=0.05, picture_maker=picture_maker) as world:
+        world.set_weather(weather or Weather())
         station = spec_of(things[0]) if mast is None else MAST
         if mast is not None:
             world.add(MAST, Placement(mast[0], mast[1], yaw=mast[2]))

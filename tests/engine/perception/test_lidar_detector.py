@@ -22,6 +22,8 @@ from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings, TruthSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.view import NOTHING
+from eidrive_scenario.world.weather import Weather
 
 CLEAN = LidarSettings(range_noise=0.0)
 
@@ -62,6 +64,39 @@ def test_detect_mixed_scene_returns_all_objects(street: Any, noise: float) -> No
     assert np.isnan(found.velocity).all()
     assert np.all((found.scores > 0.05) & (found.scores <= 1.0))
     assert np.all(np.linalg.eigvalsh(found.covariance) > 0.0)
+
+
+@pytest.mark.parametrize(
+    "weather",
+    [
+        Weather(visual_range=90.0),
+        Weather(visual_range=200.0),
+        Weather(precipitation="rain", precipitation_intensity=25.0, visual_range=2000.0),
+        Weather(precipitation="snow", precipitation_intensity=2.0, visual_range=1000.0),
+    ],
+    ids=["dense fog", "fog", "rain", "snow"],
+)
+def test_returns_of_the_air_are_no_objects(street: Any, weather: Weather) -> None:
+    """The air returns hundreds of rays; the cars and the pedestrian near the sensor are all that is detected."""
+    objects = [
+        street.thing("Ego", 0, 0),
+        street.thing("Ahead", 9, 0),
+        street.thing("Oncoming", 12, 4.5, math.pi),
+        street.thing("Walker", 7, -4, 0, "pedestrian"),
+    ]
+    readings = street.readings(objects, {"roof": LidarSettings()}, weather=weather)
+    assert np.count_nonzero(readings.lidars["roof"].rows == NOTHING) > 100
+    detections = detect(readings)
+    assert len(detections) == 3
+    for thing in objects[1:]:
+        assert detections.classes[nearest(detections, thing.box)] == thing.kind
+
+
+def test_points_without_intensity_are_detected(street: Any) -> None:
+    readings = street.readings([street.thing("Ego", 0, 0), street.thing("Ahead", 9, 0)], {"roof": CLEAN})
+    cloud = readings.lidars["roof"]
+    without = replace(readings, lidars={"roof": replace(cloud, intensity=np.zeros(len(cloud.points)))})
+    assert len(detect(without)) == len(detect(readings)) == 1
 
 
 @pytest.mark.parametrize("distance", [8.0, 16.0, 24.0, 32.0])
