@@ -15,7 +15,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, means
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.fusion.pairs import CAR_LENGTH, AssociationGate, Objects, Table, group_tracks
+from eidrive_scenario.fusion.pairs import AssociationGate, Objects, Table, group_tracks
 from eidrive_scenario.fusion.pose_alignment import PoseAligner
 from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, fuse_headings
 from eidrive_scenario.fusion.report_history import ReportHistory
@@ -173,7 +173,6 @@ def _fuse_objects(tracks: Table, objects: Objects, now: float, gate: float) -> D
     boxes[:, :2], boxes[:, 2:6] = mean[:, 0], body
     errors = np.trace(members["covariance"][:, :2, :2] + members["pose"], axis1=1, axis2=2)
     boxes[:, 6] = fuse_headings(members["heading"][:, 0], weights, errors, starts, velocity)
-    _cover_parts(boxes, members, starts)
     votes = members["votes"] / np.maximum(members["votes"].sum(axis=1, keepdims=True), 1e-12)
     words = np.argmax(np.add.reduceat(weights[:, None] * votes, starts, axis=0), axis=1)
     return Detections(
@@ -185,26 +184,6 @@ def _fuse_objects(tracks: Table, objects: Objects, now: float, gate: float) -> D
         covariance,
         existence=existence,
     )
-
-
-def _cover_parts(boxes: Array, members: Table, starts: Integers) -> None:
-    """Let the boxes (G, 7) of long vehicles cover those of all stations, each of which may show a part.
-
-    The mean of the boxes is kept if it is shorter by up to half a width, as boxes of whole vehicles differ.
-    """
-    length = members["body"][:, 1]
-    if len(starts) == len(members) or length.max() <= CAR_LENGTH:
-        return
-    counts = np.diff(starts, append=len(members))
-    cos, sin = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
-    x, y = (members["mean"][:, :2] - np.repeat(boxes[:, :2], counts, axis=0)).T
-    ahead = x * np.repeat(cos, counts) + y * np.repeat(sin, counts)
-    front, rear = np.maximum.reduceat(ahead + length / 2.0, starts), np.minimum.reduceat(ahead - length / 2.0, starts)
-    parts = (np.maximum.reduceat(length, starts) > CAR_LENGTH) & (front - rear > boxes[:, 3] + 0.5 * boxes[:, 4])
-    middle = (front + rear)[parts] / 2.0
-    boxes[parts, 0] += middle * cos[parts]
-    boxes[parts, 1] += middle * sin[parts]
-    boxes[parts, 3] = (front - rear)[parts]
 
 
 def _fuse_states(tracks: Table, objects: Objects, gate: float) -> tuple[Array, Array]:

@@ -23,10 +23,6 @@ One true pair in a hundred is outside a gate of 99 %, which would split objects 
 """
 LEVEL_TOLERANCE = 2.0
 """Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
-CAR_LENGTH = 5.0
-"""Length of a car [m], twice the distance within which the planner `behavior` recognizes an object."""
-ALIGNED = math.cos(math.pi / 6.0)
-"""Cosine of the maximum angle between the axes of two boxes that show parts of one vehicle."""
 _MAX_COORDINATE = 1e7
 """Maximum coordinate in the search by position [m], which rounding would affect beyond."""
 CERTAIN = -1e3
@@ -67,9 +63,7 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     Stations are distinct over all receiving stations if `same_station`, and those of one receiving station otherwise.
     Candidates are on one level, not on and below a bridge. They are within the gate, have the same object id of the
     station, or have centers within half a width of each other, because two bodies cannot overlap even if the
-    covariances are small. For the same reason, boxes of two stations that overlap by a width along a long vehicle are
-    candidates outside the gate: each station may see another part of it. The cost is the negative log-likelihood of the
-    offset without constants.
+    covariances are small. The cost is the negative log-likelihood of the offset without constants.
     """
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
@@ -109,28 +103,7 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
         inside |= certain
         cost[certain] = CERTAIN
     fits = inside | (~vague & (mahalanobis <= UNASSIGNED_GATE))
-    if not same_station:
-        long = np.flatnonzero(~fits & (np.maximum(own.length[rows], other.length[columns]) > CAR_LENGTH))
-        if len(long):
-            fits[long] = _overlap_along(first[rows[long]], second[columns[long]])
     return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
-
-
-def _overlap_along(first: Table, second: Table) -> NDArray[np.bool_]:
-    """Return whether boxes (N,) overlap by the width of the narrower one along the longer one.
-
-    Their axes are less than 30° apart, and the center of the shorter one is within the width of the longer one.
-    """
-    lengths, widths = (np.stack([first["body"][:, edge], second["body"][:, edge]]) for edge in (1, 2))
-    longer = np.argmax(lengths, axis=0)
-    own, other = first["heading"][:, 0], second["heading"][:, 0]
-    yaw = np.where(longer == 0, own, other)
-    x, y = (second["mean"][:, :2] - first["mean"][:, :2]).T
-    ahead, left = np.abs(x * np.cos(yaw) + y * np.sin(yaw)), np.abs(y * np.cos(yaw) - x * np.sin(yaw))
-    overlap = lengths.sum(axis=0) / 2.0 - ahead
-    beside = left > np.where(longer == 0, *widths) / 2.0
-    fits: NDArray[np.bool_] = (overlap >= widths.min(axis=0)) & ~beside & (np.abs(np.cos(own - other)) > ALIGNED)
-    return fits
 
 
 def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
@@ -191,7 +164,7 @@ def ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers,
 
 
 class _Side(NamedTuple):
-    """One side of the pairs, (N,) each: position, covariance, length, width, and whether the covariance is unknown.
+    """One side of the pairs, (N,) each: position, covariance, width, and whether the covariance is unknown.
 
     reach  maximum contribution of this side to the distance of a candidate pair [m]
     """
@@ -201,7 +174,6 @@ class _Side(NamedTuple):
     xx: Array
     xy: Array
     yy: Array
-    length: Array
     width: Array
     vague: NDArray[np.bool_]
     reach: Array
@@ -210,10 +182,10 @@ class _Side(NamedTuple):
     def of(cls, tracks: Table, gate: AssociationGate) -> _Side:
         mean, covariance, pose, vague = (tracks[name] for name in ("mean", "covariance", "pose", "vague"))
         xx, yy = covariance[:, 0, 0] + pose[:, 0, 0], covariance[:, 1, 1] + pose[:, 1, 1]
-        length, width = tracks["body"][:, 1], tracks["body"][:, 2]
+        width = tracks["body"][:, 2]
         statistical = math.sqrt(max(gate.chi_square, UNASSIGNED_GATE)) * np.sqrt(xx + yy)
-        reach = np.maximum(statistical, np.where(vague, gate.distance, np.maximum(width, length / 2.0)))
-        return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, length, width, vague, reach)
+        reach = np.maximum(statistical, np.where(vague, gate.distance, width))
+        return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, width, vague, reach)
 
 
 class Objects(NamedTuple):

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.geometry import wrap_angle
-from eidrive_scenario.fusion.pairs import CAR_LENGTH
 from eidrive_scenario.perception.tracking.motion_models import (
     ACCELERATION_DENSITY,
     HEADING_DEVIATION,
@@ -33,6 +32,8 @@ def predictable_time(deviation: float) -> float:
     return float(roots.real.max())  # the only positive root: the coefficients change their sign once
 
 
+CAR_LENGTH = 5.0
+"""Length of a car [m], twice the distance within which the planner `behavior` recognizes an object."""
 REPORT_LIFETIME = predictable_time(CAR_LENGTH)
 """Default maximum age of a report [s]: 2.28 s. The standard deviation that prediction adds is then the length of a car,
 and the predicted box of a car does not overlap with the car any more.

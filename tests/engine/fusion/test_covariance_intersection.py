@@ -62,35 +62,6 @@ def test_fuse_keeps_cars_on_and_below_a_bridge_separate(report: Make, fuse: Fuse
     assert len(fuse([above, below], 0.0)) == objects
 
 
-@pytest.mark.parametrize("yaw", [0.0, 2.0])
-@pytest.mark.parametrize("rear", [(28.1, 8.2), (30.0, 12.0)], ids=["rear", "whole"])
-def test_fuse_parts_of_a_bus_by_two_stations_returns_one_box(
-    report: Make, fuse: Fuse, yaw: float, rear: tuple[float, float]
-) -> None:
-    """A bus from 24 to 36 m along its axis: one station sees its front 7.4 m, the other its rear 8.2 m or all of it."""
-    axis = np.array([math.cos(yaw), math.sin(yaw)])
-    parts = [
-        report(name, 0.0, [tuple(middle * axis)], yaw=yaw, kind="bus", size=(length, 2.5, 3.0))
-        for name, (middle, length) in (("A", rear), ("B", (32.3, 7.4)))
-    ]
-    for fused in (fuse(parts, 0.0), fuse(parts[::-1], 0.0)):
-        np.testing.assert_allclose(fused.boxes[0, :2], 30.0 * axis, atol=1e-9)
-        assert fused.boxes[0, 3] == pytest.approx(12.0)
-        assert len(fused) == 1
-
-
-@pytest.mark.parametrize(
-    ("place", "yaw", "length"),
-    [((29.0, 0.0), 0.0, 8.0), ((23.0, 2.8), 0.0, 8.0), ((23.0, 0.0), 1.0, 8.0), ((22.5, 0.0), 0.0, 4.5)],
-    ids=["behind", "beside", "across", "cars"],
-)
-def test_fuse_keeps_other_vehicles_near_a_long_one_separate(
-    report: Make, fuse: Fuse, place: Place, yaw: float, length: float
-) -> None:
-    first = report("A", 0.0, [(20.0, 0.0)], kind="truck", size=(length, 2.0, 3.0))
-    assert len(fuse([first, report("B", 0.0, [place], yaw=yaw, kind="truck", size=(length, 2.0, 3.0))], 0.0)) == 2
-
-
 def test_fuse_keeps_distant_cars_separate(report: Make, fuse: Fuse) -> None:
     places = [(10.0, 0.0), (10.0, 3.0), (30.0, 0.0)]
     fused = fuse([report("A", 0.0, places), report("B", 0.0, places[:2])], 0.0)

@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.fusion import prediction
-from eidrive_scenario.fusion.pairs import CAR_LENGTH
-from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, predictable_time
+from eidrive_scenario.fusion.prediction import CAR_LENGTH, REPORT_LIFETIME, predictable_time
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, ConstantVelocity, Estimates
 
 STATE = np.array([[1.0, 2.0, 10.0, -3.0]])
