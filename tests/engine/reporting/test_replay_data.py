@@ -258,7 +258,7 @@ def test_content_of_messages_names_objects_and_other_parts() -> None:
     assert describe_content(sent_message((), kind="cam")) == "CAM, no objects"
     assert describe_content(sent_message(("car",), objects=(3,))) == "CPM, updates of car"
     full = sent_message(("bus",), points=cloud, sensors=(ViewSector(0.0, 0.0, 1.0, 0.0, 1.0, 50.0),))
-    assert describe_content(full) == "CPM, bus, sensor information, point cloud of 100 bytes"
+    assert describe_content(full) == "CPM, bus, sensor information, point cloud of 102 bytes"
     frame = FeatureFrame(
         0, 5, 1, 2, 0.1, 0.0, 0.0, 0.0, 1.8, 0.0, 0.8, (128, 128), "int8", 0.1, np.zeros((31, 10), np.uint8)
     )
