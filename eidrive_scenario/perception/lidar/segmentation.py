@@ -12,8 +12,8 @@ from eidrive_scenario.base.randomness import generator
 
 FAINT, FAINT_NEAR = 0.03, 2.5e-4
 """Intensity, and intensity over the square of the distance [1/m²], below which a point may be of the air. Fog with a
-visibility of 90 m returns less than 1.1e-4 with all but one ray in a thousand, in proportion to its density, and beyond
-10 m 0.03 or less with 98 %."""
+visibility of 90 m returns less than 1.1e-4 to all but one ray in a thousand, in proportion to its density; 98 % of the
+returns from beyond 10 m are below 0.03."""
 AIR, CLOSE, SEVERAL = 25.0, 5.0, 5
 """Maximum distance of points of the air [m], and distance within which there are several of them if there are any [m]:
 the nearest fog and drops return most, and surfaces so near are not that faint."""
