@@ -204,9 +204,9 @@ def test_concurrent_runs_write_consistent_results_and_recordings(tmp_path: Path)
     for late in (0.1, 0.2):
         assert f"delay: {{kind: constant, seconds: {late}}}" in text
     different = {json.dumps(result["settings"], sort_keys=True) for result in results(tmp_path)}
-    assert len(different) < len(folders)
     assert f"{len(different)} runs" in text
-    assert "a copy of another" in text or "copies of others" in text
+    # Equal runs have one folder if the second begins after the first has ended.
+    assert ("a copy of another" in text or "copies of others" in text) == (len(different) < len(folders))
 
 
 @pytest.mark.process
