@@ -101,8 +101,8 @@ class Timeline:
     """Intervals in which the elements of a storyboard were running, by path, in the order of their first start."""
 
     def __init__(self) -> None:
-        self._elements: dict[str, tuple[str, list[list[Any]]]] = {}
-        """Kind and intervals by path; an interval is [start, end or None, reason of the start, of the end]."""
+        self._elements: dict[str, tuple[str, str, list[list[Any]]]] = {}
+        """Name, kind and intervals by path; an interval is [start, end or None, reason of the start, of the end]."""
         self._changed: set[str] = set()
 
     def observe(self, changes: Iterable[StateChange]) -> None:
@@ -114,16 +114,16 @@ class Timeline:
             starts = change.after is ElementState.RUNNING and change.before is not ElementState.RUNNING
             ends = change.before is ElementState.RUNNING and change.after is not ElementState.RUNNING
             if starts:
-                _, intervals = self._elements.setdefault(change.path, (change.kind, []))
+                *_, intervals = self._elements.setdefault(change.path, (change.element, change.kind, []))
                 intervals.append([time, None, change.why, ""])
                 self._changed.add(change.path)
             elif ends and change.path in self._elements:
-                _, intervals = self._elements[change.path]
+                *_, intervals = self._elements[change.path]
                 intervals[-1][1], intervals[-1][3] = time, change.why
                 self._changed.add(change.path)
 
     def take(self) -> list[list[Any]]:
-        """Return [path, kind, intervals] of each element with a change since the last call."""
+        """Return [path, name, kind, intervals] of each element with a change since the last call."""
         changed, self._changed = self._changed, set()
         return [[path, *self._elements[path]] for path in self._elements if path in changed] if changed else []
 
@@ -267,7 +267,7 @@ def replay_data(
                A box is [x, y, l, w, yaw, h], with the probability of existence as seventh entry if it is estimated,
                None otherwise if more entries follow
     messages   see `MessageList`; timeline  see `Timeline`; series, contact, decisive  see `SeriesBuilder`
-    changes    [time, path, after, why] of the storyboard transitions
+    changes    [time, path, name, after, why] of the storyboard transitions
     contacts   [time, name, other name, relative speed at the impact [m/s]] of all contacts
 
     For `report`, `settings`, `models` and `light` see `ReplayBuilder`; by default, models are those of categories, and
@@ -354,7 +354,7 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
         "poses": [poses],
         "stations": {name: _station(snapshots[name]) if name in frame.steps else None for name in builders},
         "changes": [
-            [round(change.time, 4), change.path, change.after.value.removesuffix("State"), change.why]
+            [round(change.time, 4), change.path, change.element, change.after.value.removesuffix("State"), change.why]
             for change in frame.changes
             if change.transition is not None and math.isfinite(change.time)
         ],
@@ -381,7 +381,7 @@ def _raised(view: WorldView) -> dict[str, list[float]]:
 def _size(part: Mapping[str, Any]) -> int:
     """Return the approximate size of the data of one frame in the page [bytes]."""
     poses = sum(40 + len(name) for name in part["poses"][0])
-    changes = sum(len(path) + len(why) for _, path, _, why in part["changes"])
+    changes = sum(len(path) + len(name) + len(why) for _, path, name, _, why in part["changes"])
     contacts = sum(40 + len(first) + len(second) for _, first, second, _ in part["contacts"])
     return 40 + poses + changes + contacts + sum(map(_station_size, part["stations"].values()))
 

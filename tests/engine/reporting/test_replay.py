@@ -88,7 +88,7 @@ def test_replay_data_lists_storyboard_transitions(street: Play) -> None:
     )
     frame = street(1)[0]
     data = replay_data([Frame(frame.view, frame.steps, (change,))])
-    assert data["changes"] == [[0.0, "S/A/Go", "running", "time > 0"]]
+    assert data["changes"] == [[0.0, "S/A/Go", "Go", "running", "time > 0"]]
 
 
 def test_replay_page_contains_run_without_external_resources(street: Play, tmp_path: Path) -> None:

@@ -39,10 +39,10 @@ QUANTILE = 5.991464547107979
 """95 % quantile of the chi-squared distribution with two degrees of freedom."""
 
 
-def change(time: float, before: ElementState, after: ElementState, why: str = "", path: str = "S/Go") -> StateChange:
+def change(time: float, before: ElementState, after: ElementState, why: str = "", name: str = "Go") -> StateChange:
     started = after is ElementState.RUNNING
     transition = ElementTransition.START if started else ElementTransition.END
-    return StateChange(time, path.split("/")[-1], path, "event", before, transition, after, why)
+    return StateChange(time, name, f"S/{name}", "event", before, transition, after, why)
 
 
 def observe(frames: list[Frame]) -> SeriesBuilder:
@@ -314,10 +314,10 @@ def test_timeline_has_interval_per_execution_with_reasons() -> None:
     timeline.observe([change(1.0, ElementState.STANDBY, ElementState.RUNNING, "time > 1 s")])
     timeline.observe([change(2.0, ElementState.RUNNING, ElementState.STANDBY)])
     timeline.observe([change(3.0, ElementState.STANDBY, ElementState.RUNNING, "again")])
-    timeline.observe([change(4.0, ElementState.STANDBY, ElementState.RUNNING, "first", path="S/Late")])
+    timeline.observe([change(4.0, ElementState.STANDBY, ElementState.RUNNING, "first", name="On/Off")])
     assert timeline.take() == [
-        ["S/Go", "event", [[1.0, 2.0, "time > 1 s", ""], [3.0, None, "again", ""]]],
-        ["S/Late", "event", [[4.0, None, "first", ""]]],
+        ["S/Go", "Go", "event", [[1.0, 2.0, "time > 1 s", ""], [3.0, None, "again", ""]]],
+        ["S/On/Off", "On/Off", "event", [[4.0, None, "first", ""]]],
     ]
 
 

@@ -187,13 +187,13 @@ function grow() {
 let listed = 0, changeTimes = [];
 function addChanges() {
   const list = element("changes");
-  for (const [time, path, after, why] of data.changes.slice(listed)) {
+  for (const [time, path, name, after, why] of data.changes.slice(listed)) {
     if (changeTimes[changeTimes.length - 1] !== time) {
       changeTimes.push(time);
       make("summary", "", make("details", "", make("li", "", list, { className: "future" }))).onclick = () => seek(time);
       marked = -1;
     }
-    const details = list.lastElementChild.firstElementChild, line = make("p", `${path.split("/").pop()} → ${after}`, details, { title: path });
+    const details = list.lastElementChild.firstElementChild, line = make("p", `${name} → ${after}`, details, { title: path });
     if (why) make("span", why, line);
     const count = details.children.length - 1;
     details.open = count === 1;

@@ -96,7 +96,7 @@ function layTracks() {
     tracks.push(["contacts" + suffix, "contact", run.contacts.map(([time, first, second, speed]) =>
       [time, `${first} and ${second}` + (speed === null ? "" : ` at ${speed.toFixed(1)} m/s`)])]);
     tracks.push(["lost messages" + suffix, "lost", lost.map(([time, sender, receiver, , reason]) => [time, `${sender} → ${receiver}: ${reason}`])]);
-    tracks.push(["storyboard" + suffix, "change", run.changes.map(([time, path, after]) => [time, `${path.split("/").pop()} → ${after}`])]);
+    tracks.push(["storyboard" + suffix, "change", run.changes.map(([time, , name, after]) => [time, `${name} → ${after}`])]);
   }
   const layout = JSON.stringify([tracks, axis, plotWidth]);
   if (layout === laidTracks) return;
@@ -125,16 +125,18 @@ function addBar(track, label, text, kind, start) {
 
 const widthOf = (start, end) => `max(4px, ${percent(shareOf(end) - shareOf(start))})`;
 
+/* Levels of the storyboard below the stories, whose rows are indented. */
+const LEVELS = ["act", "maneuverGroup", "maneuver", "event", "action"];
+
 /* Return the elements of the storyboard as rows: an element whose intervals are those of the element in it joins its row. */
 function storyboardRows() {
   const rows = [];
-  for (const [path, kind, intervals] of data.timeline) {
+  for (const [path, name, kind, intervals] of data.timeline) {
     const before = rows[rows.length - 1], spans = JSON.stringify(intervals.map(([start, end]) => [start, end]));
-    const name = path.split("/").pop();
     if (before && path.startsWith(before.path + "/") && spans === before.spans) {
       before.names.push(name);
       Object.assign(before, { path, kind, intervals });
-    } else rows.push({ path, kind, intervals, spans, names: [name], depth: path.split("/").length - 1 });
+    } else rows.push({ path, kind, intervals, spans, names: [name], depth: LEVELS.indexOf(kind) + 1 });
   }
   return rows;
 }
@@ -160,7 +162,7 @@ function layRows(rows, hidden) {
   element("storyboard-title").hidden = !rows.length;
   for (const row of rows) {
     const track = addRow(parent, row.names.join(" › "), `${row.kind} ${row.path}`, "element");
-    track.previousSibling.style.paddingLeft = `${Math.min(row.depth, 6) * 8}px`;
+    track.previousSibling.style.paddingLeft = `${row.depth * 8}px`;
     for (const interval of row.intervals) {
       const [start, end] = interval, bar = addBar(track, "", textOf(row, interval), row.kind, start);
       if (end === null) openBars.push({ bar, start }); else bar.style.width = widthOf(start, end);
