@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from eidrive_scenario.base.content_digest import canonical_json
-from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.failures import WARNING, add_properties, record_of
 from eidrive_scenario.pytest_plugin.option_values import path_beside, split_channels
 from eidrive_scenario.pytest_plugin.options import (
@@ -135,15 +136,19 @@ def _run(
     settings.update(overrides)
     below = runs_folder(config)
     below = below and below.joinpath(*_subfolders(config, file))
-    result = run_and_save(
-        source,
-        seed=variant.seed,
-        settings=RunSettings(**settings),
-        below=below,
-        record=option_value(config, "record") or True,
-        wall_limit=limit,
-        command=_command(item, source),
-    )
+    try:
+        result = run_and_save(
+            source,
+            seed=variant.seed,
+            settings=RunSettings(**settings),
+            below=below,
+            record=option_value(config, "record") or True,
+            wall_limit=limit,
+            command=_command(item, source),
+        )
+    except InputError as error:
+        raise type(error)([_with_own_options(diagnostic) for diagnostic in error.diagnostics]) from None
+    result = replace(result, warnings=tuple(map(_rename_options, result.warnings)))
     if option_value(config, "without_criteria") == "pass":
         result = replace(result, warnings=tuple(text for text in result.warnings if text != UNJUDGED))
     if result.folder is not None:
@@ -153,6 +158,21 @@ def _run(
 
         result = replace(result, warnings=(*result.warnings, *add_topics(result.recording, topics)))
     return result
+
+
+_FLAGS = {option_of(option.setting).flag: option.flag for option in OPTIONS if option.setting}
+"""Options of pytest by those of `eidrive run`."""
+_FLAG = re.compile(rf"(?<![\w-])(?:{'|'.join(_FLAGS)})(?![\w-])")
+
+
+def _rename_options(text: str) -> str:
+    """Return a message of the engine with the options of pytest in place of those of `eidrive run`."""
+    return _FLAG.sub(lambda match: _FLAGS[match[0]], text)
+
+
+def _with_own_options(diagnostic: Diagnostic) -> Diagnostic:
+    message, hint, source = map(_rename_options, (diagnostic.message, diagnostic.hint, diagnostic.source))
+    return replace(diagnostic, message=message, hint=hint, source=source)
 
 
 def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, Any]:
