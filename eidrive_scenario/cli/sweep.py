@@ -44,7 +44,10 @@ REASONS = 3
 def sweep(
     settings: RunSettings,
     scenario: Annotated[str, typer.Argument(help="An .xosc file or a library name; all runs of a distribution.")],
-    store: Annotated[Path, typer.Option(help="SQLite file of results, which is continued.")],
+    store: Annotated[
+        Path | None,
+        typer.Option(help="SQLite file of results, which is continued.", show_default="required but for --dry-run"),
+    ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -121,7 +124,6 @@ def sweep(
 
     check_seconds("--wall-limit", wall_limit)
     check_record(record, out)
-    files = None if out is None else KeptFiles(out.absolute(), record or RecordMode.ALWAYS, store.absolute())
     path = resolve_scenario(scenario)
     check_output_paths({"--store": store, "--out": out}, [path, *settings.sources])
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
@@ -155,6 +157,9 @@ def sweep(
         if len(plan.points) > 10:
             echo(f"  and {len(plan.points) - 10} more")
         raise typer.Exit
+    if store is None:
+        raise SettingError(Diagnostic("--store is missing", "give the SQLite file of the results, or --dry-run"))
+    files = None if out is None else KeptFiles(out.absolute(), record or RecordMode.ALWAYS, store.absolute())
     if out is not None:
         check_writable(out)
     with interrupt_once(), ResultStore.open(store, package_versions()) as opened:

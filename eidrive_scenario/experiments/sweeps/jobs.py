@@ -341,7 +341,7 @@ def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:
         parameter = name.removeprefix(PARAMETER)
         if not is_setting(name) and parameter not in declared:
             text = f"--vary: unknown parameter or setting {parameter!r}"
-            raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *sorted(SETTINGS)])))
+            raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *SETTINGS, "--seeds"])))
 
 
 def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[int]:

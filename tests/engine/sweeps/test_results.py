@@ -150,6 +150,8 @@ def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -
         ),
         (("sweep", "no_such_scenario", "--store", "s.db"), "no_such_scenario"),
         (("sweep", "{scenario}", "--store", "{folder}"), "not a regular file"),
+        (("sweep", "{scenario}"), "--store is missing"),
+        (("sweep", "{scenario}", "--vary", "seed=1,2", "--dry-run"), "did you mean '--seeds'?"),
     ],
 )
 def test_invalid_commands_are_clear_errors(
@@ -166,8 +168,9 @@ def test_invalid_commands_are_clear_errors(
 
 
 def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
-    arguments = ("sweep", scenario, "--vary", "Speed=10,30", "--store", tmp_path / "s.db", "--workers", "1")
-    assert eidrive(*arguments, "--dry-run").stdout.splitlines() == [
+    runs = ("sweep", scenario, "--vary", "Speed=10,30")
+    arguments = (*runs, "--store", tmp_path / "s.db", "--workers", "1")
+    assert eidrive(*runs, "--dry-run").stdout.splitlines() == [
         f"2 runs of {scenario}: 2 combinations, 1 seeds each",
         "  Speed=10",
         "  Speed=30",
