@@ -69,9 +69,13 @@ def test_area_without_room_is_a_warning_with_its_line(run: Run, continuous: str)
     assert 1 <= int(found[2]) <= 2
 
 
-def test_swarm_with_room_is_no_warning(run: Run) -> None:
-    played = run(1.0, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm()))
+def test_swarm_below_its_maximum_number_is_no_warning(run: Run) -> None:
+    """A ring of 40 m on each side has no site for 500 cars, and one of no width has none at all."""
+    played = run(0.2, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm(500, reach=70)))
+    assert 0 < len(crowd(played, 0.1)) < 500
     assert not [text for text in played.result.warnings if "road users" in text]
+    played = run(0.2, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm(500, reach=30)))
+    assert [text for text in played.result.warnings if "at most 0 of 500 road users" in text]
 
 
 def test_swarm_velocity_is_the_initial_speed(run: Run) -> None:

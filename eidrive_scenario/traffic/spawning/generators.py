@@ -123,6 +123,11 @@ class Swarm(MaintainedTraffic):
     sectors: tuple[float, float, float, float] | None = None
     _filled: bool = field(default=False, init=False)
 
+    @property
+    def shortage(self) -> Diagnostic | None:
+        """Warning that no car found a site: `numberOfVehicles` is a maximum (ASAM OpenSCENARIO XML 1.3.1)."""
+        return None if self._most else super().shortage
+
     def step(self, population: Population) -> None:
         """Remove cars outside the ellipse and spawn missing ones."""
         center = population.center(self.center)
