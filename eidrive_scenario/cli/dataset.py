@@ -10,7 +10,6 @@ import typer
 
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, parse_seeds, takes_run_options
 from eidrive_scenario.cli.output import echo, print_warnings
-from eidrive_scenario.cli.supervision import interrupt_once
 from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError
 from eidrive_scenario.run_options import RunSettings
 
@@ -90,8 +89,7 @@ def dataset(
         sensors=None if sensors is None else read_sensors(sensors),
     )
     bar = console(stderr=True)
-    with interrupt_once():
-        runs = export_dataset(planned, workers=jobs, console=bar if bar.is_terminal else None, finished=_print)
+    runs = export_dataset(planned, workers=jobs, console=bar if bar.is_terminal else None, finished=_print)
     failed = sum(bool(run.error) and not run.is_excluded for run in runs)
     frames = sum(run.frames for run in runs)
     warned = Counter(warning for run in runs for warning in run.warnings)

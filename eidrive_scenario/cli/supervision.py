@@ -1,4 +1,4 @@
-"""Runs that do not end as they should: failures of `eidrive run`, `--wall-limit` in a child process, Ctrl-C."""
+"""Runs that do not end as they should: failures of `eidrive run`, `--wall-limit` in a child process."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import typer
@@ -158,25 +156,3 @@ class RunFailures:
         if notes := getattr(error, "__notes__", None):
             entry["notes"] = notes
         echo(json.dumps(entry, ensure_ascii=not has_all_characters()))
-
-
-@contextmanager
-def interrupt_once() -> Iterator[None]:
-    """Raise KeyboardInterrupt at the first Ctrl-C only, so that a second one does not interrupt the end of the block.
-
-    A command that ignores interruptions, such as a background job of a shell, continues to ignore them.
-    """
-    before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
-        yield
-        return
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -19,7 +19,6 @@ from eidrive_scenario.cli.options import (
     takes_run_options,
 )
 from eidrive_scenario.cli.output import echo, print_warnings
-from eidrive_scenario.cli.supervision import interrupt_once
 from eidrive_scenario.errors import ABORTED, NOT_JUDGED, PASSED, Diagnostic, SettingError
 from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import RunSettings, check_seconds
@@ -111,7 +110,7 @@ def sweep(
 
     from eidrive_scenario.base.content_digest import package_versions
     from eidrive_scenario.cli.sweep_search import ProgressDisplay, Search
-    from eidrive_scenario.experiments.repetitions import cores
+    from eidrive_scenario.experiments.repetitions import cores, interrupt_once
     from eidrive_scenario.experiments.run_folder import check_writable
     from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis, points_of, with_types
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TypeVar
+from types import FrameType
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -58,7 +61,7 @@ def run_jobs(
 
     `task` is a module-level function: function and result are pickled for other processes. `workers` defaults to the
     number of cores; 1 runs all jobs in this process. `console` shows a progress bar.
-    Raise the exceptions of the task, and SimulationError if a worker process dies.
+    Raise the exceptions of the task, SimulationError if a worker process dies, and KeyboardInterrupt also at SIGTERM.
     """
     workers = min(cores() if workers is None else workers, max(1, len(jobs)))
     if workers < 1:
@@ -80,9 +83,10 @@ def run_jobs(
             progress.advance(bar)
             return result
 
-        if workers == 1:
-            return tuple(end(task(job)) for job in jobs)
-        return _in_processes(jobs, task, workers, end)
+        with interrupt_once():
+            if workers == 1:
+                return tuple(end(task(job)) for job in jobs)
+            return _in_processes(jobs, task, workers, end)
 
 
 def end_with_parent() -> None:
@@ -102,6 +106,42 @@ def _start_worker() -> None:
     """Prepare a worker process: equal images of its runs are processed once, and it ends when its parent ends."""
     image_memory.activate(image_memory.ImageMemory())
     end_with_parent()
+
+
+_INTERRUPTIONS: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+"""Signals that interrupt a command, with their default handlers."""
+
+
+@contextmanager
+def interrupt_once() -> Iterator[None]:
+    """Raise KeyboardInterrupt at the first Ctrl-C or SIGTERM only: a second one does not interrupt the end of a block.
+
+    Signals without their default handler keep it: a background job of a shell continues to ignore Ctrl-C. Threads other
+    than the main one handle no signals.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    handled = [number for number, default in _INTERRUPTIONS.items() if is_main and signal.getsignal(number) is default]
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        for each in handled:
+            signal.signal(each, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    for number in handled:
+        signal.signal(number, interrupt)
+    try:
+        yield
+    finally:
+        for number in handled:
+            signal.signal(number, _INTERRUPTIONS[number])
+
+
+def terminate(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool and their calls, without waiting for them."""
+    # Executors have no method before Python 3.14 that ends a call in progress.
+    for process in list((getattr(pool, "_processes", None) or {}).values()):
+        with suppress(OSError, ValueError):
+            process.terminate()
 
 
 class JobQueue:
@@ -159,6 +199,10 @@ def _in_processes(jobs: Sequence[J], task: Callable[[J], T], workers: int, end: 
         return tuple(results[index] for index in range(len(jobs)))
     except BrokenProcessPool as error:
         raise SimulationError("a worker process died; run with one worker to see the error") from error
+    except BaseException:
+        for pool in pools:
+            terminate(pool)
+        raise
     finally:
         for pool in pools:
             pool.shutdown(wait=True, cancel_futures=True)

@@ -24,7 +24,7 @@ from eidrive_scenario.base.wall_limit import running_line
 from eidrive_scenario.errors import ConstraintError, InputError, OutputError, WallLimitError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.hung_runs import hang_of, report_hung_runs
-from eidrive_scenario.experiments.repetitions import end_with_parent
+from eidrive_scenario.experiments.repetitions import end_with_parent, terminate
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
 from eidrive_scenario.experiments.sweeps.store import (
@@ -222,10 +222,7 @@ class _Worker:
 
     def terminate(self) -> None:
         """End the process and its call, without waiting for it."""
-        # Executors have no method before Python 3.14 that ends a call in progress.
-        for process in list((getattr(self._pool, "_processes", None) or {}).values()):
-            with suppress(OSError, ValueError):
-                process.terminate()
+        terminate(self._pool)
 
     def shut_down(self, *, wait: bool) -> None:
         """Release the process once it has ended."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import io
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -82,8 +83,12 @@ def test_run_jobs_raises_error_of_task(tasks: ModuleType, workers: int) -> None:
 
 
 @pytest.mark.process
-def test_workers_of_a_killed_process_end(tmp_path: Path) -> None:
-    """Each worker writes its process number and sleeps; after the kill of their parent both end within seconds."""
+@pytest.mark.parametrize(("number", "leaks"), [(signal.SIGKILL, True), (signal.SIGTERM, False)])
+def test_workers_of_a_killed_process_end(tmp_path: Path, number: signal.Signals, leaks: bool) -> None:
+    """Each worker writes its process number and sleeps; after the end of their parent both end within seconds.
+
+    A terminated parent also releases their semaphores, of which Python would warn.
+    """
     code = (
         "if __name__ == '__main__':\n"
         "    import repetition_tasks\n"
@@ -94,12 +99,14 @@ def test_workers_of_a_killed_process_end(tmp_path: Path) -> None:
     )
     script = tmp_path / "parent.py"
     script.write_text(code)
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
-    with subprocess.Popen([sys.executable, str(script)], env=environment) as parent:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    with subprocess.Popen([sys.executable, str(script)], env=environment, stderr=subprocess.PIPE, text=True) as parent:
         wait_until(lambda: len(list(tmp_path.glob("*.pid"))) == 2)
         numbers = [int(path.stem) for path in tmp_path.glob("*.pid")]
         assert all(map(is_running, numbers))
-        parent.kill()
+        parent.send_signal(number)
+        err = parent.communicate()[1]  # up to the end of all processes
+    assert ("leaked semaphore" in err) is leaks
     wait_until(lambda: not any(map(is_running, numbers)))
 
 

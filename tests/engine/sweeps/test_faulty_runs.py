@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from command_fixtures import Eidrive, eidrive
 from sweep_workers import InProcess
 
 from eidrive_scenario.base.content_digest import package_versions
-from eidrive_scenario.cli.supervision import interrupt_once
+from eidrive_scenario.experiments.repetitions import interrupt_once
 from eidrive_scenario.experiments.sweeps.axes import parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
@@ -85,31 +85,28 @@ def test_interrupt_of_user_keeps_ended_runs(scenario: Path, tmp_path: Path) -> N
         assert [(run.point["Speed"], run.status) for run in store.runs()] == [(10, "passed")]
 
 
-@pytest.fixture
-def default_interrupt() -> Iterator[None]:
-    """Handler of SIGINT that raises KeyboardInterrupt; shells ignore the signal in processes of the background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.usefixtures("default_interrupt")
-def test_second_interrupt_does_not_interrupt_the_end() -> None:
-    before = signal.getsignal(signal.SIGINT)
+@pytest.mark.parametrize(
+    ("number", "default"), [(signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)]
+)
+def test_second_interrupt_does_not_interrupt_the_end(number: signal.Signals, default: signal._HANDLER) -> None:
+    before = signal.signal(number, default)  # shells ignore SIGINT in processes of the background
     ended = []
 
     def interrupted_twice() -> None:
         with interrupt_once():
             try:
-                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(number)
             finally:
-                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(number)
                 ended.append(True)
 
-    with pytest.raises(KeyboardInterrupt):
-        interrupted_twice()
-    assert ended == [True]
-    assert signal.getsignal(signal.SIGINT) is before
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted_twice()
+        assert ended == [True]
+        assert signal.getsignal(number) is default
+    finally:
+        signal.signal(number, before)
 
 
 def test_unwritable_folder_of_a_run_is_aborted_and_repeatable(scenario: Path, tmp_path: Path) -> None:
