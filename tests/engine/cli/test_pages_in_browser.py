@@ -175,6 +175,13 @@ def test_replay_is_controlled_by_keyboard(browser: Any, report: Path) -> None:
     for key, view in (("2", "follow"), ("3", "third"), ("4", "driver"), ("5", "orbit"), ("1", "top")):
         keys.press(key)
         assert page.page.input_value("#view") == view
+    page.page.locator("#layers input").first.focus()
+    keys.press("ArrowRight")
+    assert page.time() == pytest.approx(0.05)
+    page.page.locator("#slider").focus()
+    keys.press(" ")
+    assert page.page.inner_text("#play") == "Pause"
+    keys.press(" ")
     page.close("replay-keyboard")
 
 
@@ -358,6 +365,28 @@ def test_orbit_turns_moves_and_zooms_by_pointer(browser: Any, report: Path) -> N
     assert math.dist(after_move[2:4], after_turn[2:4]) == pytest.approx(math.hypot(60, 30) / first[4])
     assert after_zoom[4] == pytest.approx(first[4] * math.exp(240 / 600))
     page.close("replay-orbit", full=False)
+
+
+def test_top_view_is_moved_and_zoomed_by_fingers(browser: Any, report: Path) -> None:
+    """Fingers 100 px apart move to a distance of 150 px, and their middle moves by 25 px to the right."""
+    page = Page(browser, replay_of(report, "ideal"), WIDTHS["phone"], address="#t=3.9")
+    area, state = page.page.locator("#street").bounding_box(), "[topView.x, topView.y, topView.scale]"
+    x, y = area["x"] + 100, area["y"] + 100
+    page.page.evaluate("follow(false)")
+    states = [page.page.evaluate(state)]
+    devtools = page.page.context.new_cdp_session(page.page)
+    for ends in ([[(0, 0)], [(60, 30)]], [[(0, 0), (100, 0)], [(0, 0), (150, 0)]]):
+        for kind, points in zip(("touchStart", "touchMove"), ends, strict=True):
+            touched = [{"x": x + dx, "y": y + dy, "id": number} for number, (dx, dy) in enumerate(points)]
+            devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touched})
+        devtools.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        page.page.wait_for_timeout(50)
+        states.append(page.page.evaluate(state))
+    first, after_move, after_zoom = states
+    assert after_move == pytest.approx([first[0] - 60 / first[2], first[1] + 30 / first[2], first[2]])
+    scale = 1.5 * first[2]
+    assert after_zoom == pytest.approx([after_move[0] - 25 / scale, after_move[1], scale])
+    page.close("replay-fingers", full=False)
 
 
 NO_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, {

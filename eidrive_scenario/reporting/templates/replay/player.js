@@ -129,7 +129,7 @@ function selectView(view) {
   shown.view = view;
   element("view").value = view;
   canvas.setAttribute("aria-label", element("view").selectedOptions[0].textContent + " of the street");
-  for (const id of ["fit", "following"]) element(id).disabled = !["top", "orbit"].includes(view);
+  for (const id of ["fit", "following"]) element(id).disabled = !isMovable(view);
   draw();
 }
 
@@ -257,27 +257,14 @@ const KEYS = {
 });
 
 addEventListener("keydown", (event) => {
-  const tag = event.target.tagName;
+  const { tagName, type } = event.target;
   if (event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
-  if (tag === "SELECT" || (["INPUT", "BUTTON", "SUMMARY"].includes(tag) && (event.key === " " || tag === "INPUT"))) return;
+  // Keys that the focused control uses itself
+  if (tagName === "SELECT" || (event.key === " " && (type === "checkbox" || ["BUTTON", "SUMMARY"].includes(tagName)))) return;
   event.preventDefault();
   KEYS[event.key](event);
 });
-canvas.addEventListener("wheel", (event) => {
-  if (shown.view !== "top") return;
-  event.preventDefault();
-  hasMoved = true;
-  topView.scale = Math.max(0.05, Math.min(200, topView.scale * Math.exp(-event.deltaY / 600)));
-  draw();
-}, { passive: false });
 canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-canvas.addEventListener("pointermove", (event) => {
-  if (!event.buttons || shown.view !== "top") return;
-  hasMoved = true;
-  follow(false);
-  topView.x -= event.movementX / topView.scale; topView.y += event.movementY / topView.scale;
-  draw();
-});
 addEventListener("resize", () => { if (last >= 0) { layTime(); layMessages(); draw(); } });
 darkMode.addEventListener("change", () => { setColors(); laidLayers = ""; if (last >= 0) { layLayers(); layTime(); draw(); } });
 addEventListener("hashchange", () => { const time = fromAddress(); if (time !== null && time !== announced) seek(time); });

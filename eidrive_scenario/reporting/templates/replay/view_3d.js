@@ -10,6 +10,7 @@ const RISES = [-6, 0, 3, 7, 12, 18, 25, 35, 50, 70, 90];
 const SKY = 1500, SHADOWS = 70, MOST_SHADOWS = 250, UNLIMITED = 60;
 /* Maximum number of views from sensors in the list. */
 const MOST_CAMERAS = 60;
+const isMovable = (view) => ["top", "orbit"].includes(view);
 const isFree = (view) => view === "orbit" || view.startsWith("camera ");
 
 async function inflate(text) {
@@ -429,12 +430,13 @@ function draw() {
   if (shown.view === "top") { drawTop(); drawSectors(canvas.getBoundingClientRect()); } else if (!drawSpace()) drawPerspective();
 }
 
-/* Pointers on the street, by number: a drag turns the view; two pointers, the right button or shift move and zoom it. */
+/* Pointers on the street, by number: a drag moves the top view and turns others; two pointers move and zoom, the right
+   button and shift move. The top view is that from the south. */
 const pointers = new Map();
 function moveView(dx, dy) {
-  if (shown.view !== "orbit") return;
+  if (!isMovable(shown.view)) return;
   follow(false);
-  const [cos, sin] = [Math.cos(orbit.azimuth), Math.sin(orbit.azimuth)];
+  const azimuth = shown.view === "top" ? -Math.PI / 2 : orbit.azimuth, [cos, sin] = [Math.cos(azimuth), Math.sin(azimuth)];
   topView.x += (dx * sin - dy * cos) / topView.scale; topView.y += (-dx * cos - dy * sin) / topView.scale;
 }
 function turnView(dx, dy) {
@@ -443,14 +445,14 @@ function turnView(dx, dy) {
   view.elevation = limit(view.elevation - sign * dy / 200, shown.view === "orbit" ? 0.03 : -1.5, 1.55);
 }
 function zoomView(factor) {
-  if (shown.view === "orbit") topView.scale = limit(topView.scale * factor, 0.05, 200);
+  if (isMovable(shown.view)) topView.scale = limit(topView.scale * factor, 0.05, 200);
   else turned.zoom = limit(turned.zoom / factor, 0.3, 12);
 }
 canvas.addEventListener("pointerdown", (event) => pointers.set(event.pointerId, [event.clientX, event.clientY]));
 for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
 canvas.addEventListener("pointermove", (event) => {
   const before = pointers.get(event.pointerId);
-  if (!before || shown.view === "top" || last < 0) return;
+  if (!before || last < 0) return;
   const now = [event.clientX, event.clientY], [dx, dy] = now.map((value, axis) => value - before[axis]);
   const other = [...pointers].find(([number]) => number !== event.pointerId);
   pointers.set(event.pointerId, now);
@@ -459,11 +461,11 @@ canvas.addEventListener("pointermove", (event) => {
     const away = (point) => Math.max(Math.hypot(point[0] - other[1][0], point[1] - other[1][1]), 1);
     zoomView(away(now) / away(before));
     moveView(dx / 2, dy / 2);
-  } else if (event.buttons & 2 || event.shiftKey) moveView(dx, dy); else turnView(dx, dy);
+  } else if (shown.view === "top" || event.buttons & 2 || event.shiftKey) moveView(dx, dy); else turnView(dx, dy);
   draw();
 });
 canvas.addEventListener("wheel", (event) => {
-  if (shown.view === "top" || last < 0) return;
+  if (last < 0) return;
   event.preventDefault();
   hasMoved = true;
   zoomView(Math.exp(-event.deltaY / 600));
