@@ -195,32 +195,31 @@ def summaries(
 ) -> list[PointSummary]:
     """Return the runs by combination of values: numbers in ascending order, texts in the order of the runs.
 
-    by  names that distinguish combinations: axes, and parameters of a distribution; None: all axes, and the parameters
-        that have several values
+    by  names that distinguish combinations: axes, `scenario`, and parameters of a distribution; None: all axes, and the
+        others that have several values
 
     Raise SettingError for a name that no run has, or an unknown interval.
     """
     if interval not in INTERVALS:
         raise SettingError(Diagnostic(f"--interval: unknown interval {interval!r}", f"expected {', '.join(INTERVALS)}"))
     axes: dict[str, None] = {}
-    parameters: dict[str, set[Any]] = {}
+    others: dict[str, set[Any]] = {"scenario": set()}
     outcomes: list[tuple[dict[str, Any], str]] = []
     for run in runs:
         axes.update(dict.fromkeys(run.point))
-        varied = _varied_parameters(run)
+        varied = {"scenario": run.scenario, **_varied_parameters(run)}
         for name, value in varied.items():
-            parameters.setdefault(name, set()).add(value)
-        outcomes.append(({**run.point, **varied}, run.status))
-    names = dict.fromkeys([*axes, *parameters])
-    columns = [name for name in names if name in axes or len(parameters[name]) > 1] if by is None else by
+            others.setdefault(name, set()).add(value)
+        outcomes.append(({**varied, **run.point}, run.status))
+    names = dict.fromkeys(["scenario", *axes, *others])
+    columns = [name for name in names if name in axes or len(others[name]) > 1] if by is None else by
     groups: dict[tuple[tuple[str, Any], ...], dict[str, int]] = {}
     for values, status in outcomes:
         chosen = tuple((name, values[name]) for name in columns if name in values)
         groups.setdefault(chosen, dict.fromkeys(STATUSES, 0))[status] += 1
     unknown = [name for name in by or () if name not in names]
     if unknown:
-        hint = f"expected {', '.join(names)}" if names else "the runs vary by their seeds only"
-        raise SettingError(Diagnostic(f"--by: no axis {unknown[0]!r}", hint))
+        raise SettingError(Diagnostic(f"--by: no axis {unknown[0]!r}", f"expected {', '.join(names)}"))
     summarized = []
     key = _ranks(map(dict, groups))
     for point, counts in sorted(groups.items(), key=lambda group: key(dict(group[0]))):

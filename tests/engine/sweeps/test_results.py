@@ -57,6 +57,17 @@ def test_summaries_group_by_all_or_some_axes() -> None:
     assert summaries(RUNS, by=[])[0].rate == anytime_interval(2, 3)
 
 
+def test_summaries_distinguish_scenarios_of_several_stores() -> None:
+    other = replace(run(4, "failed", Speed=5, detector="ssd"), scenario="other")
+    rows = summaries([*RUNS, other], by=["scenario", "detector"])
+    assert [(row.point["scenario"], row.point["detector"], row.counts) for row in rows] == [
+        ("s", "oracle", {"passed": 2, "crashed": 1}),
+        ("s", "ssd", {"failed": 1}),
+        ("other", "ssd", {"failed": 1}),
+    ]
+    assert len(summaries([*RUNS, other])) == 4
+
+
 def test_summaries_are_sorted_by_value_whatever_the_order_of_the_runs() -> None:
     runs = [
         run(0, "passed", Speed=10, detector="ssd"),
