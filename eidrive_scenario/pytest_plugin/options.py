@@ -39,6 +39,8 @@ _SHOWN_LAST = ("seeds", "success_rate", "time_limit", "out", "record", "topics",
 _EXCLUSIVE = ("seeds", "success_rate")
 """Options of which one place gives at most one."""
 _EXCLUDE = " exclude each other (expected one of them)"
+_OF_FILES = ("record", "topics")
+"""Options that have an effect on kept files of runs only."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _INI = pytest.StashKey[dict[str, Any]]()
 """Parsed values of the ini options with a value, by name."""
@@ -176,6 +178,11 @@ def read_options(config: pytest.Config) -> None:
     config.stash[_INI] = {option.name: value for option in OPTIONS if (value := _ini_value(config, option)) is not None}
     config.stash[_GIVEN] = _given(config)
     _check_exclusive(config)
+    for name in _OF_FILES:
+        if command_line_value(config, name) is not None and runs_folder(config) is None:
+            raise pytest.UsageError(
+                f"--eidrive-{name} without --eidrive-out has no effect (expected --eidrive-out DIR)"
+            )
     if not hasattr(config, "workerinput"):  # its controller has checked them
         for option in OPTIONS:
             check_values(option.name, option.flag, command_line_value(config, option.name), Path())

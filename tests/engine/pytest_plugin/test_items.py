@@ -99,6 +99,15 @@ def test_topics_option_adds_topics_of_other_tools(project: pytest.Pytester) -> N
     wrong.stderr.fnmatch_lines(["*--eidrive-topics: not some of foxglove, osi (got 'rviz')*"])
 
 
+@pytest.mark.parametrize("option", [("--eidrive-record", "always"), ("--eidrive-topics", "osi")])
+def test_option_of_kept_files_without_their_folder_is_a_usage_error(
+    project: pytest.Pytester, option: tuple[str, str]
+) -> None:
+    done = project.runpytest_subprocess("xosc/far.xosc", *option)
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+    done.stderr.fnmatch_lines([f"*{option[0]} without --eidrive-out has no effect*"])
+
+
 @pytest.mark.process
 def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> None:
     def hashes(*arguments: str) -> dict[str, str]:
