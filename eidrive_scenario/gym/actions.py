@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.driving.step import OWN_DECISIONS, StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.gym.libraries import spaces
@@ -30,6 +30,7 @@ class ActionDecoder:
         self._actions = {action.kind: action for action in actions}
         self._max_steering = 0.0
         self._level = 0
+        self._mask: Bools = np.empty(0, dtype=bool)
         by_kind: dict[str, spaces.Space[Any]] = {action.kind: _space(action) for action in actions}
         self.space: spaces.Space[Any] = spaces.Dict(by_kind) if len(actions) > 1 else by_kind[actions[0].kind]
 
@@ -58,6 +59,14 @@ class ActionDecoder:
             decided = self._decode(action, given[kind], perceived, decided)
         return decided
 
+    def select_again(self, decided: StationAction, perceived: StationPerception) -> StationAction:
+        """Return the last decoded decisions for a later tick: shared objects are the nearest ones at that time."""
+        return decided if decided.share is None else replace(decided, share=self._shared_rows(perceived))
+
+    def _shared_rows(self, perceived: StationPerception) -> tuple[int, ...]:
+        rows = nearest_rows(perceived.detections, perceived.ego)
+        return tuple(row for row, chosen in zip(rows, self._mask, strict=False) if chosen)
+
     def _decode(
         self, action: ActionSettings, given: Any, perceived: StationPerception, decided: StationAction
     ) -> StationAction:
@@ -76,10 +85,8 @@ class ActionDecoder:
             return replace(decided, target_speed=action.speeds[self._level])
         if isinstance(action, SendMessages):
             return replace(decided, send=bool(_index(given, 2)))
-        mask = _mask(given, action.count)
-        rows = nearest_rows(perceived.detections, perceived.ego)
-        shared = tuple(row for row, chosen in zip(rows, mask, strict=False) if chosen)
-        return replace(decided, send=bool(mask.any()), share=shared)
+        self._mask = _mask(given, action.count)
+        return replace(decided, send=bool(self._mask.any()), share=self._shared_rows(perceived))
 
 
 def _space(action: ActionSettings) -> spaces.Space[Any]:
@@ -114,7 +121,7 @@ def _index(given: Any, count: int) -> int:
     return int(value.item())
 
 
-def _mask(given: Any, count: int) -> Array:
+def _mask(given: Any, count: int) -> Bools:
     """Return `count` truth values."""
     value = np.asarray(given)
     if value.shape != (count,) or not np.isin(value, (0, 1)).all():

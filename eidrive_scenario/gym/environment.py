@@ -223,15 +223,13 @@ class ScenarioEnvironment:
         if episode is None or not self.agents:
             raise SimulationError("the environment has no running episode; call reset")
         self._check_agents(actions)
-        acting, decided = self.agents, dict[str, StationAction]()
+        acting = self.agents
+        decoders = {name: self._interfaces[name].decoder for name in acting}
+        decided = {name: decoder.decode(actions[name], episode.perceived[name]) for name, decoder in decoders.items()}
 
         def decide(perceived: Mapping[str, StationPerception]) -> Mapping[str, StationAction]:
-            # The rows of shared objects belong to one tick: they are selected again in each.
             live = [name for name in acting if name in perceived and name not in self._left]
-            for name in live:
-                if name not in decided or decided[name].share is not None:
-                    decided[name] = self._interfaces[name].decoder.decode(actions[name], perceived[name])
-            return {name: decided[name] for name in live}
+            return {name: decoders[name].select_again(decided[name], perceived[name]) for name in live}
 
         terms: dict[str, list[dict[str, float]]] = {name: [] for name in acting}
         for _ in range(self._ticks_per_step):

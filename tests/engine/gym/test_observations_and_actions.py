@@ -109,12 +109,17 @@ def test_normalized_observation_is_that_in_si_units_by_its_bounds() -> None:
     assert in_units["tracks"][:, 0].sum() > 0
 
 
-def test_meta_speeds_move_along_their_list() -> None:
-    env = EidriveEnv(lone_car(30.0), action={"kind": "meta_speed", "speeds": [0.0, 3.0, 6.0]}, ticks_per_step=60)
+@pytest.mark.parametrize("messages", [{}, {"share": [1]}])
+def test_meta_speeds_move_along_their_list(messages: dict[str, Any]) -> None:
+    """By one entry per step, which lasts several ticks; also beside an action that concerns messages."""
+    drive = {"kind": "meta_speed", "speeds": [0.0, 3.0, 6.0]}
+    env = EidriveEnv(
+        lone_car(30.0), action=[drive, *({"kind": kind, "count": 1} for kind in messages)], ticks_per_step=60
+    )
     env.reset(seed=1)
     speeds = []
     for action in (2, 2, 2, 1, 0):
-        env.step(action)
+        env.step({"meta_speed": action, **messages} if messages else action)
         assert env._episode is not None
         speeds.append(float(env._episode.start.view.speed[0]))
     assert speeds == pytest.approx([3.0, 6.0, 6.0, 6.0, 3.0], abs=0.1)
