@@ -12,6 +12,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import equidistant
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.polynomials import Polynomials
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 
 
@@ -23,6 +24,10 @@ def angles(turn: Array) -> tuple[float, float, float]:
 
 SPACING = 2.0
 """Maximum distance between the points of a line [m]."""
+DEVIATION = 0.05
+"""Maximum distance of the true line from that between two points [m], as OSI demands of lanes and their boundaries."""
+SHORTEST = 0.1
+"""Length of an interval that is not halved [m]."""
 _MAX_POINTS = 400_000
 """Maximum number of points of all lines of a map, which increases the distance on large maps."""
 _MARKS: Mapping[str, str] = {
@@ -75,23 +80,46 @@ def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
 
 def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, spacing: float) -> Line:
     """Return the center line of a lane in the direction of s, with the height of the lane above the road."""
-    stations = equidistant(section.s, section.end, spacing)
-    aside = [lane.side * lane.center.value(s - section.s) + road.lane_offset_in(section, s)[0] for s in stations]
-    points = _line(roads, road, stations, aside)
+    stations, points = _line(roads, road, section, lane, lane.center, (section.s, section.end), spacing)
     return [[x, y, z + _height(lane, s - section.s)] for s, (x, y, z) in zip(stations, points, strict=True)]
 
 
 def edge_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, edge: LaneEdge, spacing: float) -> Line:
     """Return an outer edge of a lane on the surface of the road, in the direction of s."""
-    stations = equidistant(edge.start, edge.end, spacing)
-    aside = [lane.side * lane.outer.value(s - section.s) + road.lane_offset_in(section, s)[0] for s in stations]
-    return _line(roads, road, stations, aside)
+    return _line(roads, road, section, lane, lane.outer, (edge.start, edge.end), spacing)[1]
 
 
-def _line(roads: RoadNetwork, road: Road, stations: list[float], aside: list[float]) -> Line:
-    poses = roads.road_pose(road.id, stations, aside)
-    points: Line = np.column_stack([poses.x, poses.y, poses.z]).tolist()
-    return points
+def _line(
+    roads: RoadNetwork,
+    road: Road,
+    section: LaneSection,
+    lane: Lane,
+    distance: Polynomials,
+    ends: tuple[float, float],
+    spacing: float,
+) -> tuple[list[float], Line]:
+    """Return s and points of a line at a distance from the lane offset.
+
+    Intervals of `spacing` are halved where the line is farther than `DEVIATION` from the chord.
+    """
+
+    def points(stations: Array) -> Array:
+        aside = [lane.side * distance.value(s - section.s) + road.lane_offset_in(section, s)[0] for s in stations]
+        poses = roads.road_pose(road.id, stations, aside)
+        return np.column_stack([poses.x, poses.y, poses.z])
+
+    stations = np.array(equidistant(*ends, spacing))
+    line, fresh = points(stations), np.diff(stations) > 0.0
+    while fresh.any():
+        middle = 0.5 * (stations[1:] + stations[:-1])[fresh]
+        bent = points(middle)
+        away = np.linalg.norm(bent - 0.5 * (line[1:] + line[:-1])[fresh], axis=1)
+        added = (away > DEVIATION) & (np.diff(stations)[fresh] > SHORTEST)
+        at = np.flatnonzero(fresh)[added] + 1
+        stations, line = np.insert(stations, at, middle[added]), np.insert(line, at, bent[added], axis=0)
+        halves = np.isin(stations, middle[added])
+        fresh = halves[1:] | halves[:-1]
+    return stations.tolist(), line.tolist()
 
 
 def _height(lane: Lane, along: float) -> float:

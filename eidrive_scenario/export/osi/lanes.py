@@ -111,9 +111,7 @@ class LaneMap:
             classification.lane_pairing.add().successor_lane_id.value = self._ids.of("lane", *successor)
         for antecessor in before if ahead else after:
             classification.lane_pairing.add().antecessor_lane_id.value = self._ids.of("lane", *antecessor)
-        lane_message.source_reference.add(
-            type="net.asam.opendrive", identifier=[f"road_id:{road.id}", f"lane_id:{lane.id}", f"s:{section.s:g}"]
-        )
+        lane_message.source_reference.add(type="net.asam.opendrive", identifier=[road.id, str(section.s), str(lane.id)])
 
     def _add_boundary(self, message: Any, edge: LaneEdge, line: Line, number: int) -> None:
         kinds = self._osi.lane_boundary.Classification

@@ -29,6 +29,8 @@ VEHICLES: Mapping[str, str] = {
 """Types of vehicles by category."""
 _TOWED: Mapping[str, str] = {"trailer": "TYPE_TRAILER", "semitrailer": "TYPE_SEMITRAILER"}
 """Types of trailers by the vehicle category of OpenSCENARIO."""
+_ENTITIES: Mapping[str, str] = {"pedestrian": "Pedestrian", "misc": "MiscObject"}
+"""Types of the entities of OpenSCENARIO that are no vehicles, by category."""
 _GENERIC: Mapping[str, str] = {
     "lowBeam": "head_light",
     "highBeam": "high_beam",
@@ -72,7 +74,8 @@ def add_moving_objects(
         set_vector(base.velocity, velocity[row])
         set_vector(base.acceleration, acceleration[row])
         base.orientation_rate.yaw = float(view.yaw_rate[row])
-        moving_object.source_reference.add(type="net.asam.openscenario", identifier=[name])
+        entity = _ENTITIES.get(category, "Vehicle")
+        moving_object.source_reference.add(type="net.asam.openscenario", identifier=[entity, name])
         if row in lanes:
             moving_object.assigned_lane_id.add().value = lanes[row]
             moving_object.moving_object_classification.assigned_lane_id.add().value = lanes[row]
@@ -85,6 +88,8 @@ def add_moving_objects(
                 classification.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
             _set_axles(moving_object.vehicle_attributes, view.offset[row], run.axles.get(name))
             _set_lights(osi, classification.light_state, frame.appearances.get(name))
+        elif category == "pedestrian":
+            set_vector(moving_object.pedestrian_attributes.bbcenter_to_root, -view.offset[row])
 
 
 def _set_axles(attributes: Any, offset: Array, axles: AxleCenters | None) -> None:

@@ -102,11 +102,11 @@ class SensorDataBuilder:
             detected.base_rmse.position.x, detected.base_rmse.position.y = spread.tolist()
         reference = self._osi.detected.DetectedMovingObject.ReferencePoint
         detected.reference_point = reference.Value("REFERENCE_POINT_CENTER")
-        self._add_candidate(detected, objects.classes[row], float(objects.scores[row]))
+        self._add_candidate(detected, objects.classes[row])
 
-    def _add_candidate(self, detected: Any, category: str, score: float) -> None:
-        candidate = detected.candidate.add()
-        candidate.probability = min(max(score, 0.0), 1.0)
+    def _add_candidate(self, detected: Any, category: str) -> None:
+        """Add the only class, whose probability is 1: OSI states it given that the object exists."""
+        candidate = detected.candidate.add(probability=1.0)
         candidate.type = self._osi.moving_object.Type.Value(object_type(category))
         if category in VEHICLES:
             kind = self._osi.moving_object.VehicleClassification.Type

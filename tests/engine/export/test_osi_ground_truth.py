@@ -119,7 +119,7 @@ def test_identifiers_are_unique_and_stable(scenario_3: tuple[Path, Path]) -> Non
         numbers = [found.id.value for kind in kinds for found in kind]
         assert len(set(numbers)) == len(numbers)
         for found in truth.moving_object:
-            name = found.source_reference[0].identifier[0]
+            name = found.source_reference[0].identifier[1]
             assert by_name.setdefault(name, found.id.value) == found.id.value
         assert truth.host_vehicle_id.value == by_name["Ego"]
 
@@ -160,20 +160,27 @@ def test_velocity_of_turning_body_is_that_of_its_center(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("category", "kind", "vehicle"),
+    ("category", "kind", "entity", "vehicle"),
     [
-        ("car", "TYPE_VEHICLE", "TYPE_CAR"),
-        ("bicycle", "TYPE_VEHICLE", "TYPE_BICYCLE"),
-        ("truck", "TYPE_VEHICLE", "TYPE_HEAVY_TRUCK"),
-        ("pedestrian", "TYPE_PEDESTRIAN", None),
-        ("misc", "TYPE_OTHER", None),
+        ("car", "TYPE_VEHICLE", "Vehicle", "TYPE_CAR"),
+        ("bicycle", "TYPE_VEHICLE", "Vehicle", "TYPE_BICYCLE"),
+        ("truck", "TYPE_VEHICLE", "Vehicle", "TYPE_HEAVY_TRUCK"),
+        ("pedestrian", "TYPE_PEDESTRIAN", "Pedestrian", None),
+        ("misc", "TYPE_OTHER", "MiscObject", None),
     ],
 )
-def test_category_selects_type_of_object(tmp_path: Path, category: str, kind: str, vehicle: str | None) -> None:
+def test_category_selects_type_of_object(
+    tmp_path: Path, category: str, kind: str, entity: str, vehicle: str | None
+) -> None:
     (truth,) = exported(tmp_path, Frame(view({"A": {"category": category}})))
     (found,) = truth.moving_object
     assert type(found).Type.Name(found.type) == kind
     assert found.HasField("vehicle_classification") == (vehicle is not None)
+    # osi_object.proto: pedestrian_attributes are mandatory for pedestrians; the root is the reference point.
+    assert found.HasField("pedestrian_attributes") == (kind == "TYPE_PEDESTRIAN")
+    if kind == "TYPE_PEDESTRIAN":
+        assert vector(found.pedestrian_attributes.bbcenter_to_root) == pytest.approx([-1.4, 0.0, -0.75])
+    assert found.source_reference[0].identifier == [entity, "A"]
     if vehicle is not None:
         assert type(found).VehicleClassification.Type.Name(found.vehicle_classification.type) == vehicle
 
@@ -183,7 +190,7 @@ def test_host_vehicle_is_first_driven_station(tmp_path: Path) -> None:
     steps = {"Mast": step(detected(0.0, []), drives=False), "Driven": step(detected(0.0, []))}
     (truth,) = exported(tmp_path, Frame(view(bodies), steps))
     host = next(found for found in truth.moving_object if found.id.value == truth.host_vehicle_id.value)
-    assert host.source_reference[0].identifier == ["Driven"]
+    assert host.source_reference[0].identifier == ["Vehicle", "Driven"]
 
 
 def test_host_vehicle_may_enter_later(tmp_path: Path) -> None:
@@ -192,7 +199,7 @@ def test_host_vehicle_may_enter_later(tmp_path: Path) -> None:
     driven = Frame(view({"Car": {}, "Ego": {}, "Driven": {}}, tick=2), {"Driven": step(detected(0.2, []))})
     for frames, host in (([early], "Car"), ([early, late], "Ego"), ([early, late, driven], "Driven")):
         truths = exported(tmp_path, *frames)
-        last = {found.id.value: found.source_reference[0].identifier[0] for found in truths[-1].moving_object}
+        last = {found.id.value: found.source_reference[0].identifier[1] for found in truths[-1].moving_object}
         assert [last[truth.host_vehicle_id.value] for truth in truths] == [host] * len(frames)
 
 
@@ -257,7 +264,7 @@ def test_lanes_have_boundaries_on_both_sides(tmp_path: Path) -> None:
     }
     checked = 0
     for lane in first.lane:
-        name, number, start = (text.partition(":")[2] for text in lane.source_reference[0].identifier)
+        name, start, number = lane.source_reference[0].identifier
         data = lane.classification
         center = np.array([vector(point) for point in data.centerline])
         pose = network.lane_pose_at(name, int(number), float(start))
@@ -293,7 +300,7 @@ def test_actor_is_assigned_to_its_lane(tmp_path: Path) -> None:
     on_road, off_road = truth.moving_object
     (assigned,) = on_road.assigned_lane_id
     found = next(one for one in truth.lane if one.id.value == assigned.value)
-    assert found.source_reference[0].identifier[:2] == ["road_id:1", f"lane_id:{lane.id}"]
+    assert found.source_reference[0].identifier == ["1", "0.0", str(lane.id)]
     assert not off_road.assigned_lane_id
 
 

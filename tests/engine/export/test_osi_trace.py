@@ -47,6 +47,8 @@ def test_detections_are_in_the_frame_of_the_vehicle(tmp_path: Path) -> None:
     assert found.base.orientation.yaw == pytest.approx(np.pi / 2)
     assert (speed.x, speed.y) == pytest.approx((-5.0, 0.0))
     assert found.header.existence_probability == pytest.approx(0.9)
+    # "The sum of all probability must be one", given that the object exists (osi_detectedobject.proto).
+    assert [candidate.probability for candidate in found.candidate] == [1.0]
     assert found.header.tracking_id.value == 1
     assert message.sensor_id.value == found.header.sensor_id[0].value
 
