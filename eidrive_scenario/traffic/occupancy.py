@@ -77,7 +77,7 @@ class Occupancy:
         return concatenate_occupants(mine, self.foreign, self._ends)
 
     def leaders(self, cars: Cars, occupants: Occupants) -> Leaders:
-        """Return the leaders of all cars. During a lane change it is the nearer one of both lanes.
+        """Return the leaders of all cars. During a lane change it is that of both lanes which demands more braking.
 
         The end of a lane does not stop a car that is leaving this lane, as it leaves only while moving.
         """
@@ -87,8 +87,14 @@ class Occupancy:
             chain = self._lanes.chain(lane, PLANNED + 1)
             standing = occupants.without(FIXED)
             other = find_leaders(self._lanes, chain, cars.progress[still], cars.front[still], standing, own=still)
-            nearer = Leaders(leaders.gap[still], leaders.speed[still]).or_nearer(other)
-            leaders.gap[still], leaders.speed[still] = nearer.gap, nearer.speed
+            drivers, speed = cars.drivers.of_rows(still), cars.speed[still]
+            braking, other_braking = (
+                drivers.interaction(speed, gap, speed - leader_speed)
+                for gap, leader_speed in ((leaders.gap[still], leaders.speed[still]), (other.gap, other.speed))
+            )
+            stronger = other_braking > braking
+            binding = still[stronger]
+            leaders.gap[binding], leaders.speed[binding] = other.gap[stronger], other.speed[stronger]
         return Leaders(leaders.gap * self._lanes.stretch(cars.lane, cars.progress), leaders.speed)
 
     def _lanes_left(self, cars: Cars) -> tuple[Integers, Integers]:

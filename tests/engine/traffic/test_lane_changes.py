@@ -157,6 +157,19 @@ def test_lateral_path_is_a_quintic_of_stated_duration() -> None:
     assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
 
 
+def test_changing_car_brakes_for_the_standing_car_behind_a_faster_one_of_the_former_lane() -> None:
+    """By the model with v0 = 25 m/s, for a gap of 80 m in the new lane; that of 40 m in the former lane is no limit."""
+    roads = street()
+    fleet = queue(roads, LaneChanger(), leader_gap=100.0)
+    assert lane_after_one_step(fleet) == -1
+    x, v = float(fleet.places(["me"])[1][0]), fleet.speeds["me"]
+    fleet.add(car("fast"), roads.location("1", -2, x + BUMPERS + 40.0), speed=v)
+    fleet.add(car("standing"), roads.location("1", -1, x + BUMPERS + 80.0), desired_speed=0.0)
+    fleet.step(None, 0.05)
+    expected = 1.0 - (v / 25.0) ** 4 - ((2.0 + v + v * v / (2.0 * math.sqrt(1.5))) / 80.0) ** 2
+    assert (fleet.speeds["me"] - v) / 0.05 == pytest.approx(expected)
+
+
 @pytest.mark.statistical
 def test_dense_traffic_changes_lanes_without_contact() -> None:
     roads = street(right=3, length=3000.0)
