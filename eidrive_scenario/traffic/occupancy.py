@@ -21,6 +21,8 @@ from eidrive_scenario.world.view import WorldView
 
 STANDING = 0.5
 """Maximum speed of a standing actor [m/s]."""
+TALLEST = 4.0
+"""Maximum height of vehicles, above which actors do not occupy a lane [m]; Directive 96/53/EC."""
 OUTLINE = np.array(
     [(0.5, 0.5), (0.5, 0.0), (0.5, -0.5), (0.0, 0.5), (0.0, -0.5), (-0.5, 0.5), (-0.5, 0.0), (-0.5, -0.5)]
 )
@@ -123,7 +125,10 @@ def _considered(view: WorldView, own: frozenset[str], near: Array | None) -> Int
 
 
 def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Occupants, set[int]]:
-    """Return the outlines of actors on every lane that they overlap, and the lanes of moving ones."""
+    """Return the outlines of actors on every lane that they overlap, and the lanes of moving ones.
+
+    Actors above all vehicles, such as sign gantries, occupy none.
+    """
     if not rows:
         return no_occupants(), set()
     boxes = view.boxes[rows]
@@ -133,6 +138,9 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
     z = view.position[rows, 2].repeat(len(OUTLINE))
     lane, s, point = lanes.roads.overlapped_lanes(x, y, z)
+    base = boxes[point // len(OUTLINE), 2] - 0.5 * boxes[point // len(OUTLINE), 5]
+    in_the_way = base - lanes.tables.lane_poses(lane, s, np.zeros(len(lane))).z < TALLEST
+    lane, s, point = lane[in_the_way], s[in_the_way], point[in_the_way]
     progress = lanes.progress(lane, s)
     heading = lanes.tables.curves.heading(lanes.road[lane], s)
     vx, vy = view.velocity[rows, :2].T.take(point // len(OUTLINE), axis=1)

@@ -55,6 +55,14 @@ def test_obstacles_are_where_the_actors_are_in_every_view() -> None:
         assert bool(occupancy.moving) == (4.0 in speeds)
 
 
+def test_actor_above_the_tallest_vehicles_occupies_no_lane() -> None:
+    """Such as a sign gantry; vehicles are at most 4 m high (Directive 96/53/EC)."""
+    occupancy = Occupancy(TrafficLanes(street(1, 1)))
+    views = {"low": Placement(100.0, LANE, 3.9), "high": Placement(200.0, LANE, 4.1)}
+    occupancy.observe(view_of(views), frozenset())
+    assert places_of(occupancy) == pytest.approx(outline(100.0))
+
+
 def test_resting_actor_out_of_sight_is_ignored_until_a_car_is_near() -> None:
     occupancy = Occupancy(TrafficLanes(street(1, 1)))
     view = view_of({"a": parked(100.0), "far": parked(600.0)})
