@@ -43,7 +43,7 @@ def test_edges_of_lane_follow_its_road_marks(
     assert read_recording(tmp_path / "all.mcap").damage == ()
 
 
-def test_lines_of_a_tight_bend_are_at_most_5_cm_beside_the_lane() -> None:
+def test_lines_of_a_tight_bend_deviate_by_at_most_5_cm() -> None:
     """`centerline` of osi_lane.proto; on 8 turns of 2 m radius, with the center and the edge of the lane outside."""
     roads = RoadNetwork.parse(ROAD.format(shape='<arc curvature="0.5"/>', marks="").encode(), "road.xodr")
     road = roads.roads["1"]

@@ -157,7 +157,7 @@ def test_lateral_path_is_a_quintic_of_stated_duration() -> None:
     assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
 
 
-def test_changing_car_brakes_for_the_standing_car_behind_a_faster_one_of_the_former_lane() -> None:
+def test_changing_car_brakes_for_standing_car_beyond_a_nearer_faster_one() -> None:
     """By the model with v0 = 25 m/s, for a gap of 80 m in the new lane; that of 40 m in the former lane is no limit."""
     roads = street()
     fleet = queue(roads, LaneChanger(), leader_gap=100.0)
