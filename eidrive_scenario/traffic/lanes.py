@@ -10,6 +10,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.traffic.cars import PLANNED
 
 FREE = 13.9
 """Default desired speed on lanes without a limit [m/s]."""
@@ -156,6 +157,13 @@ class TrafficLanes:
             before = chain[:, d - 1]
             chain[:, d] = np.where(before >= 0, self.onward[before], -1)
         return chain
+
+    def to_junction(self, lane: Integers, progress: Array) -> Array:
+        """Return the distances (N,) to the next junction along first branches [m], inf beyond `PLANNED` lanes."""
+        chain = self.chain(lane, PLANNED + 1)
+        lengths = np.where(chain >= 0, self.length[chain], 0.0)
+        begins = np.cumsum(lengths, axis=1) - lengths - progress[:, None]
+        return np.asarray(np.where((chain >= 0) & self.in_junction[chain] & (begins > 0.0), begins, np.inf).min(axis=1))
 
     def stretch(self, lane: Integers, progress: Array) -> Array:
         """Return the path length per meter of progress at the center lines of lanes."""

@@ -69,6 +69,11 @@ class Participant:
         """True for a pedestrian."""
         return self.spec.category == "pedestrian"
 
+    @property
+    def front(self) -> float:
+        """Distance from the reference point to the front bumper [m]."""
+        return self.spec.offset[0] + 0.5 * self.spec.size[0]
+
 
 @dataclass(frozen=True)
 class WeightedChoice(Generic[T]):

@@ -13,7 +13,7 @@ from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import FREE
 from eidrive_scenario.traffic.right_of_way import MustStop
 from eidrive_scenario.traffic.spawning.bodies import WALKING, Participant
-from eidrive_scenario.traffic.spawning.sites import SpawnAreas, SpawnSites, is_unoccupied
+from eidrive_scenario.traffic.spawning.sites import SpawnAreas, SpawnSites, comfortable_speeds, is_unoccupied
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -128,11 +128,13 @@ class Population:
     ) -> bool:
         """Spawn a participant at the first free site in random order. Return False if no site is free.
 
-        speed        (K,) initial speed at each site [m/s]
+        speed        (K,) maximum initial speed at each site, reduced for leaders and junctions unless it is given [m/s]
         given_speed  initial speed that the scenario specifies, if any [m/s]
         """
         order = rng.permutation(len(sites))[:TRIES]
         some, speed = sites.subset(order), np.minimum(speed[order], participant.spec.max_speed)
+        if given_speed is None:
+            speed = np.minimum(speed, comfortable_speeds(self.fleet, some, participant))
         at = np.flatnonzero(is_unoccupied(self.fleet, some, participant, speed, self._foreign))
         if not at.size:
             return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,8 @@ from eidrive_scenario.roads.routing.links import RoadEnd
 from eidrive_scenario.traffic.cars import PLANNED
 from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.leaders import FOREIGN, find_followers, find_leaders
+from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, find_followers, find_leaders
+from eidrive_scenario.traffic.right_of_way import STOP_LINE, TOO_LATE
 from eidrive_scenario.traffic.spawning.bodies import Participant
 
 SPACING = 5.0
@@ -33,6 +35,8 @@ REACH = 30.0
 """Maximum distance of a traffic position from a lane [m]."""
 AIR = 0.5
 """Minimum gap between the box of a new participant and all others [m]."""
+_NOBODY = -9
+"""Index in the fleet of a participant that is not in it."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,31 @@ def is_wide_enough(sites: SpawnSites, participant: Participant) -> Bools:
     return np.asarray(sites.width >= (width if participant.walks else min(width, WIDEST)))
 
 
+def comfortable_speeds(fleet: Fleet, sites: SpawnSites, participant: Participant) -> Array:
+    """Return the maximum speeds (K,) from which a participant brakes comfortably for its leader [m/s].
+
+    A vehicle can also stop before the next junction as for a light that changes: it has no right of way yet.
+    """
+    lanes, driver = fleet.lanes, participant.driver
+    leaders = _leaders(fleet, sites, participant)
+    # The model brakes with b where s0 + v T + v (v - v_leader) / c = gap sqrt(b / a), and c = 2 sqrt(a b)
+    c = 2.0 * math.sqrt(driver.acceleration * driver.deceleration)
+    free = leaders.gap * math.sqrt(driver.deceleration / driver.acceleration) - driver.standstill_gap
+    half = 0.5 * (leaders.speed - c * driver.time_gap)
+    speed = half + np.sqrt(half**2 + c * np.maximum(free, 0.0))
+    if not participant.walks:
+        stop = lanes.to_junction(sites.lane, sites.progress) - participant.front - STOP_LINE
+        speed = np.minimum(speed, np.sqrt(2.0 * TOO_LATE * np.maximum(stop, 0.0)))
+    return np.asarray(np.maximum(speed - 1e-6, 0.0))
+
+
+def _leaders(fleet: Fleet, sites: SpawnSites, participant: Participant) -> Leaders:
+    """Return the leaders of a participant at each site."""
+    lanes, front = fleet.lanes, np.full(len(sites), participant.front)
+    chain = lanes.chain(sites.lane, PLANNED + 1)
+    return find_leaders(lanes, chain, sites.progress, front, fleet.occupants(), own=np.full(len(sites), _NOBODY))
+
+
 def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Bools:
     """Return whether a participant can be spawned at each site with speeds (K,) [m/s].
 
@@ -144,13 +173,10 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     foreign  (M, 7) boxes of all actors outside the fleet
     """
     lanes, spec, driver = fleet.lanes, participant.spec, participant.driver
-    count = len(sites)
-    half = 0.5 * spec.size[0]
-    front, rear = np.full(count, spec.offset[0] + half), np.full(count, spec.offset[0] - half)
-    occupants = fleet.occupants()
-    no_owner = np.full(count, -9)
-    leaders = find_leaders(lanes, lanes.chain(sites.lane, PLANNED + 1), sites.progress, front, occupants, own=no_owner)
-    followers = find_followers(lanes, sites.lane, sites.progress, rear, occupants, no_owner)
+    count, occupants = len(sites), fleet.occupants()
+    leaders = _leaders(fleet, sites, participant)
+    rear = np.full(count, participant.front - spec.size[0])
+    followers = find_followers(lanes, sites.lane, sites.progress, rear, occupants, np.full(count, _NOBODY))
     own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))
     braking = own.response(speed, np.maximum(speed, 1.0), leaders.gap, speed - leaders.speed)
     behind = followers.number
