@@ -30,7 +30,7 @@ CASES = {
     "coop/scenario_1_late_rsu": (delayed(0.5), {"collision", "driven_distance"}),
     "coop/scenario_2": (delayed(0.5), {"collision", "driven_distance"}),
     "coop/scenario_3": (delayed(1.0, own=True), {"detection_count"}),
-    "coop/scenario_4": (delayed(1.0), {"detection_count"}),
+    "coop/scenario_4": (delayed(1.0, own=True), {"detection_count"}),
     "coop/scenario_5": (delayed(2.5), {"collision", "reached_region"}),
     "ncap/crossing_car": (delayed(1.0), {"collision", "reach_position"}),
     "ncap/crossing_child": (delayed(1.0), {"collision", "reach_position"}),

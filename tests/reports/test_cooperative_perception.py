@@ -295,11 +295,10 @@ def learned_trial() -> PerceptionRecord:
 
 
 def test_features_find_objects_hidden_to_the_ego(learned_trial: PerceptionRecord) -> None:
-    """Nine objects are hidden. The earlier scan of the ego, which the network knows too, hits five of them."""
+    """The network also knows the earlier scan of the ego, which may hit some of the hidden objects."""
     tallies = learned_trial.tallies
     alone, fused = (sum(tallies[Condition(arm).name].hidden[0]) for arm in ("none", "attention"))
-    assert sum(learned_trial.hidden) == 9
-    assert alone < 5 < fused
+    assert alone < 0.5 * sum(learned_trial.hidden) < fused
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.4])
