@@ -107,6 +107,7 @@ def nearest_segment(segments: Iterable[Sequence[float]], x: float, y: float) -> 
         ax, ay = ax - share * dx, ay - share * dy
         gap = ax * ax + ay * ay
         if gap < nearest:
+            # At a corner both segments are equally near: the later one has to be nearer by 1 nm.
             root = math.sqrt(gap)
             best, best_share, nearest, leads_away = index, share, gap - 2e-9 * root, (root + LEADS_AWAY) ** 2
         elif gap > leads_away:

@@ -41,8 +41,8 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Course, Roller
-from eidrive_scenario.driving.planning.behavior.scoring import URGENT, Options, evaluate
+from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Course, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.scoring import AT_REST, URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
@@ -116,8 +116,8 @@ VIEWED = 10.0
 """Distance ahead at which the oncoming lane is determined [m]."""
 CRUISE = Proposal(0, 1.0, "all", 4.0)
 """Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
-AT_REST, NEAR_PLACE = 0.1, 1.0
-"""Speed of a vehicle that waits [m/s], and distance from its place of waiting [m]."""
+NEAR_PLACE = 1.0
+"""Distance from its place of waiting within which a vehicle waits there [m]."""
 VIEW_TIME_GAP = 2.0
 """Time gap behind a slower object at the border of the lane, from where the vehicle sees past it [s]: the two-second
 rule of the Highway Code (rule 126)."""
@@ -168,7 +168,7 @@ class Decider:
         self._braking = 0.0
         """Deceleration of emergency braking if that was the last decision [m/s²], else 0."""
 
-    def line_changed(self, shift: float | None, aside: float = 0.0) -> None:
+    def line_changed(self, shift: float | None, aside: float) -> None:
         """Move the current maneuver to another line.
 
         shift  increase of the distances along the line [m]; None if the maneuver ends because the lines differ
@@ -192,7 +192,7 @@ class Decider:
         current = extended(situation, scene, settings, self._body, self._continued(situation))
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
-            profiles.append(self._towards(situation, ROUTE, 0.0))
+            profiles.append(self._to_route(situation))
         change = situation.change
         merges = change is not None and current.name == change.name
         self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
@@ -294,16 +294,17 @@ class Decider:
             if current.last == 0.0 and s >= current.places[-1]:
                 return LateralProfile(ROUTE, (s,), (0.0,))
             return current
-        return self._towards(situation, ROUTE, 0.0)
+        return self._to_route(situation)
 
-    def _towards(self, situation: Situation, name: str, value: float) -> LateralProfile:
+    def _to_route(self, situation: Situation) -> LateralProfile:
+        """Return the motion to the route, which continues the current one if the vehicle is on that."""
         current = self._current
         s, start, slope = situation.steered
         if current is not None and abs(current.offset_at(s) - start) <= OFF_PROFILE:
             start, slope = current.offset_at(s), current.slope_at(s)
-        if abs(start - value) < 0.02 and abs(slope) < 0.01:
-            return LateralProfile(name, (s,), (value,))
-        return towards(name, value, Start(s, start, slope, situation.speed), self._settings.lateral_acceleration)
+        if abs(start) < 0.02 and abs(slope) < 0.01:
+            return LateralProfile(ROUTE, (s,), (0.0,))
+        return towards(ROUTE, 0.0, Start(s, start, slope, situation.speed), self._settings.lateral_acceleration)
 
     def _options(
         self,
@@ -318,19 +319,18 @@ class Decider:
         if with_maneuvers:
             more = passing_profiles(situation, scene, self._settings, self._body, has_begun=self._passes)
         profiles = profiles + more
-        course = Course(situation.line.along, situation.limits, situation.wanted)
         waiting, refused = set(), set()
         options: list[Option] = []
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
         here = (self._front, situation.s, situation.speed)
-        stops = [situation.stop] if situation.stop is not None else []
+        stops = situation.stops
         change = situation.change
         end = None if change is None else change.wall(self._front, self._settings.lateral_acceleration)
         for number, profile in enumerate(profiles):
             holds: list[Wall] = []
             verdict = Verdict.GO
             if profile.uses_oncoming:
-                profile, verdict, waits_at = self._verified(situation, scene, profile, stops)
+                profile, verdict, waits_at = self._verified(situation, scene, profile)
                 if verdict in (Verdict.WAIT, Verdict.FOLLOW):
                     waiting.add(number)
                 if verdict is Verdict.WAIT:
@@ -368,8 +368,7 @@ class Decider:
                 leads = leads | gap_leader(scene, change.offset, situation.motion, self._body, comfortable)
                 gently = Proposal(number, 1.0, "all", comfortable)
                 options.append(Option(gently, profile, way, walls, leads, MERGING_TIME_GAP))
-        start, body = (situation.s, situation.speed), (self._front, self._center)
-        rolled = self._roller.roll(options, course, start, body, scene)
+        rolled = self._roll(situation, scene, options)
         late = None
         if change is not None and end is not None and situation.s >= change.begin:
             desire = change.desire(situation.s, situation.wanted)
@@ -397,26 +396,27 @@ class Decider:
         situation: Situation,
         scene: Surroundings,
         profile: LateralProfile,
-        stops: list[Wall],
         time_gap: float | None = None,
     ) -> Motion:
         """Return the motion along a profile at the wanted speed."""
         way = inside_way(scene, profile, self._half_width)
         crossing = conflicts(scene, way, situation.s)
         leads = leading(scene, way, crossing, situation.s + self._center, CRUISE)
-        course = Course(situation.line.along, situation.limits, situation.wanted)
-        here, body = (situation.s, situation.speed), (self._front, self._center)
-        rolled = self._roller.roll([Option(CRUISE, profile, way, stops, leads, time_gap)], course, here, body, scene)
+        rolled = self._roll(situation, scene, [Option(CRUISE, profile, way, situation.stops, leads, time_gap)])
         return Motion(rolled.s[0], rolled.speed[0])
 
+    def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:
+        course = Course(situation.line.along, situation.limits, situation.wanted)
+        return self._roller.roll(options, course, situation.motion, (self._front, self._center), scene)
+
     def _verified(
-        self, situation: Situation, scene: Surroundings, profile: LateralProfile, stops: list[Wall]
+        self, situation: Situation, scene: Surroundings, profile: LateralProfile
     ) -> tuple[LateralProfile, Verdict, float]:
         """Return a profile that uses the oncoming lane, whether the vehicle may follow it, and where it waits [m].
 
         A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
         """
-        motion = self._motion(situation, scene, profile, stops)
+        motion = self._motion(situation, scene, profile)
         beside = situation.line.lanes_beside(situation.s + VIEWED)
         outlook = Outlook(situation.line, scene, beside)
         is_current = self._current is not None and self._current.name == profile.name
@@ -426,13 +426,12 @@ class Decider:
         waits_at = self._oncoming.waiting_place(profile, situation.s)
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
             verdict = Verdict.WAIT
-        start = Start(*situation.steered, situation.speed)
         s = situation.s + self._center
         viewpoint = (s, profile.offset_at(s))
         if verdict is Verdict.WAIT:
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
             onward_speed = situation.speed_at(profile.places[-3], max(self._settings.acceleration, BRISK))
-            better = with_view(profile, start, self._settings, sufficient, onward_speed)
+            better = with_view(profile, situation.start, self._settings, sufficient, onward_speed)
             if better is not None:
                 profile, waits_at = better, self._oncoming.waiting_place(better, situation.s)
             elif math.isinf(profile.waits_at):
@@ -442,12 +441,12 @@ class Decider:
             waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene, self._body):
                 is_last_place = math.isinf(profile.waits_at)
-                is_free = self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=is_last_place)
+                is_free = self._oncoming.yields(outlook, viewpoint, now, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:
-            if self._oncoming.yields(outlook, viewpoint, situation.now, is_last_place=False):
+            if self._oncoming.yields(outlook, viewpoint, now, is_last_place=False):
                 return profile, Verdict.GO, waits_at
-            edge = at_edge(profile, start, self._settings)
+            edge = at_edge(profile, situation.start, self._settings)
             # A motion to the edge that has begun is completed, instead of a new one in each tick.
             current = self._current if is_current else None
             profile = current if current is not None and abs(current.last - edge.last) < AT_OFFSET else edge
@@ -458,17 +457,12 @@ class Decider:
 
         Traffic behind the gap must not come too close later either: the vehicle may have to stop soon.
         """
-        body = self._body
-        if situation.s < change.begin or not has_gap_now(
-            scene, change.offset, situation.motion, body, MERGING_TIME_GAP
-        ):
+        offset, body = change.offset, self._body
+        if situation.s < change.begin or not has_gap_now(scene, offset, situation.motion, body, MERGING_TIME_GAP):
             return None
-        profile = to_lane(
-            change.offset, Start(*situation.steered, situation.speed), self._settings.lateral_acceleration
-        )
-        stops = [situation.stop] if situation.stop is not None else []
-        s = self._motion(situation, scene, profile, stops, MERGING_TIME_GAP).s
-        has_room = leaves_room(scene, change.offset, s[None], body, len(self._times))[0, 0]
+        profile = to_lane(offset, situation.start, self._settings.lateral_acceleration)
+        s = self._motion(situation, scene, profile, MERGING_TIME_GAP).s
+        has_room = leaves_room(scene, offset, s[None], body, len(self._times))[0, 0]
         return profile if has_room else None
 
     def _kept_names(self, situation: Situation) -> frozenset[str]:

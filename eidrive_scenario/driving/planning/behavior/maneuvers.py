@@ -70,6 +70,16 @@ class Situation(msgspec.Struct, frozen=True):
         return self.s, self.speed
 
     @property
+    def stops(self) -> list[Wall]:
+        """Place at which a signal requires a stop, if there is one."""
+        return [] if self.stop is None else [self.stop]
+
+    @property
+    def start(self) -> Start:
+        """Start of a lateral motion of the front axle."""
+        return Start(*self.steered, self.speed)
+
+    @property
     def end(self) -> float:
         """Distance along the line at which the route ends [m]; inf if it goes on."""
         return self.line.length if self.line.path.ends else math.inf
@@ -212,11 +222,11 @@ def passing_profiles(
     if blocker is None or (not has_begun and _queues(situation, scene, blocker, body)):
         return profiles
     obstacle = _obstacle(situation, scene, settings, blocker, body)
-    if not may_pass(situation, scene, body):
-        profile = None if obstacle is None else _around(situation, settings, obstacle, body, _overtaking(situation))
-        return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     beside = situation.line.lanes_beside(situation.s + 10.0)
     faster, overtaking = beside.faster, beside.overtaking
+    if not _is_parked(situation, blocker, body):
+        profile = None if obstacle is None else _around(situation, settings, obstacle, body, overtaking)
+        return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
     change = situation.change
@@ -224,7 +234,7 @@ def passing_profiles(
     returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
     may_change = not math.isnan(faster) and returns
     if may_change and has_gap_now(scene, faster, situation.motion, body):
-        profiles.append(to_lane(faster, Start(*situation.steered, situation.speed), settings.lateral_acceleration))
+        profiles.append(to_lane(faster, situation.start, settings.lateral_acceleration))
     if obstacle is not None:
         # A moving vehicle is overtaken on one side only. With several lanes of its direction that is a change of lane:
         # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
@@ -300,8 +310,7 @@ def _evasions(
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
         if not (math.isnan(offset) or math.isnan(beyond)) and has_gap_now(scene, offset, situation.motion, body):
-            start = Start(*situation.steered, situation.speed)
-            evasions.append(to_lane(offset, start, settings.lateral_acceleration))
+            evasions.append(to_lane(offset, situation.start, settings.lateral_acceleration))
     return evasions
 
 
@@ -411,11 +420,6 @@ def _is_parked(situation: Situation, hypothesis: Present, body: Body) -> bool:
         return True
     stands = situation.now - known_object.still_since
     return situation.speed < WAITING or stands >= LONG or _is_beside(situation, hypothesis, body)
-
-
-def _overtaking(situation: Situation) -> int:
-    """Return the side for overtaking at the vehicle."""
-    return situation.line.lanes_beside(situation.s + 10.0).overtaking
 
 
 def _is_steady(situation: Situation, hypothesis: Present) -> bool:

@@ -207,7 +207,7 @@ class OncomingTraffic:
         crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
         hidden: Bools = np.logical_or.reduce(crosses, axis=(0, 1))
         if line.heights is not None:
-            hidden |= _beyond_crest(line, s, self._ahead)
+            hidden |= _beyond_crest(line.along, line.heights, s, self._ahead)
         first = int(hidden.argmax()) if hidden.any() else len(places)
         return float(s + first * SAMPLE)
 
@@ -237,8 +237,10 @@ class OncomingTraffic:
             return Verdict.GO
         first = int(outside.argmax())
         back, return_s = self._return(profile, motion, outside)
-        possible, duration = self._can_give_up(profile, motion, scene, np.maximum(side * offsets - border, 0.0))
-        moves = self._moves(profile, motion, scene)
+        passed = self._passed(profile, float(motion.s[0]), scene)
+        possible, duration = self._can_give_up(motion, scene, passed, np.maximum(side * offsets - border, 0.0))
+        # Behind what moves there is no place to wait.
+        moves = bool((scene.speed[passed, 0] > ONCOMING_SPEED).any())
         if first and not moves:
             # Behind a standing object there is seldom space to return: the vehicle stops before the border.
             stop = motion.s + motion.speed**2 / (2.0 * BRAKING) + motion.speed * DELAY
@@ -263,7 +265,7 @@ class OncomingTraffic:
         free = self._free(outlook, here, until, end, now)
         if self._suffices(free, here[0], until, end, beside, now):
             return Verdict.GO
-        step = min(max(last, 0), len(times) - 1)
+        step = max(last, 0)
         there = (float(viewpoints[step]), float(beside_line[step]))
         hidden = self.first_hidden(outlook, there, step)
         if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
@@ -338,7 +340,7 @@ class OncomingTraffic:
 
         oncoming  center of the oncoming lane [m];  s  place of the reference point [m]
         """
-        rows = self._passed(profile, Motion(np.array([s]), np.zeros(1)), scene)
+        rows = self._passed(profile, s, scene)
         edge = profile.border - 2.0 * AT_OFFSET  # with the error of the lateral control
         covered = float((profile.side * scene.d[rows, 0] + scene.half_width[rows, 0]).max(initial=edge)) - edge
         # The line of sight past the nearer corner of an object reaches the center of the lane at the range.
@@ -367,33 +369,27 @@ class OncomingTraffic:
             return math.inf, return_s
         return float(self._times[-1]) + (return_s - float(motion.s[-1])) / speed, return_s
 
-    def _passed(self, profile: LateralProfile, motion: Motion, scene: Surroundings) -> Bools:
-        """Return which hypotheses (N,) the profile passes: in the lane ahead of the rear of the vehicle."""
+    def _passed(self, profile: LateralProfile, s: float, scene: Surroundings) -> Bools:
+        """Return which hypotheses (N,) the profile passes: in the lane ahead of the rear of the vehicle at `s`."""
         in_lane = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < self._body.half_width + scene.margin
-        ahead = scene.front[:, 0] > float(motion.s[0]) - self._body.rear
+        ahead = scene.front[:, 0] > s - self._body.rear
         near = scene.rear[:, 0] < profile.places[-2]
         return np.asarray(in_lane & ahead & near & (scene.speed[:, 0] > -ONCOMING_SPEED) & ~scene.crosses[:, 0])
 
-    def _moves(self, profile: LateralProfile, motion: Motion, scene: Surroundings) -> bool:
-        """Return whether a passed object moves, so that there is no place to wait behind it."""
-        return bool((scene.speed[self._passed(profile, motion, scene), 0] > ONCOMING_SPEED).any())
-
-    def _can_give_up(
-        self, profile: LateralProfile, motion: Motion, scene: Surroundings, excess: Array
-    ) -> tuple[Bools, Array]:
+    def _can_give_up(self, motion: Motion, scene: Surroundings, passed: Bools, excess: Array) -> tuple[Bools, Array]:
         """Return when (K,) the vehicle can still return behind what it passes, and how long the return takes (K,) [s].
 
+        passed  which hypotheses it passes (N,)
         excess  distance by which the vehicle is beyond the border of its lane (K,) [m]
         """
-        rows = self._passed(profile, motion, scene).nonzero()[0]
         duration = lateral_duration(excess, self._lateral_acceleration)
-        if not rows.size:
+        if not passed.any():
             return np.zeros(len(excess), dtype=bool), duration
-        rear = scene.rear[rows]
+        rear = scene.rear[passed]
         nearest = rear.argmin(axis=0)
         columns = np.arange(rear.shape[1])
         gap = rear[nearest, columns] - motion.s - self._body.front
-        closing = np.maximum(motion.speed - np.maximum(scene.speed[rows][nearest, columns], 0.0), 0.0)
+        closing = np.maximum(motion.speed - np.maximum(scene.speed[passed][nearest, columns], 0.0), 0.0)
         # The return needs a length on the road, of which the object ahead covers its share meanwhile.
         length = np.maximum(motion.speed * duration, least_length(excess))
         returning = length * closing / np.maximum(motion.speed, ONCOMING_SPEED)
@@ -421,12 +417,11 @@ def approach(speed: float, duration: float, deceleration: float = RESPONSE_DECEL
     return speed * min(duration, RESPONSE) + speed * braking - 0.5 * deceleration * braking**2
 
 
-def _beyond_crest(line: ReferenceLine, s: float, ahead: Array) -> Bools:
-    """Return which distances `ahead` of a place on the line (P,) the road between hides."""
-    if line.heights is None:
-        return np.zeros(len(ahead), dtype=bool)
-    here = float(np.interp(s, line.along, line.heights)) + VIEWPOINT
-    road = np.interp(s + ahead, line.along, line.heights) - here
+def _beyond_crest(along: Array, heights: Array, s: float, ahead: Array) -> Bools:
+    """Return which distances `ahead` of a place on the line (P,) the road between hides; its heights are those `along`
+    the line."""
+    here = float(np.interp(s, along, heights)) + VIEWPOINT
+    road = np.interp(s + ahead, along, heights) - here
     # The steepest line of sight over the road up to each place; traffic below it is hidden.
     steepest = np.maximum.accumulate(road / ahead)
     return np.asarray((road + TARGET) / ahead < steepest)

@@ -12,12 +12,11 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
+from eidrive_scenario.driving.planning.path import ALIGNED
 from eidrive_scenario.roads import RoadNetwork
 
 STANDING = 0.3
 """Speed below which an object is predicted to stand [m/s]; the direction of a slower one is noise."""
-ALIGNED = 0.6
-"""Maximum angle between the motion of a vehicle and a lane that it follows [rad]."""
 LEAVING_RATE = 0.3
 """Minimum lateral speed of a vehicle that leaves its lane [m/s]; slower motion is its lateral wandering."""
 LEAVING_ERROR = 3.5

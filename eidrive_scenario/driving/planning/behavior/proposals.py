@@ -316,7 +316,7 @@ class Conflict(msgspec.Struct, frozen=True):
     crosses: bool
 
 
-def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float, extra: float = 0.0) -> Bools:
+def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float) -> Bools:
     """Return where hypotheses are in the way (N, K) of a vehicle that follows a profile.
 
     The vehicle is beside an object that it overtakes as soon as it reaches it, wherever the object is now.
@@ -326,7 +326,7 @@ def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float, 
         slow = (scene.speed[:, 0] > ONCOMING_SPEED) & (scene.speed[:, 0] <= profile.overtakes + SIMILAR_SPEED)
         s = np.where((slow & (scene.rear[:, 0] < profile.places[-2]))[:, None], profile.places[-2], s)
     gap = np.abs(profile.offset(s) - scene.d) - scene.half_width
-    return np.asarray(gap < half_width + scene.margin[:, None] * 0.5 + extra)
+    return np.asarray(gap < half_width + scene.margin[:, None] * 0.5)
 
 
 def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:

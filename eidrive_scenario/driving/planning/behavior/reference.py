@@ -107,7 +107,7 @@ class ReferenceLine:
         self.spacing = float(self.along[-1]) / len(length)
         self.tangent, self.normal = _directions(self.points)
         self.heading: Array = np.unwrap(np.arctan2(self.tangent[:, 1], self.tangent[:, 0]))
-        self.curvature: Array = np.gradient(self.heading, self.along) if len(self.along) > 1 else np.zeros(1)
+        self.curvature: Array = np.gradient(self.heading, self.along)
         self._columns: Array = np.stack([*self.points.T, *self.tangent.T, self.along, self.heading])
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}

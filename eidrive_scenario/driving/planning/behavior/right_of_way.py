@@ -87,14 +87,13 @@ class JunctionRules:
                 if junction in self._priorities:
                     covered.append((owner, junction, self._road[lane]))
         signs = list(places_along(self._lines_near(points), points, heights))
-        passages = [self._passage(*run, along, heading, signs) for run in _runs(inside)]
-        if not covered:
-            return tuple(passages)
-        roads: list[str | None] = []
-        for junction, first, last in _runs(inside):  # the connecting road that covers most points of a stay
+        passages = []
+        for junction, first, last in _runs(inside):
+            # The connecting road that covers most points of the stay.
             counts = Counter(road for index, name, road in covered if name == junction and first <= index <= last)
-            roads.append(max(counts, key=lambda road: (counts[road], road), default=None))
-        return tuple([passage._replace(road=road) for passage, road in zip(passages, roads, strict=True)])
+            road = max(counts, key=lambda road: (counts[road], road), default=None)
+            passages.append(self._passage(junction, first, last, along, heading, signs, road))
+        return tuple(passages)
 
     def _lines_near(self, points: Array) -> list[StopLine]:
         """Return the stop lines in the extent of a way (M, 2)."""
@@ -109,6 +108,7 @@ class JunctionRules:
         along: Array,
         heading: Array,
         signs: list[tuple[float, StopLine]],
+        road: str | None,
     ) -> Passage:
         start, end = float(along[first]), float(along[last])
         here = [line for distance, line in signs if start - BEFORE_ENTRY <= distance <= start + BEYOND_ENTRY]
@@ -122,6 +122,7 @@ class JunctionRules:
             turn,
             any(line.kind != "light" for line in here),
             any(line.kind == "light" for line in here),
+            road,
         )
 
     def gives_way(self, own: Passage, other: Passage) -> bool:
