@@ -254,3 +254,8 @@ def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: fl
     share = ((x - x0) * dx + (y - y0) * dy) / square if square > 0.0 else 0.0
     share = min(max(share, 0.0), 1.0)
     return math.hypot(x - x0 - share * dx, y - y0 - share * dy)
+
+
+def distances_along(points: Array) -> Array:
+    """Return the distances of the points (M, 2) of a polyline from its first point, along it (M,) [m]."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

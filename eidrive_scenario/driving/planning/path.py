@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import segment_distance, wrap_angle
+from eidrive_scenario.base.geometry import distances_along, segment_distance, wrap_angle
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
@@ -121,19 +121,28 @@ def _speed_limits(step: Array, *, ends: bool) -> Array:
     heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
     curvature = np.zeros(len(step) + 1)
     curvature[1:-1] = np.abs(np.diff(heading)) / ((length[1:] + length[:-1]) / 2.0)
-    limits: list[float] = np.sqrt(LATERAL_ACCELERATION / np.maximum(curvature, 1e-6)).tolist()
+    limits = np.sqrt(LATERAL_ACCELERATION / np.maximum(curvature, 1e-6))
     if ends:
         limits[-1] = 0.0
-    gains: list[float] = (2.0 * APPROACH_DECELERATION * length).tolist()
-    for index in range(len(limits) - 2, -1, -1):
-        limits[index] = min(limits[index], math.sqrt(limits[index + 1] ** 2 + gains[index]))
-    return np.array(limits)
+    return approached(limits, length, APPROACH_DECELERATION)
+
+
+def approached(limits: Array, lengths: Array, deceleration: float) -> Array:
+    """Return speed limits (M,) [m/s] of points, lowered so that a vehicle slows down before lower ones.
+
+    lengths  distances between the points (M - 1,) [m];  deceleration  before lower limits [m/s²]
+    """
+    speeds: list[float] = limits.tolist()
+    gains: list[float] = (2.0 * deceleration * lengths).tolist()
+    for index in range(len(gains) - 1, -1, -1):
+        speeds[index] = min(speeds[index], math.sqrt(speeds[index + 1] ** 2 + gains[index]))
+    return np.array(speeds)
 
 
 def _resample(line: Array) -> Array:
     """Return points (M, 2) at equal distances of about SPACING along a polyline (K, 2), with its ends."""
     line = _apart(np.asarray(line, dtype=float)[:, :2])
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = distances_along(line)
     stations = np.linspace(0.0, along[-1], max(2, round(along[-1] / SPACING) + 1))
     return np.stack([np.interp(stations, along, line[:, 0]), np.interp(stations, along, line[:, 1])], axis=1)
 

@@ -12,6 +12,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import distances_along
 from eidrive_scenario.base.requests import LONGEST_WAY, Goal
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.path import (
@@ -305,7 +306,7 @@ def _curve(x: float, y: float, yaw: float, waypoints: Array) -> Array:
 
     nose = [x + SPACING * math.cos(yaw), y + SPACING * math.sin(yaw)]
     knots = np.array([[x, y], nose, *waypoints[:, :2].tolist()])
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(knots, axis=0).T))])
+    along = distances_along(knots)
     keep = np.concatenate([[True], np.diff(along) > 1e-6])
     stations = np.linspace(0.0, along[-1], max(2, math.ceil(along[-1] / SPACING) + 1))
     return np.asarray(PchipInterpolator(along[keep], knots[keep])(stations))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import distances_along
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.path import APPROACH_DECELERATION
 from eidrive_scenario.perception.traffic_lights import SignalAhead, SignalsAhead
@@ -76,7 +77,7 @@ class SignalStops:
         """Set the path (M, 2) of the vehicle and the heights of the road along it (M,) [m]; None: roads are level."""
         self.signals.follow(path, heights)
         self._path = path
-        self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        self._along = distances_along(path)
 
     def next(self, along: float, speed: float, now: float) -> StopPoint | None:
         """Return the next stop of a vehicle at distance `along` of the path [m]; None if no signal requires one."""

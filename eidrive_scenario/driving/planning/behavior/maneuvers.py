@@ -26,6 +26,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     Wall,
     change_length,
     passing,
+    time_to_gain,
     to_lane,
 )
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
@@ -443,18 +444,6 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: B
     )
 
 
-def _catch_up_time(gap: float, closing: float, top: float, acceleration: float) -> float:
-    """Return the time to gain a gap [m] on an object at speeds relative to it from `closing` to `top` [m/s]."""
-    if gap <= 0.0:
-        return 0.0
-    top = max(top, closing, 0.5)
-    time = (top - closing) / acceleration
-    gained = 0.5 * (closing + top) * time
-    if gained >= gap:
-        return (math.sqrt(closing**2 + 2.0 * acceleration * gap) - closing) / acceleration
-    return time + (gap - gained) / top
-
-
 def _obstacle(
     situation: Situation, scene: Surroundings, settings: BehaviorSettings, blocker: Present, body: Body
 ) -> _Obstacle | None:
@@ -471,11 +460,11 @@ def _obstacle(
         gain = settings.acceleration * MEAN_SHARE
         rear = situation.s - body.rear - BEFORE_OBSTACLE
         ends = [
-            end + own * _catch_up_time(end - rear, situation.speed - own, wanted - own, gain)
+            end + own * time_to_gain(end - rear, situation.speed - own, wanted - own, gain)
             for end, own in zip(ends, speed, strict=True)
         ]
         begin -= BEFORE_MOVING * slowest
-        begin += slowest * _catch_up_time(begin - situation.s, situation.speed - slowest, wanted - slowest, gain)
+        begin += slowest * time_to_gain(begin - situation.s, situation.speed - slowest, wanted - slowest, gain)
     end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
     return _Obstacle.between(begin, end, objects, situation)
 

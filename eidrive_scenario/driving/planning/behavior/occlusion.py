@@ -12,7 +12,7 @@ from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.conflict_ways import UPSTREAM, ConflictWay
-from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE
+from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE, time_to_gain
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec
@@ -189,7 +189,9 @@ class HiddenTraffic:
         for way in ahead.values():
             shown = self._shown(way, regions, occluders, ground, now)
             hidden = self._traffic.setdefault(way.key, PossibleTraffic()).first(way, shown, now)
-            if hidden / way.speed > self._time_to_clear(way, s, speed, wanted):
+            # Until the rear of the vehicle has left the zone.
+            time = time_to_gain(way.end + self._rear - s, speed, wanted, self._settings.acceleration)
+            if hidden / way.speed > time:
                 continue
             stop = way.hold - self._front - BEFORE_ZONE
             limits = np.where(along > way.look - self._sensor, math.inf, self.safe_speed(stop - along))
@@ -205,17 +207,6 @@ class HiddenTraffic:
         b, t = self._deceleration, REACTION
         speed = -b * t + np.sqrt((b * t) ** 2 + 2.0 * b * np.maximum(distance, 0.0))
         return np.maximum(speed, CREEP)
-
-    def _time_to_clear(self, way: ConflictWay, s: float, speed: float, wanted: float) -> float:
-        """Return the time until the rear of the vehicle has left the zone if it accelerates to the wanted speed [s]."""
-        left = max(way.end + self._rear - s, 0.0)
-        acceleration = self._settings.acceleration
-        top = max(wanted, speed)
-        time = (top - speed) / acceleration
-        gained = (speed + top) / 2.0 * time
-        if gained >= left:
-            return (math.sqrt(speed**2 + 2.0 * acceleration * left) - speed) / acceleration
-        return time + (left - gained) / max(top, 1e-3)
 
     def _shown(
         self,

@@ -72,16 +72,18 @@ class BehaviorPlanner(RoutePlanner):
         own = self.planner_settings
         self._times: Array = np.arange(0.0, own.horizon + 1e-9, STEP)
         self._memory = ObjectMemory(own)
-        self._rules = JunctionRules(roads) if roads is not None and roads.junctions else None
+        self._rules = None if roads is None else JunctionRules(roads)
         self._predictor = Predictor(roads, self._times, self._rules)
         self._passages: tuple[Passage, ...] = ()
         self._line: ReferenceLine | None = None
         self._route_lanes: list[RouteLane] = []
         """Lanes of a path that changes lanes, from the current one on."""
         self._conflict_ways: ConflictWays | None = None
+        if own.caution and roads is not None and self._rules is not None:
+            self._conflict_ways = ConflictWays(roads, self._rules, spec.size[:2])
         self._ways: list[ConflictWay] = []
         self._hidden: HiddenTraffic | None = None
-        self.observes_regions = own.caution and roads is not None
+        self.observes_regions = self._conflict_ways is not None
         self._lights_work = True
         """Whether the last traffic light in sight was lit."""
         self._regions: Sequence[PerceptionRegion] = ()
@@ -147,11 +149,7 @@ class BehaviorPlanner(RoutePlanner):
                 line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
         self._line = line
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
-        if self.observes_regions and self.roads is not None:
-            if self._conflict_ways is None:
-                self._conflict_ways = ConflictWays(
-                    self.roads, self._rules or JunctionRules(self.roads), self.spec.size[:2]
-                )
+        if self._conflict_ways is not None:
             self._ways = self._conflict_ways.along(line, self._passages)
         shift = None
         if before is not None:
@@ -196,13 +194,8 @@ class BehaviorPlanner(RoutePlanner):
         if not self._ways or self.roads is None:
             return self._limits, ""
         if self._hidden is None:
-            self._hidden = HiddenTraffic(
-                self.planner_settings,
-                Occluders.of_map(self.roads),
-                self.spec,
-                self.view or (),
-                self._range,
-            )
+            fixed = Occluders.of_map(self.roads)
+            self._hidden = HiddenTraffic(self.planner_settings, fixed, self.spec, self.view or (), self._range)
         motion = (s, max(ego.speed, 0.0), wanted)
         position: tuple[float, float, float] = tuple(ego.position.tolist())
         ways = [way for way in self._ways if not way.has_light] if self._relies_on_lights(s) else self._ways

@@ -12,6 +12,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+from eidrive_scenario.driving.planning.path import approached
 
 ROUTE = "route"
 """Name of the maneuver without a lateral deviation."""
@@ -256,6 +257,8 @@ ONCOMING_SPEED = 0.5
 """Speed against the direction of the vehicle above which an object is oncoming [m/s]."""
 BEFORE_ZONE = 1.5
 """Distance between the front of a waiting vehicle and the zone that others cross [m]."""
+LEAST_TOP = 0.5
+"""Least top speed by which the time to cover a gap is computed [m/s]."""
 RELEASE = 0.3
 """Time after which a zone counts as free when the crossing object has left it [s]."""
 
@@ -398,11 +401,20 @@ def speed_limits(curvature: Array, path_limits: Array, spacing: float, settings:
     kernel = np.ones(5) / 5.0
     smooth = np.convolve(np.abs(np.pad(curvature, 2, mode="edge")), kernel, mode="valid")
     limits = np.minimum(np.sqrt(settings.lateral_acceleration / np.maximum(smooth, 1e-4)), path_limits)
-    gain = 2.0 * settings.comfortable_deceleration * spacing
-    values: list[float] = limits.tolist()
-    for index in range(len(values) - 2, -1, -1):
-        values[index] = min(values[index], math.sqrt(values[index + 1] ** 2 + gain))
-    return np.array(values)
+    return approached(limits, np.full(len(limits) - 1, spacing), settings.comfortable_deceleration)
+
+
+def time_to_gain(gap: float, speed: float, top: float, acceleration: float) -> float:
+    """Return the time in which a vehicle that accelerates from a speed to `top` [m/s] covers a gap [m]; for a gap to an
+    object that moves, with speeds relative to it."""
+    if gap <= 0.0:
+        return 0.0
+    top = max(top, speed, LEAST_TOP)
+    time = (top - speed) / acceleration
+    gained = 0.5 * (speed + top) * time
+    if gained >= gap:
+        return (math.sqrt(speed**2 + 2.0 * acceleration * gap) - speed) / acceleration
+    return time + (gap - gained) / top
 
 
 def leading(scene: Surroundings, way: Bools, conflicts: list[Conflict], center: float, proposal: Proposal) -> Bools:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import distances_along
 from eidrive_scenario.driving.planning.path import PlannedPath, path_heights
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
@@ -154,7 +155,7 @@ class ReferenceLine:
     @cached_property
     def _along_path(self) -> Array:
         """Distances of the points along the path (M,) [m]."""
-        return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.path.points, axis=0).T))])
+        return distances_along(self.path.points)
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""

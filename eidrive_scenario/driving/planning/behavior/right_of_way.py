@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import distances_along, wrap_angle
+from eidrive_scenario.driving.planning.path import approached
 from eidrive_scenario.perception.traffic_lights import StopLine, places_along, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
@@ -74,9 +75,9 @@ class JunctionRules:
 
         heights  of the way (M,) [m], for roads above each other; None: the roads are level
         """
-        step = np.diff(points, axis=0)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
-        heading = np.arctan2(step[:, 1], step[:, 0])
+        along = distances_along(points)
+        dx, dy = np.diff(points, axis=0).T
+        heading = np.arctan2(dy, dx)
         inside: list[set[str]] = [set() for _ in points]
         covered: list[tuple[int, str, str]] = []
         lanes, _, owners = self._roads.overlapped_lanes(points[:, 0].copy(), points[:, 1].copy(), heights)
@@ -274,10 +275,8 @@ class Course:
         curvature = np.concatenate([[0.0], turn / np.maximum(length, 1e-9), [0.0]])
         # The mean of neighbors: the course has an angle at each of its points, and a lane may begin with one.
         curvature = np.convolve(curvature, np.ones(3) / 3.0, mode="same") if len(curvature) > 3 else curvature
-        speeds: list[float] = np.sqrt(FASTEST_TURN / np.maximum(curvature, 1e-6)).tolist()
-        steps: list[float] = np.diff(self.along).tolist()
-        for index in range(len(steps) - 1, -1, -1):
-            speeds[index] = min(speeds[index], math.sqrt(speeds[index + 1] ** 2 + 2.0 * FASTEST_STOP * steps[index]))
+        limits = np.sqrt(FASTEST_TURN / np.maximum(curvature, 1e-6))
+        speeds: list[float] = approached(limits, np.diff(self.along), FASTEST_STOP).tolist()
         return speeds
 
     def poses(self, along: Array, left: Array | float) -> tuple[Array, Array, Array]:
@@ -348,7 +347,7 @@ class LaneCourses:
         points, heights = points[apart], np.asarray(poses.z)[apart]
         if len(points) < 2:
             return None
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        along = distances_along(points)
         first = chain[0]
         section = self._roads.road(first.road).sections[first.section]
         width = section.lanes[first.lane].width

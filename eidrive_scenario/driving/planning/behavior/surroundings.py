@@ -21,8 +21,8 @@ LARGEST_LATERAL_ERROR = 0.75
 """Maximum enlargement of an object to the side [m]: half of what a lane leaves beside a car, else neighbors block."""
 LARGEST_ERROR_ALONG = 3.0
 """Maximum enlargement of an object along the line [m]."""
-FAR_ASIDE = 12.0
-"""Distance from the line beyond which an object has no effect at that time [m]."""
+FAR_ASIDE, AWAY = 12.0, 1e3
+"""Distance from the line beyond which an object has no effect at that time, and one for objects without effect [m]."""
 ACROSS = np.cos(np.radians(40.0))
 """Cosine of the angle between the motion of an object and the line from which on it crosses."""
 
@@ -151,13 +151,13 @@ def surroundings(
     )
     if prediction.z is not None and line.heights is not None:
         below = np.interp(s, line.along, line.heights, left=np.nan, right=np.nan)
-        d = np.where(np.abs(prediction.z - below) > OTHER_LEVEL, 1e3, d)
+        d = np.where(np.abs(prediction.z - below) > OTHER_LEVEL, AWAY, d)
     moving = prediction.speed[:, :1] > 0.0
     center, offset, length, width = ego
     behind = (s[:, 0] + half_length[:, 0] < center - length) & (np.abs(d[:, 0] - offset) < half_width[:, 0] + width)
     return Surroundings(
         s,
-        np.where(np.abs(d) < FAR_ASIDE, d, 1e3),
+        np.where(np.abs(d) < FAR_ASIDE, d, AWAY),
         half_length,
         half_width,
         prediction.speed * cos,
@@ -198,5 +198,5 @@ def _yields(prediction: Prediction, gives_way: Callable[[Passage], bool] | None)
 
 def only_certain(scene: Surroundings) -> Surroundings:
     """Return the scene without objects of low existence probability, which neither lead nor collide."""
-    aside = np.where(scene.certain[:, None], scene.d, 1e3)
+    aside = np.where(scene.certain[:, None], scene.d, AWAY)
     return msgspec.structs.replace(scene, d=aside)
