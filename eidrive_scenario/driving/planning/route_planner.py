@@ -262,11 +262,17 @@ class RoutePlanner(Planner):
 
 
 def _lane_at(roads: RoadNetwork, ego: EgoState) -> list[LaneLocation]:
-    """Return the lane at the vehicle if its driving direction is that of the vehicle."""
+    """Return the lane at the vehicle, or the nearest one in its direction if traffic of that lane drives against it."""
     location = lane_below(roads, ego)
-    if location is None or angle_to_lane(roads, location, ego.yaw) >= math.pi / 2.0:
-        return []
-    return [location]
+    if location is None or angle_to_lane(roads, location, ego.yaw) < math.pi / 2.0:
+        return [] if location is None else [location]
+    road, against = location.road, roads.driving_direction(location.road, location.lane)
+    lanes = [
+        roads.location(road, lane, location.s)
+        for lane in roads.lane_ids(road, location.s, drivable=True)
+        if roads.driving_direction(road, lane) != against
+    ]
+    return sorted(lanes, key=lambda lane: abs(lane.t - location.t))[:1]
 
 
 def _further(roads: RoadNetwork, location: LaneLocation) -> list[LaneLocation]:

@@ -148,8 +148,15 @@ def test_route_on_opposite_lane_follows_its_driving_direction(car: ActorSpec, ro
     np.testing.assert_allclose(plan.points[:, 1], 1.75, atol=1e-6)
 
 
-def test_vehicle_against_driving_direction_plans_straight_ahead(car: ActorSpec, roads: RoadNetwork) -> None:
+def test_vehicle_against_traffic_follows_the_lane_of_its_direction(car: ActorSpec, roads: RoadNetwork) -> None:
     plan = planner(car, roads).plan(ego(50.0, -1.75, math.pi), NOTHING, None, 0.0)
+    assert plan.points[0] == pytest.approx((50.0, 1.75), abs=1e-6)
+    assert plan.points[-1] == pytest.approx((0.0, 1.75), abs=1e-6)
+
+
+def test_vehicle_against_one_way_road_plans_straight_ahead(car: ActorSpec) -> None:
+    one_way = RoadNetwork.parse(map_xml(road_xml(lanes=section_xml(right=lane_xml(-1, 3.5)))))
+    plan = planner(car, one_way).plan(ego(50.0, -1.75, math.pi), NOTHING, None, 0.0)
     assert plan.points[-1][0] < 0.0
     np.testing.assert_allclose(plan.points[:, 1], -1.75, atol=1e-6)
 
