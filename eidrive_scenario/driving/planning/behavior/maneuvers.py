@@ -13,7 +13,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
-from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
+from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, STILL, KnownObject
 from eidrive_scenario.driving.planning.behavior.merging import has_gap_now
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
@@ -380,7 +380,7 @@ def _is_in_way(hypothesis: Present, half_width: float) -> bool:
 
 def _blocker(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
-    center, slower = situation.s + body.center, situation.wanted - SLOWER
+    center, slower = situation.s + body.center, max(situation.wanted - SLOWER, STILL)
     slower_ahead = [
         hypothesis
         for hypothesis in scene.present
@@ -399,10 +399,10 @@ def _is_beside(situation: Situation, hypothesis: Present, body: Body) -> bool:
 
 
 def _is_passable(situation: Situation, hypothesis: Present, body: Body) -> bool:
-    """Return whether an object may be passed: not a crossing pedestrian, and standing for some time or moving."""
+    """Return whether an object may be passed: standing for some time or moving, a pedestrian steadily."""
     known_object = situation.objects[hypothesis.owner]
     if known_object.still_since is None:
-        return known_object.kind not in ON_FOOT
+        return known_object.kind not in ON_FOOT or _is_steady(situation, hypothesis)
     if known_object.kind in ON_FOOT and not _is_parked(situation, hypothesis, body):
         return False
     return known_object.kind == "misc" or situation.now - known_object.still_since >= PATIENCE
@@ -435,8 +435,10 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: B
     if situation.stop is not None and situation.stop.s < blocker.s + NEAR_STOP:
         return True
     known_object = situation.objects[blocker.owner]
-    since = known_object.still_since
-    if since is None or situation.now - since >= QUEUE_PATIENCE or _is_beside(situation, blocker, body):
+    since, may_queue = known_object.still_since, known_object.kind != "misc" and known_object.kind not in ON_FOOT
+    if not may_queue or since is None or situation.now - since >= QUEUE_PATIENCE:
+        return False
+    if _is_beside(situation, blocker, body):
         return False
     return any(
         -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP and abs(hypothesis.d - blocker.d) < 1.0

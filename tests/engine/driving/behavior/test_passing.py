@@ -42,6 +42,34 @@ def test_row_of_parked_cars_longer_than_the_horizon_is_passed() -> None:
     assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
 
 
+def test_row_of_obstacles_is_no_queue_and_passed_without_a_stop() -> None:
+    barriers = [KnownBox(100.0 + 7.0 * number, kind="misc", size=(3.0, 1.0)) for number in range(3)]
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads), roads)
+    run.run(18.0, lambda now: barriers)
+    run.world.close()
+    assert run.front > 130.0
+    assert min(run.speeds) > 3.0
+
+
+def test_pedestrian_along_the_lane_is_overtaken() -> None:
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads), roads)
+    walker = KnownBox(80.0, LANE - 0.8, vx=1.4, kind="pedestrian", size=(0.5, 0.5))
+    run.run(25.0, lambda now: [walker._replace(x=80.0 + 1.4 * now)])
+    run.world.close()
+    assert run.front > 80.0 + 1.4 * 25.0 + 10.0
+
+
+def test_standing_car_is_passed_by_a_vehicle_at_walking_pace() -> None:
+    # Along 40 m at 1.5 m/s: 27 s, and a wait behind the car.
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads, 1.5), roads, speed=1.5)
+    run.run(60.0, lambda now: [KnownBox(45.0)])
+    run.world.close()
+    assert run.front > 55.0
+
+
 def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
     """Each car of a row of 36 m is visible from 25 m before the rear of the one before it. A car that comes at 10 m/s
     is beside the vehicle 12 s after the start, and the next one 20 s later: enough for the whole row."""
