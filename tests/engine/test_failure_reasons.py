@@ -35,7 +35,7 @@ CASES = {
     "ncap/crossing_car": (delayed(1.0), {"collision", "reach_position"}),
     "ncap/crossing_child": (delayed(1.0), {"collision", "reach_position"}),
     "driving/lead_braking": (delayed(1.9, own=True), {"collision"}),
-    "ei/scenario_17": (delayed(1.2, own=True), {"reach_position", "time_limit"}),
+    "ei/scenario_17": (delayed(1.5, own=True), {"reach_position", "time_limit"}),
 }
 """Channel and failed criteria of ten scenarios of the library, all of which pass without a delay."""
 LONG = {"coop/scenario_5", "driving/lead_braking", "ei/scenario_17"}
