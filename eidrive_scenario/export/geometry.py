@@ -26,10 +26,12 @@ SPACING = 2.0
 """Maximum distance between the points of a line [m]."""
 DEVIATION = 0.05
 """Maximum distance of the true line from that between two points [m], as OSI demands of lanes and their boundaries."""
-SHORTEST = 0.1
-"""Length of an interval that is not halved [m]."""
+SHARES = (0.25, 0.5, 0.75)
+"""Shares of an interval at which the deviation is measured: an S crosses its chord in the middle."""
+HALVINGS = 3
+"""Maximum number of times that an interval is halved, to bound the points; 0.25 m suffice on the maps of CARLA."""
 _MAX_POINTS = 400_000
-"""Maximum number of points of all lines of a map, which increases the distance on large maps."""
+"""Maximum number of points of all lines of a map before halving, which increases the distance on large maps."""
 _MARKS: Mapping[str, str] = {
     "none": "NO_LINE",
     "broken": "DASHED_LINE",
@@ -110,14 +112,18 @@ def _line(
 
     stations = np.array(equidistant(*ends, spacing))
     line, fresh = points(stations), np.diff(stations) > 0.0
-    while fresh.any():
-        middle = 0.5 * (stations[1:] + stations[:-1])[fresh]
-        bent = points(middle)
-        away = np.linalg.norm(bent - 0.5 * (line[1:] + line[:-1])[fresh], axis=1)
-        added = (away > DEVIATION) & (np.diff(stations)[fresh] > SHORTEST)
-        at = np.flatnonzero(fresh)[added] + 1
-        stations, line = np.insert(stations, at, middle[added]), np.insert(line, at, bent[added], axis=0)
-        halves = np.isin(stations, middle[added])
+    for _ in range(HALVINGS):
+        if not fresh.any():
+            break
+        start, step = stations[:-1][fresh], np.diff(stations)[fresh]
+        first, chord = line[:-1][fresh], np.diff(line, axis=0)[fresh]
+        between = [points(start + share * step) for share in SHARES]
+        pairs = zip(SHARES, between, strict=True)
+        away = np.max([np.linalg.norm(point - first - share * chord, axis=1) for share, point in pairs], axis=0)
+        added = away > DEVIATION
+        at, middle = np.flatnonzero(fresh)[added] + 1, (start + SHARES[1] * step)[added]
+        stations, line = np.insert(stations, at, middle), np.insert(line, at, between[1][added], axis=0)
+        halves = np.isin(stations, middle)
         fresh = halves[1:] | halves[:-1]
     return stations.tolist(), line.tolist()
 

@@ -55,3 +55,16 @@ def test_lines_of_a_tight_bend_deviate_by_at_most_5_cm() -> None:
         points = np.array(line)[:, :2] - (0.0, 2.0)
         assert np.hypot(*points.T) == pytest.approx(radius)
         assert radius - np.hypot(*(0.5 * (points[1:] + points[:-1])).T).min() <= 0.05
+
+
+def test_line_follows_an_s_that_crosses_its_chord_in_the_middle() -> None:
+    """With the width 3.5 + 0.3 (x³ - 3 x² + 2 x) on the first 2 m, up to 0.115 m beside the chord."""
+    width = '<width sOffset="0" a="3.5" b="0.6" c="-0.9" d="0.3"/><width sOffset="2" a="3.5" b="0" c="0" d="0"/>'
+    text = ROAD.format(shape="<line/>", marks="").replace('<width sOffset="0" a="3.5" b="0" c="0" d="0"/>', width)
+    roads = RoadNetwork.parse(text.encode(), "road.xodr")
+    road = roads.roads["1"]
+    (section,) = road.sections
+    (edge,) = lane_edges(section, section.lanes[-1])
+    x, y, _ = np.array(edge_line(roads, road, section, section.lanes[-1], edge, 2.0)).T
+    at = np.linspace(0.0, 2.0, 201)
+    assert np.abs(np.interp(at, x, -y) - np.polyval([0.3, -0.9, 0.6, 3.5], at)).max() <= 0.05
