@@ -13,7 +13,13 @@ from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import FREE
 from eidrive_scenario.traffic.right_of_way import MustStop
 from eidrive_scenario.traffic.spawning.bodies import WALKING, Participant
-from eidrive_scenario.traffic.spawning.sites import SpawnAreas, SpawnSites, comfortable_speeds, is_unoccupied
+from eidrive_scenario.traffic.spawning.sites import (
+    SpawnAreas,
+    SpawnSites,
+    comfortable_speeds,
+    is_unoccupied,
+    leaders_ahead,
+)
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -133,9 +139,10 @@ class Population:
         """
         order = rng.permutation(len(sites))[:TRIES]
         some, speed = sites.subset(order), np.minimum(speed[order], participant.spec.max_speed)
+        leaders = leaders_ahead(self.fleet, some, participant)
         if given_speed is None:
-            speed = np.minimum(speed, comfortable_speeds(self.fleet, some, participant))
-        at = np.flatnonzero(is_unoccupied(self.fleet, some, participant, speed, self._foreign))
+            speed = np.minimum(speed, comfortable_speeds(self.fleet.lanes, some, participant, leaders))
+        at = np.flatnonzero(is_unoccupied(self.fleet, some, participant, speed, leaders, self._foreign))
         if not at.size:
             return False
         n = int(at[0])

@@ -35,6 +35,8 @@ REACH = 30.0
 """Maximum distance of a traffic position from a lane [m]."""
 AIR = 0.5
 """Minimum gap between the box of a new participant and all others [m]."""
+ROUNDING = 1e-6
+"""Reduction of a comfortable speed, so that rounding does not make its braking more than comfortable [m/s]."""
 _NOBODY = -9
 """Index in the fleet of a participant that is not in it."""
 
@@ -141,13 +143,19 @@ def is_wide_enough(sites: SpawnSites, participant: Participant) -> Bools:
     return np.asarray(sites.width >= (width if participant.walks else min(width, WIDEST)))
 
 
-def comfortable_speeds(fleet: Fleet, sites: SpawnSites, participant: Participant) -> Array:
+def leaders_ahead(fleet: Fleet, sites: SpawnSites, participant: Participant) -> Leaders:
+    """Return the leaders of a participant at each site."""
+    lanes, front = fleet.lanes, np.full(len(sites), participant.front)
+    chain = lanes.chain(sites.lane, PLANNED + 1)
+    return find_leaders(lanes, chain, sites.progress, front, fleet.occupants(), own=np.full(len(sites), _NOBODY))
+
+
+def comfortable_speeds(lanes: TrafficLanes, sites: SpawnSites, participant: Participant, leaders: Leaders) -> Array:
     """Return the maximum speeds (K,) from which a participant brakes comfortably for its leader [m/s].
 
     A vehicle can also stop before the next junction as for a light that changes: it has no right of way yet.
     """
-    lanes, driver = fleet.lanes, participant.driver
-    leaders = _leaders(fleet, sites, participant)
+    driver = participant.driver
     # The model brakes with b where s0 + v T + v (v - v_leader) / c = gap sqrt(b / a), and c = 2 sqrt(a b)
     c = 2.0 * math.sqrt(driver.acceleration * driver.deceleration)
     free = leaders.gap * math.sqrt(driver.deceleration / driver.acceleration) - driver.standstill_gap
@@ -156,17 +164,12 @@ def comfortable_speeds(fleet: Fleet, sites: SpawnSites, participant: Participant
     if not participant.walks:
         stop = lanes.to_junction(sites.lane, sites.progress) - participant.front - STOP_LINE
         speed = np.minimum(speed, np.sqrt(2.0 * TOO_LATE * np.maximum(stop, 0.0)))
-    return np.asarray(np.maximum(speed - 1e-6, 0.0))
+    return np.asarray(np.maximum(speed - ROUNDING, 0.0))
 
 
-def _leaders(fleet: Fleet, sites: SpawnSites, participant: Participant) -> Leaders:
-    """Return the leaders of a participant at each site."""
-    lanes, front = fleet.lanes, np.full(len(sites), participant.front)
-    chain = lanes.chain(sites.lane, PLANNED + 1)
-    return find_leaders(lanes, chain, sites.progress, front, fleet.occupants(), own=np.full(len(sites), _NOBODY))
-
-
-def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Bools:
+def is_unoccupied(
+    fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, leaders: Leaders, foreign: Array
+) -> Bools:
     """Return whether a participant can be spawned at each site with speeds (K,) [m/s].
 
     It must not overlap others, must need at most comfortable braking for its leader, and its follower likewise.
@@ -174,7 +177,6 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     """
     lanes, spec, driver = fleet.lanes, participant.spec, participant.driver
     count, occupants = len(sites), fleet.occupants()
-    leaders = _leaders(fleet, sites, participant)
     rear = np.full(count, participant.front - spec.size[0])
     followers = find_followers(lanes, sites.lane, sites.progress, rear, occupants, np.full(count, _NOBODY))
     own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))

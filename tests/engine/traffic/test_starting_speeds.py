@@ -11,7 +11,7 @@ from fleet_scene import LENGTH, REAR_AXLE, car, street
 from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, Participant, SpawnSites
-from eidrive_scenario.traffic.spawning.sites import comfortable_speeds
+from eidrive_scenario.traffic.spawning.sites import comfortable_speeds, leaders_ahead
 
 FRONT = REAR_AXLE + LENGTH / 2.0
 """Distance from the reference point to the front bumper [m]."""
@@ -20,7 +20,9 @@ FRONT = REAR_AXLE + LENGTH / 2.0
 def speed_at(fleet: Fleet, roads: RoadNetwork, lane: int, s: float) -> float:
     number, progress = fleet.lanes.of(roads.location("1", lane, s))
     sites = SpawnSites.at(fleet.lanes, np.array([number]), np.array([progress]))
-    return float(comfortable_speeds(fleet, sites, Participant(car("new"), IntelligentDriver()))[0])
+    participant = Participant(car("new"), IntelligentDriver())
+    leaders = leaders_ahead(fleet, sites, participant)
+    return float(comfortable_speeds(fleet.lanes, sites, participant, leaders)[0])
 
 
 def test_car_can_stop_before_the_junction_ahead(library_roads: RoadNetwork) -> None:

@@ -258,7 +258,7 @@ ONCOMING_SPEED = 0.5
 BEFORE_ZONE = 1.5
 """Distance between the front of a waiting vehicle and the zone that others cross [m]."""
 LEAST_TOP = 0.5
-"""Least top speed by which the time to cover a gap is computed [m/s]."""
+"""Least top speed by which the time to cover a gap is computed, so that it is finite [m/s]; a choice."""
 RELEASE = 0.3
 """Time after which a zone counts as free when the crossing object has left it [s]."""
 
