@@ -25,7 +25,7 @@ class Plan(msgspec.Struct, frozen=True, gc=False):
     speeds: Array
     reason: str
     acceleration: float = 0.0
-    """Rate of change of the first speed [m/s²]."""
+    """Rate of change of the first speed, which is that at the vehicle [m/s²]; negative: its deceleration now."""
     braking: float | None = None
     """Deceleration that overrides the speeds [m/s²]."""
     objects: tuple[int, ...] = ()

@@ -80,6 +80,8 @@ STANDSTILL = 0.3
 """Speed below which a stopping vehicle holds its brake [m/s]."""
 GRAVITY = 9.81
 """[m/s²]; the pedals compensate its part along a slope."""
+ROLLING_RESISTANCE = 0.012 * GRAVITY
+"""Deceleration by the rolling resistance of tires on asphalt [m/s²]."""
 HOLDING = 3.0
 """Deceleration that corresponds to the held brake: sufficient on a slope of 30 % [m/s²]."""
 
@@ -106,6 +108,8 @@ class PidController(VehicleController):
             braking = max(plan.braking + _downhill(ego), 0.0)
             return Control(0.0, _pedal(braking, self.spec.max_deceleration), steering)
         target, falling = _speed_here(ego, plan)
+        if plan.acceleration < 0.0:  # exact, unlike the profile between two points; the tires take their part
+            target, falling = float(plan.speeds[0]), plan.acceleration + ROLLING_RESISTANCE
         if target < STANDSTILL and ego.speed < STANDSTILL:
             self._speed.reset()
             acceleration = -HOLDING

@@ -304,19 +304,13 @@ def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[i
     along = line.along[part]
     offset = decision.profile.offset(along)
     points = line.points[part] + offset[:, None] * line.normal[part]
-    squares = np.interp(along, decision.s, decision.speed**2)
+    # The first point is behind the vehicle; its speed is that at the vehicle.
+    squares = np.interp([s, *along[1:]], decision.s, decision.speed**2)
     speeds = np.sqrt(squares) if s < line.length or not line.path.ends else np.zeros(len(along))
-    acceleration = decision.acceleration
-    if acceleration > 0.0 and speeds[0] < CREEPING:
+    # It does not start for the last decimeters of a gap, which it does not cover faster than that.
+    if decision.acceleration > 0.0 and speeds[0] < CREEPING <= decision.speed.max():
         speeds = np.maximum(speeds, CREEPING)
-    return Plan(
-        points,
-        speeds,
-        decision.reason,
-        acceleration=max(acceleration, 0.0),
-        braking=decision.braking,
-        objects=rows,
-    )
+    return Plan(points, speeds, decision.reason, decision.acceleration, decision.braking, rows)
 
 
 def _planned_part(line: ReferenceLine, s: float) -> slice:

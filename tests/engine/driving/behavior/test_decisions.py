@@ -11,6 +11,7 @@ from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detecti
 from signal_street import CAR
 
 from eidrive_scenario.base.requests import Goal
+from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
@@ -131,7 +132,7 @@ def test_message_of_half_a_second_ago_delays_the_reaction_to_braking(roads: Road
 
     starts = []
     for age in (0.0, 0.5):
-        run = drive(roads, lead, 12.0, age=age)
+        run = drive(roads, lead, 12.0, age=age, lane_changes=False)
         assert run.front < lead(12.0)[0].x - 2.25, "no contact"
         slow = np.array([speed < run.speeds[58] - 0.3 for speed in run.speeds])
         slow[:60] = False
@@ -210,6 +211,20 @@ def test_decisions_have_the_period_of_the_settings(roads: RoadNetwork) -> None:
             changes.append(now)
         before = reason
     assert changes[0] == pytest.approx(0.4), "decisions at 0, 0.2 and 0.4 s; the object appears at 0.25 s"
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 0.75])
+def test_vehicle_brakes_as_planned_between_two_points_of_the_path(roads: RoadNetwork, share: float) -> None:
+    # A stop within 14 m needs 3.6 m/s², and one that keeps a gap all of the hard deceleration, 4 m/s².
+    planner = behavior(roads)
+    for now, x in ((0.0, 20.0), (1.0, 30.0 + share)):
+        state = EgoState(now, np.array([x, LANE, 0.0]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0)
+        objects = [KnownBox(x + FRONT + 14.0 + 2.25)] if now else []
+        plan = planner.plan(state, detections(now, *objects), Goal(), now)
+    assert plan.speeds[0] == pytest.approx(10.0)
+    assert plan.acceleration == pytest.approx(-4.0)
+    rolling = 0.012 * 9.81
+    assert PidController(CAR, 0.05).control(state, plan).brake == pytest.approx((4.0 - rolling) / CAR.max_deceleration)
 
 
 @pytest.mark.parametrize("start", [50.0, 58.0])
