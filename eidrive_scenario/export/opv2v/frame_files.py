@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,96 +14,34 @@ from eidrive_scenario.files.atomic import create
 
 DECIMALS = 9
 """Decimals of written numbers: the last one of an angle in degrees moves a point at 140 m by less than 1e-8 m."""
-Pose = Sequence[float]
-"""x, y, z [m], roll, yaw, pitch [degrees]."""
 
 
-@dataclass(frozen=True)
-class ObjectEntry:
-    """True object.
+def frame_text(content: Mapping[str, Any]) -> str:
+    """Return the YAML of a frame: mappings by lines, lists of numbers in one line each, those of a matrix by rows.
 
-    location  point below the center of its box, at the height of the base of the box [m]
-    angle     roll, yaw, pitch [degrees]
-    extent    half length, width, height [m]
-    speed     [km/h]
-    category  class of this project
+    The text is composed here, as writing it by PyYAML would take longer than a scan.
     """
-
-    location: Sequence[float]
-    angle: Sequence[float]
-    extent: Sequence[float]
-    speed: float
-    category: str
+    return "\n".join(_lines(content)) + "\n"
 
 
-@dataclass(frozen=True)
-class CameraEntry:
-    """Camera: pose, matrix (4, 4) from the lidar to the camera in left-handed axes, and (3, 3) of the lens [px]."""
-
-    cords: Pose
-    extrinsic: Sequence[Sequence[float]]
-    intrinsic: Sequence[Sequence[float]]
-
-
-@dataclass(frozen=True)
-class StationFrame:
-    """State of a station, and true objects around it.
-
-    speed      of the station [km/h]
-    extent     half length, width, height of its box [m]
-    pose       of the point below the center of its box; `estimate` is the pose that it assumes
-    vehicles   true vehicles that its lidar hits, by id;  pedestrians  the same of pedestrians
-    """
-
-    lidar_pose: Pose
-    pose: Pose
-    estimate: Pose
-    speed: float
-    extent: Sequence[float]
-    cameras: Sequence[CameraEntry]
-    vehicles: Mapping[int, ObjectEntry]
-    pedestrians: Mapping[int, ObjectEntry]
-
-    def text(self) -> str:
-        """Return the YAML of the frame. `ego_extent`, `pedestrians` and `obj_type` are additions to OPV2V.
-
-        The text is composed here, as writing it by PyYAML would take longer than a scan.
-        """
-        lines: list[str] = []
-        for number, camera in enumerate(self.cameras):
-            lines += [f"camera{number}:", f"  cords: {_list(camera.cords)}"]
-            for name, matrix in (("extrinsic", camera.extrinsic), ("intrinsic", camera.intrinsic)):
-                lines += [f"  {name}:", *(f"  - {_list(row)}" for row in matrix)]
-        lines += [
-            f"ego_extent: {_list(self.extent)}",
-            f"ego_speed: {_number(self.speed)}",
-            f"lidar_pose: {_list(self.lidar_pose)}",
-            "plan_trajectory: []",
-            f"predicted_ego_pos: {_list(self.estimate)}",
-            f"true_ego_pos: {_list(self.pose)}",
-        ]
-        for name, objects in (("pedestrians", self.pedestrians), ("vehicles", self.vehicles)):
-            lines += _objects(name, objects)
-        return "\n".join(lines) + "\n"
+def _lines(content: Mapping[Any, Any], indent: str = "") -> Iterator[str]:
+    for key, value in content.items():
+        if isinstance(value, Mapping) and value:
+            yield f"{indent}{key}:"
+            yield from _lines(value, f"{indent}  ")
+        elif isinstance(value, list) and value and isinstance(value[0], list):
+            yield f"{indent}{key}:"
+            yield from (f"{indent}- {_flow(row)}" for row in value)
+        else:
+            yield f"{indent}{key}: {_flow(value)}"
 
 
-def _objects(name: str, objects: Mapping[int, ObjectEntry]) -> list[str]:
-    lines = [f"{name}:" if objects else f"{name}: {{}}"]
-    for number, entry in sorted(objects.items()):
-        lines += [
-            f"  {number}:",
-            f"    angle: {_list(entry.angle)}",
-            f"    center: {_list([0.0, 0.0, entry.extent[2]])}",
-            f"    extent: {_list(entry.extent)}",
-            f"    location: {_list(entry.location)}",
-            f"    obj_type: {entry.category}",
-            f"    speed: {_number(entry.speed)}",
-        ]
-    return lines
-
-
-def _list(values: Sequence[float]) -> str:
-    return f"[{', '.join(map(_number, values))}]"
+def _flow(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{}"  # others have lines
+    if isinstance(value, list):
+        return f"[{', '.join(map(_number, value))}]"
+    return value if isinstance(value, str) else _number(value)
 
 
 def _number(value: float) -> str:
@@ -147,9 +84,8 @@ def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
     """Write an image (H, W, 3). Raise OutputError if the file cannot be written."""
     import cv2
 
-    _, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
-    encoded: Any = data
-    write_file(path, encoded.tobytes())
+    _, data = cv2.imencode(".png", rgb[..., ::-1])
+    write_file(path, data.tobytes())
 
 
 def write_file(path: Path, content: bytes) -> None:

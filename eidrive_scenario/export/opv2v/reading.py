@@ -19,8 +19,7 @@ from eidrive_scenario.export.traffic_recording.scene import (
     MAX_NUMBER,
     OUT_OF_RANGE,
     STATION_SIZE,
-    MobileStation,
-    RoadsideStation,
+    LidarStation,
     Track,
     TrafficScene,
     assumed_size,
@@ -188,8 +187,8 @@ def read_scene(folder: Path) -> TrafficScene:
         folder_name(folder),
         (numbers[-1] - numbers[0]) * FRAME_STEP,
         [track(number, samples) for number, samples in sorted(objects.items())],
-        [MobileStation(name_of(number), relative_lidar(number)) for number in mobile],
-        [RoadsideStation(f"RoadsideUnit{-number}", first_lidar(number)) for number in stations if number < 0],
+        [LidarStation(name_of(number), relative_lidar(number)) for number in mobile],
+        [LidarStation(f"RoadsideUnit{-number}", first_lidar(number)) for number in stations if number < 0],
         warnings,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,14 +13,7 @@ from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.driving.agent_factory import station_sensors
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
-from eidrive_scenario.export.opv2v.frame_files import (
-    CameraEntry,
-    ObjectEntry,
-    StationFrame,
-    write_file,
-    write_pcd,
-    write_png,
-)
+from eidrive_scenario.export.opv2v.frame_files import frame_text, write_file, write_pcd, write_png
 from eidrive_scenario.export.opv2v.poses import MIRROR, opv2v_pose
 from eidrive_scenario.export.opv2v.reader_limits import ReaderLimits
 from eidrive_scenario.openscenario import Scenario
@@ -133,8 +127,8 @@ class Opv2vWriter:
             listed[name] = [other for other in hit_actors if view.categories[view.rows[other]] not in _NO_VEHICLES]
             step = frame.steps.get(name)
             estimate = None if step is None else step.estimate
-            station_frame = self._frame(view, name, hit_actors, readings[name], estimate)
-            self._write(number, name, readings[name], cloud, station_frame)
+            content = self._content(view, name, hit_actors, readings[name], estimate)
+            self._write(number, name, readings[name], cloud, content)
         # Frames that lack a station are omitted later, and readers find the ego in each of the others.
         if len(present) == len(self.stations):
             objects = dict.fromkeys(other for names in listed.values() for other in names)
@@ -156,35 +150,42 @@ class Opv2vWriter:
             self._ids[name] = FIRST_ID + len(self._ids)
         return self._ids[name]
 
-    def _frame(
+    def _content(
         self, view: WorldView, name: str, hit_actors: Sequence[str], readings: Readings, estimate: EgoState | None
-    ) -> StationFrame:
+    ) -> dict[str, Any]:
+        """Return the content of the YAML of a station; its objects are the actors that its lidar hits.
+
+        Poses are those below the centers of boxes, extents half lengths, widths and heights [m], speeds are in km/h.
+        `ego_extent`, `pedestrians` and `obj_type` are additions to OPV2V.
+        """
         row = view.rows[name]
         (cloud,) = readings.lidars.values()
-        vehicles: dict[int, ObjectEntry] = {}
-        pedestrians: dict[int, ObjectEntry] = {}
+        objects: dict[str, dict[int, dict[str, Any]]] = {"pedestrians": {}, "vehicles": {}}
         for other in hit_actors:
             category = view.categories[view.rows[other]]
             if other != name and category != "misc":
-                entries = pedestrians if category == "pedestrian" else vehicles
-                entries[self._id(other)] = _entry(view, view.rows[other])
-        return StationFrame(
-            opv2v_pose(cloud.pose),
-            opv2v_pose(_base_pose(view, row)),
-            opv2v_pose(_base_pose(view, row, estimate)),
-            _speed(view, row),
-            (view.size[row] / 2.0).tolist(),
-            [_camera(camera, cloud.pose) for camera in readings.cameras.values()],
-            vehicles,
-            pedestrians,
-        )
+                kind = "pedestrians" if category == "pedestrian" else "vehicles"
+                objects[kind][self._id(other)] = _object(view, view.rows[other])
+        cameras = enumerate(readings.cameras.values())
+        return {
+            **{f"camera{number}": _camera(camera, cloud.pose) for number, camera in cameras},
+            "ego_extent": (view.size[row] / 2.0).tolist(),
+            "ego_speed": _speed(view, row),
+            "lidar_pose": opv2v_pose(cloud.pose),
+            "plan_trajectory": [],
+            "predicted_ego_pos": opv2v_pose(_base_pose(view, row, estimate)),
+            "true_ego_pos": opv2v_pose(_base_pose(view, row)),
+            **{kind: dict(sorted(entries.items())) for kind, entries in objects.items()},
+        }
 
-    def _write(self, number: int, name: str, readings: Readings, cloud: LidarReading, frame: StationFrame) -> None:
+    def _write(
+        self, number: int, name: str, readings: Readings, cloud: LidarReading, content: Mapping[str, Any]
+    ) -> None:
         folder = self.folder / str(self.stations[name])
         write_pcd(folder / f"{number:06d}.pcd", cloud.points * MIRROR.diagonal()[:3], cloud.intensity)
         for camera_number, camera in enumerate(readings.cameras.values()):
             write_png(folder / f"{number:06d}_camera{camera_number}.png", camera.rgb)
-        write_file(folder / f"{number:06d}.yaml", frame.text().encode())
+        write_file(folder / f"{number:06d}.yaml", frame_text(content).encode())
         self._written.setdefault(name, []).append(number)
 
     def conclude(self, result: RunResult) -> None:
@@ -249,15 +250,22 @@ def _speed(view: WorldView, row: int) -> float:
     return 3.6 * float(np.linalg.norm(view.velocity[row]))
 
 
-def _entry(view: WorldView, row: int) -> ObjectEntry:
-    x, y, z, roll, yaw, pitch = opv2v_pose(_base_pose(view, row))
-    return ObjectEntry(
-        (x, y, z), (roll, yaw, pitch), (view.size[row] / 2.0).tolist(), _speed(view, row), view.categories[row]
-    )
+def _object(view: WorldView, row: int) -> dict[str, Any]:
+    x, y, z, *angles = opv2v_pose(_base_pose(view, row))
+    extent = (view.size[row] / 2.0).tolist()
+    return {
+        "angle": angles,
+        "center": [0.0, 0.0, extent[2]],
+        "extent": extent,
+        "location": [x, y, z],
+        "obj_type": view.categories[row],
+        "speed": _speed(view, row),
+    }
 
 
-def _camera(reading: CameraReading, lidar: Array) -> CameraEntry:
+def _camera(reading: CameraReading, lidar: Array) -> dict[str, Any]:
+    """Return pose, matrix (4, 4) from the lidar to the camera in left-handed axes, and (3, 3) of the lens [px]."""
     pose = reading.pose.copy()
     pose[:3, :3] = pose[:3, :3] @ _OPTICAL.T
     extrinsic = MIRROR @ np.linalg.inv(pose) @ lidar @ MIRROR
-    return CameraEntry(opv2v_pose(pose), extrinsic.tolist(), reading.intrinsics.tolist())
+    return {"cords": opv2v_pose(pose), "extrinsic": extrinsic.tolist(), "intrinsic": reading.intrinsics.tolist()}

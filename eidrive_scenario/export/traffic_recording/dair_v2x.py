@@ -23,8 +23,7 @@ from eidrive_scenario.export.traffic_recording.scene import (
     MAX_NUMBER,
     OUT_OF_RANGE,
     STATION_SIZE,
-    MobileStation,
-    RoadsideStation,
+    LidarStation,
     Track,
     TrafficScene,
     assumed_size,
@@ -243,10 +242,10 @@ def _scene(folder: Path, name: str, frames: list[_Frame]) -> TrafficScene:
         open_tracks += _continue(open_tracks, others, time)
     tracks = [_station_track(times, lidars, own)]
     tracks += [_track(number, track) for number, track in enumerate([*done, *open_tracks], 1)]
-    mobile = MobileStation(VEHICLE_NAME, np.linalg.inv(tracks[0].poses[0]) @ lidars[0])
+    mobile = LidarStation(VEHICLE_NAME, np.linalg.inv(tracks[0].poses[0]) @ lidars[0])
     assert unit is not None
     warnings = [] if any(own) else [assumed_size("the vehicle with the lidar")]
-    return TrafficScene(name, times[-1], tracks, [mobile], [RoadsideStation(UNIT_NAME, unit)], warnings)
+    return TrafficScene(name, times[-1], tracks, [mobile], [LidarStation(UNIT_NAME, unit)], warnings)
 
 
 def _vehicle_lidar(folder: Path, number: str) -> Array:

@@ -14,7 +14,7 @@ from lxml import etree
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.export.geometry import angles
-from eidrive_scenario.export.traffic_recording.scene import RoadsideStation, Track, TrafficScene
+from eidrive_scenario.export.traffic_recording.scene import LidarStation, Track, TrafficScene
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, SCENARIO_SUFFIX, library_path
 from eidrive_scenario.files.encodable import encodable, printable
 from eidrive_scenario.files.yaml_text import flow_yaml
@@ -240,7 +240,7 @@ def _position(parent: etree._Element, pose: Array) -> None:
     _add(parent, "WorldPosition", **{key: f"{round(value, 9) + 0.0:.9f}" for key, value in values.items()})
 
 
-def _add_mast(entities: etree._Element, start: etree._Element, unit: RoadsideStation, lidar: dict[str, object]) -> None:
+def _add_mast(entities: etree._Element, start: etree._Element, unit: LidarStation, lidar: dict[str, object]) -> None:
     """Add the mast of a roadside unit, with its lidar on the top."""
     yaw, pitch, _ = angles(unit.lidar[:3, :3])
     x, y, height = unit.lidar[:3, 3].tolist()

@@ -53,16 +53,8 @@ class Track:
 
 
 @dataclass(frozen=True)
-class MobileStation:
-    """Vehicle with a lidar: name of its track, and pose (4, 4) of the lidar relative to the center of its box."""
-
-    name: str
-    lidar: Array
-
-
-@dataclass(frozen=True)
-class RoadsideStation:
-    """Roadside unit: its name, and the pose (4, 4) of its lidar in the world."""
+class LidarStation:
+    """Station with a lidar: its name, for a vehicle that of its track, and the pose (4, 4) of the lidar."""
 
     name: str
     lidar: Array
@@ -70,13 +62,17 @@ class RoadsideStation:
 
 @dataclass
 class TrafficScene:
-    """Scene of a recording; `end` is the time of the last frame [s], the first one has the time 0."""
+    """Scene of a recording; `end` is the time of the last frame [s], the first one has the time 0.
+
+    mobile    vehicles with a lidar, whose pose is relative to the center of their box
+    roadside  roadside units with the poses of their lidars in the world
+    """
 
     name: str
     end: float
     tracks: list[Track]
-    mobile: list[MobileStation]
-    roadside: list[RoadsideStation]
+    mobile: list[LidarStation]
+    roadside: list[LidarStation]
     warnings: list[str] = field(default_factory=list)
 
 

@@ -36,7 +36,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import points_in_box, rotation_matrix
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.export.opv2v.dataset import read_sensors
-from eidrive_scenario.export.opv2v.frame_files import StationFrame, write_pcd
+from eidrive_scenario.export.opv2v.frame_files import frame_text, write_pcd
 from eidrive_scenario.export.opv2v.poses import opv2v_pose, pose_matrix
 from eidrive_scenario.export.opv2v.reader_limits import ReaderLimits
 from eidrive_scenario.export.opv2v.writer import Opv2vWriter
@@ -349,8 +349,8 @@ def test_limits_of_readers_are_warnings() -> None:
 
 
 def test_numbers_of_frames_have_no_exponents_and_no_negative_zero() -> None:
-    text = StationFrame([1e-7, -0.0, 1e6, 0.0, -1e-12, 0.1], [0.0] * 6, [0.0] * 6, 0.0, [1.0] * 3, [], {}, {}).text()
-    assert "lidar_pose: [0.0000001, 0.0, 1000000.0, 0.0, 0.0, 0.1]\n" in text
+    text = frame_text({"lidar_pose": [1e-7, -0.0, 1e6, 0.0, -1e-12, 0.1]})
+    assert text == "lidar_pose: [0.0000001, 0.0, 1000000.0, 0.0, 0.0, 0.1]\n"
 
 
 @pytest.mark.parametrize("sensors", ["truth", "{a: {kind: lidar}, b: {kind: lidar}}", "camera"])
