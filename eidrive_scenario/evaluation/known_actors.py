@@ -117,20 +117,12 @@ class FalseTracks:
             step = frame.steps.get(name)
             if step is None or step.plan is None:
                 continue
-            station = self._stations.get(name)
-            if station is None:
-                station = self._stations[name] = _Station()
-            boxes = step.fused.boxes.tolist()
-            rows = _unmatched(boxes, view, view.rows.get(name, -1)) if boxes else ()
-            if rows:
-                existence = step.fused.confidence.tolist()
-                rows = [row for row in rows if existence[row] >= limit]
-            if rows or station.false:
-                points = [(boxes[row][0], boxes[row][1]) for row in rows]
-                station.tracks += sum(
-                    all(math.dist(point, before) > SAME for before in station.false) for point in points
-                )
-                station.false = points
+            station = self._stations.setdefault(name, _Station())
+            boxes, existence = step.fused.boxes.tolist(), step.fused.confidence.tolist()
+            rows = [row for row in _unmatched(boxes, view, view.rows.get(name)) if existence[row] >= limit]
+            points = [(boxes[row][0], boxes[row][1]) for row in rows]
+            station.tracks += sum(all(math.dist(point, before) > SAME for before in station.false) for point in points)
+            station.false = points
             braking = step.plan.braking is not None or -step.plan.acceleration > self._harder_than
             if braking and not station.braking:
                 station.brakings += 1
@@ -140,8 +132,8 @@ class FalseTracks:
 
     def brakings(self, station: str) -> Brakings:
         """Return the brakings of a station."""
-        observed = self._stations.get(station)
-        return Brakings(0, 0) if observed is None else Brakings(observed.brakings, observed.without_cause)
+        observed = self._stations.get(station, _Station())
+        return Brakings(observed.brakings, observed.without_cause)
 
     def metrics(self) -> dict[str, float]:
         """Return `false_tracks.NAME.per_minute`, `.brakings` and `.brakings_without_cause` of each station."""
@@ -154,20 +146,10 @@ class FalseTracks:
         return metrics
 
 
-def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> Sequence[int]:
-    """Return the rows of objects without a true actor within GATE."""
-    bodies = view.plain_boxes
-    unmatched = []
-    for row, box in enumerate(boxes):
-        x, y = box[0], box[1]
-        for index, body in enumerate(bodies):
-            dx, dy = x - body[0], y - body[1]
-            if dx * dx + dy * dy <= GATE * GATE and index != own:
-                break
-        else:
-            if not any(index != own and _beside(x, y, body) for index, body in enumerate(bodies)):
-                unmatched.append(row)
-    return unmatched
+def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int | None) -> list[int]:
+    """Return the rows of objects without a true actor within GATE, other than that in row `own`."""
+    bodies = [body for row, body in enumerate(view.plain_boxes) if row != own]
+    return [row for row, (x, y, *_) in enumerate(boxes) if not any(_beside(x, y, body) for body in bodies)]
 
 
 def _beside(x: float, y: float, body: Sequence[float]) -> bool:

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, set_stamp
+from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, stamp, vector
 from eidrive_scenario.files.atomic import partial_path
 from eidrive_scenario.files.bounded import is_regular_file, load_json, read_regular_file
 from eidrive_scenario.recording.camera_images import camera_file
@@ -95,15 +95,14 @@ def image_message(foxglove: Foxglove, picture: Picture, time: float) -> Any:
     """Return an image. Raise OSError if it cannot be read."""
     data = read_regular_file(picture.path, _LARGEST_IMAGE)
     frame = frame_of(picture.station, picture.camera)
-    message = foxglove.image(frame_id=frame, format="jpeg", data=data)
-    set_stamp(message.timestamp, time)
-    return message
+    return foxglove.image(timestamp=stamp(time), frame_id=frame, format="jpeg", data=data)
 
 
 def calibration_message(foxglove: Foxglove, camera: Camera, time: float) -> Any:
     """Return the calibration of a camera, with Brown's distortion."""
     lens = camera.intrinsics
-    message = foxglove.calibration(
+    return foxglove.calibration(
+        timestamp=stamp(time),
         frame_id=frame_of(camera.station, camera.name),
         width=camera.width,
         height=camera.height,
@@ -113,8 +112,6 @@ def calibration_message(foxglove: Foxglove, camera: Camera, time: float) -> Any:
         R=np.eye(3).ravel().tolist(),
         P=np.column_stack([lens, np.zeros(3)]).ravel().tolist(),
     )
-    set_stamp(message.timestamp, time)
-    return message
 
 
 def add_camera_transforms(transforms: Any, cameras: list[Camera], present: Iterator[str], time: float) -> None:
@@ -122,19 +119,19 @@ def add_camera_transforms(transforms: Any, cameras: list[Camera], present: Itera
     here = set(present)
     for camera in cameras:
         if camera.station in here:
-            transform = transforms.transforms.add()
-            set_stamp(transform.timestamp, time)
-            transform.parent_frame_id = frame_of(camera.station)
-            transform.child_frame_id = frame_of(camera.station, camera.name)
-            transform.translation.x, transform.translation.y, transform.translation.z = camera.pose[:3, 3].tolist()
-            x, y, z, w = _quaternion(camera.pose[:3, :3])
-            transform.rotation.x, transform.rotation.y, transform.rotation.z, transform.rotation.w = x, y, z, w
+            transforms.transforms.add(
+                timestamp=stamp(time),
+                parent_frame_id=frame_of(camera.station),
+                child_frame_id=frame_of(camera.station, camera.name),
+                translation=vector(camera.pose[:3, 3].tolist()),
+                rotation=_rotation(camera.pose[:3, :3]),
+            )
 
 
-def _quaternion(turn: Array) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of a rotation matrix."""
+def _rotation(turn: Array) -> dict[str, float]:
+    """Return the quaternion of a rotation matrix."""
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
-    norm = math.hypot(x, y, z, w)
-    return x / norm, y / norm, z / norm, w / norm
+    quaternion = Rotation.from_matrix(turn).as_quat().tolist()
+    norm = math.hypot(*quaternion)
+    return {axis: value / norm for axis, value in zip("xyzw", quaternion, strict=True)}

@@ -10,7 +10,7 @@ from typing import Any
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.evaluation.criterion import Verdict
-from eidrive_scenario.export.foxglove.schemas import Foxglove, set_stamp
+from eidrive_scenario.export.foxglove.schemas import Foxglove, stamp
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.run_log import (
     Decisions,
@@ -73,9 +73,8 @@ class RunMessages:
             yield self._message(time, level, "criterion", f"{verdict.name}: {outcome}; {verdict.reason}")
 
     def _message(self, time: float, level: str, name: str, text: str) -> Any:
-        message = self._foxglove.log(level=self._foxglove.log.Level.Value(level), name=name, message=text)
-        set_stamp(message.timestamp, time)
-        return message
+        number = self._foxglove.log.Level.Value(level)
+        return self._foxglove.log(timestamp=stamp(time), level=number, name=name, message=text)
 
 
 _NUMBER = {"type": "number"}

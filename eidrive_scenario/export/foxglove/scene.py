@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.export.foxglove.schemas import (
-    WORLD,
-    Color,
-    Foxglove,
-    set_color,
-    set_rotation,
-    set_stamp,
-    set_vector,
-)
+from eidrive_scenario.export.foxglove.schemas import UPRIGHT, WORLD, Color, Foxglove, rgba, rotation, stamp, vector
 from eidrive_scenario.export.geometry import Line, edge_line, lane_edges, point_spacing
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
@@ -51,19 +43,15 @@ class ActorScene:
         update = self._foxglove.scene()
         for name in self._shown:
             if name not in view:
-                deletion = update.deletions.add(type=self._foxglove.deletion.MATCHING_ID, id=name)
-                set_stamp(deletion.timestamp, view.time)
+                kind = self._foxglove.deletion.MATCHING_ID
+                update.deletions.add(timestamp=stamp(view.time), type=kind, id=name)
         self._shown = dict.fromkeys(view.names)
         arms = np.einsum("nij,nj->ni", rotation_matrix(view.yaw, view.pitch, view.roll), view.offset)
         centers = (view.position + arms).tolist()
         for row, (name, category) in enumerate(zip(view.names, view.categories, strict=True)):
             entity = add_entity(update, name, view.time)
-            cube = entity.cubes.add()
-            set_vector(cube.pose.position, centers[row])
-            angles = float(view.yaw[row]), float(view.pitch[row]), float(view.roll[row])
-            set_rotation(cube.pose.orientation, *angles)
-            set_vector(cube.size, view.size[row].tolist())
-            set_color(cube.color, _COLORS.get(category, _OTHER))
+            turn = rotation(float(view.yaw[row]), float(view.pitch[row]), float(view.roll[row]))
+            _add_cube(entity, centers[row], turn, view.size[row].tolist(), _COLORS.get(category, _OTHER))
             x, y, z = centers[row]
             add_text(entity, name, (x, y, z + 0.5 * float(view.size[row, 2]) + 0.6))
             speed = f"{view.speed[row]:.2f} m/s"
@@ -74,24 +62,24 @@ class ActorScene:
 
 def add_entity(update: Any, name: str, time: float) -> Any:
     """Add an entity in the world frame, which replaces the former one of this name."""
-    entity = update.entities.add(id=name, frame_id=WORLD)
-    set_stamp(entity.timestamp, time)
-    return entity
+    return update.entities.add(timestamp=stamp(time), id=name, frame_id=WORLD)
+
+
+def _add_cube(
+    entity: Any, center: Sequence[float], turn: Mapping[str, float], size: Sequence[float], color: Color
+) -> None:
+    entity.cubes.add(pose={"position": vector(center), "orientation": turn}, size=vector(size), color=rgba(color))
 
 
 def add_text(entity: Any, text: str, position: tuple[float, float, float], size: float = 0.8) -> None:
     """Add a text that faces the viewer; size in the world [m]."""
-    label = entity.texts.add(billboard=True, font_size=size, scale_invariant=False, text=text)
-    set_vector(label.pose.position, position)
-    set_rotation(label.pose.orientation, 0.0)
-    set_color(label.color, _TEXT)
+    pose = {"position": vector(position), "orientation": UPRIGHT}
+    entity.texts.add(pose=pose, billboard=True, font_size=size, scale_invariant=False, color=rgba(_TEXT), text=text)
 
 
 def box_scene(foxglove: Foxglove, lists: Iterable[tuple[str, Detections]], color: Color, time: float) -> Any:
     """Return a scene of perceived boxes with class and confidence, one entity per name with all its lists."""
-    update = foxglove.scene()
-    deletion = update.deletions.add(type=foxglove.deletion.ALL)
-    set_stamp(deletion.timestamp, time)
+    update = _cleared_scene(foxglove, time)
     by_name: dict[str, list[Detections]] = {}
     for name, objects in lists:
         by_name.setdefault(name, []).append(objects)
@@ -103,17 +91,18 @@ def box_scene(foxglove: Foxglove, lists: Iterable[tuple[str, Detections]], color
     return update
 
 
+def _cleared_scene(foxglove: Foxglove, time: float) -> Any:
+    """Return a scene that deletes the former entities of its topic."""
+    return foxglove.scene(deletions=[{"timestamp": stamp(time), "type": foxglove.deletion.ALL}])
+
+
 def _add_boxes(entity: Any, objects: Detections, color: Color) -> None:
     """Add the boxes that are finite."""
     rows = zip(objects.boxes.tolist(), objects.classes, objects.confidence.tolist(), strict=True)
     for (x, y, z, length, width, height, yaw), category, confidence in rows:
         if not np.isfinite([x, y, z, length, width, height, yaw]).all():
             continue
-        cube = entity.cubes.add()
-        set_vector(cube.pose.position, (x, y, z))
-        set_rotation(cube.pose.orientation, yaw)
-        set_vector(cube.size, (length, width, height))
-        set_color(cube.color, color)
+        _add_cube(entity, (x, y, z), rotation(yaw), (length, width, height), color)
         add_text(entity, f"{category} {confidence:.2f}", (x, y, z + 0.5 * height + 0.3), 0.5)
 
 
@@ -152,11 +141,9 @@ def plan_scene(foxglove: Foxglove, plan: Plan | None, roads: RoadNetwork | None,
 
     height  of the reference point of the vehicle [m], on which the path lies where there is no road
     """
-    update = foxglove.scene()
     if plan is None or len(plan.points) < 2:
-        deletion = update.deletions.add(type=foxglove.deletion.ALL)
-        set_stamp(deletion.timestamp, time)
-        return update
+        return _cleared_scene(foxglove, time)
+    update = foxglove.scene()
     entity = add_entity(update, "plan", time)
     points = np.column_stack([plan.points[:, :2], _surface_heights(roads, plan.points, height) + _ABOVE])
     _add_line(foxglove, entity, points.tolist(), _DRIVES if plan.braking is None else _BRAKES)
@@ -199,8 +186,11 @@ def link_scene(foxglove: Foxglove, frame: Frame) -> Any:
 def _add_line(foxglove: Foxglove, entity: Any, points: Line, color: Color, *, dashed: bool = False) -> None:
     """Add a line; a dashed one consists of every second part."""
     kind = foxglove.line.LINE_LIST if dashed else foxglove.line.LINE_STRIP
-    line = entity.lines.add(type=kind, thickness=_THICKNESS)
-    set_rotation(line.pose.orientation, 0.0)
-    set_color(line.color, color)
-    for x, y, z in points[: len(points) // 2 * 2] if dashed else points:
-        line.points.add(x=x, y=y, z=z)
+    drawn = points[: len(points) // 2 * 2] if dashed else points
+    entity.lines.add(
+        type=kind,
+        pose={"orientation": UPRIGHT},
+        thickness=_THICKNESS,
+        points=list(map(vector, drawn)),
+        color=rgba(color),
+    )

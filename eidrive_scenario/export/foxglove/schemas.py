@@ -1,4 +1,4 @@
-"""Message classes of Foxglove, and setting of their common parts."""
+"""Message classes of Foxglove, and their common parts as arguments of these classes."""
 
 from __future__ import annotations
 
@@ -47,21 +47,25 @@ def escaped(name: str) -> str:
     return quote(name, safe=" ")
 
 
-def set_stamp(stamp: Any, time: float) -> None:
-    """Set a timestamp [s]."""
-    stamp.FromNanoseconds(nanoseconds(time))
+def stamp(time: float) -> dict[str, int]:
+    """Return a timestamp [s]."""
+    return dict(zip(("seconds", "nanos"), divmod(nanoseconds(time), 1_000_000_000), strict=True))
 
 
-def set_vector(vector: Any, values: Sequence[float]) -> None:
-    """Set x, y and z."""
-    vector.x, vector.y, vector.z = values
+def vector(values: Sequence[float]) -> dict[str, float]:
+    """Return a vector of x, y and z."""
+    return dict(zip("xyz", values, strict=True))
 
 
-def set_rotation(rotation: Any, yaw: float, pitch: float = 0.0, roll: float = 0.0) -> None:
-    """Set a quaternion to a z-y'-x'' rotation [rad]."""
-    rotation.x, rotation.y, rotation.z, rotation.w = quaternion(yaw, pitch, roll)
+def rotation(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> dict[str, float]:
+    """Return the quaternion of a z-y'-x'' rotation [rad]."""
+    return dict(zip("xyzw", quaternion(yaw, pitch, roll), strict=True))
 
 
-def set_color(target: Any, color: Color) -> None:
-    """Set a color."""
-    target.r, target.g, target.b, target.a = color
+def rgba(color: Color) -> dict[str, float]:
+    """Return a color."""
+    return dict(zip("rgba", color, strict=True))
+
+
+UPRIGHT = rotation(0.0)
+"""Rotation of what has no orientation of its own."""

@@ -27,14 +27,15 @@ from eidrive_scenario.export.foxglove.log_messages import (
 )
 from eidrive_scenario.export.foxglove.scene import ActorScene, box_scene, link_scene, map_scene, plan_scene
 from eidrive_scenario.export.foxglove.schemas import (
+    UPRIGHT,
     WORLD,
     Color,
     Foxglove,
     escaped,
     frame_of,
-    set_rotation,
-    set_stamp,
-    set_vector,
+    rotation,
+    stamp,
+    vector,
 )
 from eidrive_scenario.export.mcap_topics import ToolTopics, protobuf_registration, write_topics
 from eidrive_scenario.export.recorded_run import RecordedRun
@@ -184,22 +185,26 @@ class FoxgloveTopics(ToolTopics):
         view = frame.view
         message = self._foxglove.transforms()
         for name, state in zip(view.names, view.states, strict=True):
-            transform = message.transforms.add(parent_frame_id=WORLD, child_frame_id=frame_of(name))
-            set_stamp(transform.timestamp, view.time)
-            set_vector(transform.translation, (state.x, state.y, state.z))
-            set_rotation(transform.rotation, state.yaw, state.pitch, state.roll)
+            message.transforms.add(
+                timestamp=stamp(view.time),
+                parent_frame_id=WORLD,
+                child_frame_id=frame_of(name),
+                translation=vector((state.x, state.y, state.z)),
+                rotation=rotation(state.yaw, state.pitch, state.roll),
+            )
         add_camera_transforms(message, self._images.cameras, iter(view.names), view.time)
         return message
 
     def _points(self, points: Any, time: float) -> Any:
-        message = self._foxglove.point_cloud(frame_id=WORLD, point_stride=12)
-        set_stamp(message.timestamp, time)
-        set_vector(message.pose.position, (0.0, 0.0, 0.0))
-        set_rotation(message.pose.orientation, 0.0)
-        for index, axis in enumerate("xyz"):
-            message.fields.add(name=axis, offset=4 * index, type=self._foxglove.field.FLOAT32)
-        message.data = np.ascontiguousarray(points, dtype="<f4").tobytes()
-        return message
+        number = self._foxglove.field.FLOAT32
+        return self._foxglove.point_cloud(
+            timestamp=stamp(time),
+            frame_id=WORLD,
+            pose={"position": vector((0.0, 0.0, 0.0)), "orientation": UPRIGHT},
+            point_stride=12,
+            fields=[{"name": axis, "offset": 4 * index, "type": number} for index, axis in enumerate("xyz")],
+            data=np.ascontiguousarray(points, dtype="<f4").tobytes(),
+        )
 
     def _fix(self, frame: Frame, name: str) -> Any | None:
         assert self._run.roads is not None
@@ -210,11 +215,10 @@ class FoxgloveTopics(ToolTopics):
             self._has_reference = False
             self._run.warnings.append(f"there is no geographic position: {error.diagnostics[0]}")
             return None
-        message = self._foxglove.location_fix(
+        return self._foxglove.location_fix(
+            timestamp=stamp(frame.view.time),
             frame_id=frame_of(name),
             latitude=float(np.degrees(latitude)),
             longitude=float(np.degrees(longitude)),
             altitude=z + self._run.roads.header.offset[2],
         )
-        set_stamp(message.timestamp, frame.view.time)
-        return message
