@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -48,15 +47,13 @@ class RoadLintContext(LintContext):
     @cached_property
     def unresolved(self) -> dict[int, InputError]:
         """Return the errors of positions that cannot be resolved, by identity of the position."""
-        return dict(self._unresolved())
-
-    def _unresolved(self) -> Iterator[tuple[int, InputError]]:
-        for element in self.elements:
-            if isinstance(element, model.Position):
-                try:
-                    self.resolve(element)
-                except InputError as error:
-                    yield id(element), error
+        errors = {}
+        for position in self.of(model.Position):
+            try:
+                self.resolve(position)
+            except InputError as error:
+                errors[id(position)] = error
+        return errors
 
     def outside(self, x: list[float], y: list[float]) -> list[float]:
         """Return the distances of points from the edge of the nearest road [m]; 0 on a road."""
@@ -65,42 +62,22 @@ class RoadLintContext(LintContext):
         return distances
 
 
-class HasRoads(Protocol):
-    """Lint context with a road network."""
-
-    @property
-    def roads(self) -> RoadNetwork | None:
-        """Return the road network; None if the scenario has none."""
-
-
-@dataclass(frozen=True)
-class RoadFileContext:
-    """Lint context of a road file without a scenario."""
-
-    roads: RoadNetwork
-
-
-def map_warning_rule(name: str) -> Callable[[HasRoads], Iterator[Diagnostic]]:
+def map_warning_rule(name: str) -> Callable[[RoadNetwork], Iterator[Diagnostic]]:
     """Return the check of a rule whose violations the road network reports itself."""
-
-    def check(context: HasRoads) -> Iterator[Diagnostic]:
-        if context.roads is not None:
-            yield from (diagnostic for diagnostic in context.roads.map_warnings if diagnostic.rule == name)
-
-    return check
+    return lambda roads: (diagnostic for diagnostic in roads.map_warnings if diagnostic.rule == name)
 
 
-def _invalid_geo_reference(context: HasRoads) -> Iterator[Diagnostic]:
-    if context.roads is None or not context.roads.header.geo_reference:
+def _invalid_geo_reference(roads: RoadNetwork) -> Iterator[Diagnostic]:
+    if not roads.header.geo_reference:
         return
     try:
-        _ = context.roads.geo_reference
+        _ = roads.geo_reference
     except PositionError as error:
         for diagnostic in error.diagnostics:
             yield replace(diagnostic, message=f"{diagnostic.message}; no GeoPosition can be resolved")
 
 
-ROAD_FILE_RULES: tuple[Rule[HasRoads], ...] = (
+ROAD_FILE_RULES: tuple[Rule[RoadNetwork], ...] = (
     *(Rule(rule.id, Level.WARNING, rule.value, map_warning_rule(rule.id)) for rule in MapRule),
     Rule("geo-reference", Level.WARNING, "a geoReference that cannot be used", _invalid_geo_reference),
 )
@@ -115,12 +92,7 @@ _ADDRESS = "="
 
 def unresolvable_positions(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield positions on a road or lane that does not exist."""
-    seen: set[Diagnostic] = set()
-    for error in context.unresolved.values():
-        for diagnostic in error.diagnostics:
-            if diagnostic not in seen:
-                seen.add(diagnostic)
-                yield diagnostic
+    yield from dict.fromkeys(diagnostic for error in context.unresolved.values() for diagnostic in error.diagnostics)
 
 
 def s_out_of_range(context: RoadLintContext) -> Iterator[Diagnostic]:
@@ -139,10 +111,8 @@ def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
     if context.roads is None:
         return
     lanes = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
-    for element in context.elements:
-        target = (
-            element.lane_change_target.absolute_target_lane if isinstance(element, model.LaneChangeAction) else None
-        )
+    for action in context.of(model.LaneChangeAction):
+        target = action.lane_change_target.absolute_target_lane
         if target is not None and target.value.strip() not in lanes - {"0"}:
             shown = ", ".join(sorted(lanes - {"0"}, key=int))
             yield at(target, f"lane {target.value!r} exists on no road", f"known: {shown}")
@@ -239,10 +209,9 @@ def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield waypoints and destinations outside of the road."""
     if context.roads is None:
         return
-    waypoints: list[model.Waypoint | model.AcquirePositionAction] = [
-        waypoint for route in _routes(context) for waypoint in route.waypoint
-    ]
-    waypoints += [element for element in context.elements if isinstance(element, model.AcquirePositionAction)]
+    waypoints: list[model.Waypoint | model.AcquirePositionAction] = []
+    waypoints += [waypoint for route in _routes(context) for waypoint in route.waypoint]
+    waypoints += context.of(model.AcquirePositionAction)
     for waypoint in waypoints:
         if id(waypoint.position) in context.unresolved or (resolved := context.resolve(waypoint.position)) is None:
             continue
@@ -298,13 +267,12 @@ def _has_wrong_way_driver(context: RoadLintContext, roads: RoadNetwork, route: m
 
 def _routes(context: RoadLintContext) -> Iterator[model.Route]:
     """Yield the routes that the scenario uses, each once."""
-    routes = []
-    for element in context.elements:
-        if isinstance(element, model.AssignRouteAction | model.RouteRef):
-            route = _route_of(context, element)
-            if route is not None:
-                routes.append(route)
-    yield from {id(route): route for route in routes}.values()
+    routes = [
+        _route_of(context, element)
+        for element in context.elements
+        if isinstance(element, model.AssignRouteAction | model.RouteRef)
+    ]
+    yield from {id(route): route for route in routes if route is not None}.values()
 
 
 def _route_of(context: RoadLintContext, element: model.AssignRouteAction | model.RouteRef) -> model.Route | None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from eidrive_scenario.checks.road_rules import ROAD_FILE_RULES, ROAD_RULES, RoadFileContext, RoadLintContext
+from eidrive_scenario.checks.road_rules import ROAD_FILE_RULES, ROAD_RULES, RoadLintContext
 from eidrive_scenario.checks.rule import CheckReport, Level, Rule, S
 from eidrive_scenario.checks.scenario_rules import RULES
 from eidrive_scenario.errors import (
@@ -41,7 +42,7 @@ from eidrive_scenario.run_options import checked_settings
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.run_outcome import HOW_TO_JUDGE, UNJUDGED
 
-ALL_RULES: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES, *ROAD_FILE_RULES)
+ALL_RULES: tuple[Rule[Any], ...] = (*RULES, *ROAD_RULES, *ROAD_FILE_RULES)
 """All rules; each name, level and summary is defined once."""
 
 
@@ -55,13 +56,15 @@ def run_rules(
     Raise SettingError if `ignored` has an unknown name.
     """
     check_rule_names(ignored)
-    rules = ALL_RULES
+    rules: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES)
     roads = None
     try:
         roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     except InputError:
         rules = RULES
     yield from _run_rules(rules, RoadLintContext(scenario, roads, tuple(added)), ignored)
+    if roads is not None:
+        yield from _run_rules(ROAD_FILE_RULES, roads, ignored)
 
 
 def check_rule_names(ignored: Collection[str]) -> None:
@@ -136,7 +139,7 @@ def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
 
 def _road_file_diagnostics(path: Path, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
     try:
-        yield from _run_rules(ROAD_FILE_RULES, RoadFileContext(RoadNetwork.load(path)), ignored)
+        yield from _run_rules(ROAD_FILE_RULES, RoadNetwork.load(path), ignored)
     except InputError as error:
         yield from _errors(error)
 

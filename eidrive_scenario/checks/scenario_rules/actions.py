@@ -79,17 +79,17 @@ def _speed(element: model.Element) -> float | None:
 
 def zero_rate_transitions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield transitions that never reach their target because their rate is 0."""
-    for element in context.elements:
-        if isinstance(element, model.TransitionDynamics) and has_zero_rate(element):
-            yield at(element, "with a rate of 0 the action never reaches its target", "specify a rate above 0")
+    for dynamics in context.of(model.TransitionDynamics):
+        if has_zero_rate(dynamics):
+            yield at(dynamics, "with a rate of 0 the action never reaches its target", "specify a rate above 0")
 
 
 def untimed_trajectories(context: LintContext) -> Iterator[Diagnostic]:
     """Yield trajectories with a Timing whose times are missing or all equal."""
-    for element in context.elements:
-        if not isinstance(element, model.FollowTrajectoryAction) or element.time_reference.timing is None:
+    for action in context.of(model.FollowTrajectoryAction):
+        if action.time_reference.timing is None:
             continue
-        trajectory = context.trajectory(element)
+        trajectory = context.trajectory(action)
         shape = trajectory.shape.chosen() if trajectory is not None else None
         if isinstance(shape, model.Polyline):
             yield from _times(shape)

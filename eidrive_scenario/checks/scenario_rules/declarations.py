@@ -62,30 +62,30 @@ def _used(root: etree._Element) -> set[str]:
 
 def ineffective_parameter_actions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield ParameterActions whose parameter no condition reads; `$name` is replaced when the file is read."""
-    read = {element.parameter_ref for element in context.elements if isinstance(element, model.ParameterCondition)}
-    for element in context.elements:
-        if isinstance(element, model.ParameterAction) and element.parameter_ref not in read:
+    read = {condition.parameter_ref for condition in context.of(model.ParameterCondition)}
+    for action in context.of(model.ParameterAction):
+        if action.parameter_ref not in read:
             yield at(
-                element,
-                f"ParameterAction has no effect: no condition reads parameter {element.parameter_ref!r}",
-                f"${element.parameter_ref} keeps the value from the start of the run",
+                action,
+                f"ParameterAction has no effect: no condition reads parameter {action.parameter_ref!r}",
+                f"${action.parameter_ref} keeps the value from the start of the run",
             )
 
 
 def unused_variables(context: LintContext) -> Iterator[Diagnostic]:
     """Yield variables without a reference."""
     referenced = context.referenced.get("variable", set()) | context.command_words
-    for element in context.elements:
-        if isinstance(element, model.VariableDeclaration) and element.name not in referenced:
-            yield at(element, f"variable {element.name!r} is never used", "remove it")
+    for variable in context.of(model.VariableDeclaration):
+        if variable.name not in referenced:
+            yield at(variable, f"variable {variable.name!r} is never used", "remove it")
 
 
 def unused_monitors(context: LintContext) -> Iterator[Diagnostic]:
     """Yield monitors that no action sets."""
     referenced = context.referenced.get("monitor", set())
-    for element in context.elements:
-        if isinstance(element, model.MonitorDeclaration) and element.name not in referenced:
-            yield at(element, f"monitor {element.name!r} is set by no SetMonitorAction", "set it or remove it")
+    for monitor in context.of(model.MonitorDeclaration):
+        if monitor.name not in referenced:
+            yield at(monitor, f"monitor {monitor.name!r} is set by no SetMonitorAction", "set it or remove it")
 
 
 def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
@@ -95,11 +95,9 @@ def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
     """
     referenced = context.referenced.get("entity", set()) | context.command_words
     stations = _stations_with_senders(context)
-    for element in context.elements:
-        if not isinstance(element, model.EntitySelection) or element.name in referenced:
-            continue
-        if not stations.intersection(context.members(element.name)):
-            yield at(element, f"selection {element.name!r} is never used", "remove it")
+    for selection in context.of(model.EntitySelection):
+        if selection.name not in referenced and stations.isdisjoint(context.members(selection.name)):
+            yield at(selection, f"selection {selection.name!r} is never used", "remove it")
 
 
 def _stations_with_senders(context: LintContext) -> set[str]:

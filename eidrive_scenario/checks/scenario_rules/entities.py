@@ -111,11 +111,8 @@ def self_references(context: LintContext) -> Iterator[Diagnostic]:
 
 def unknown_traffic(context: LintContext) -> Iterator[Diagnostic]:
     """Yield TrafficStopActions with a traffic name that no other action defines."""
-    named = [
-        (element, element.traffic_name)
-        for element in context.elements
-        if isinstance(element, model.TrafficAction) and element.traffic_name is not None
-    ]
+    actions = context.of(model.TrafficAction)
+    named = [(action, action.traffic_name) for action in actions if action.traffic_name is not None]
     started = {name for action, name in named if action.traffic_stop_action is None}
     for action, name in named:
         if action.traffic_stop_action is not None and name not in started:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
+from typing import TypeVar
 
 from lxml import etree
 
@@ -22,6 +23,7 @@ from eidrive_scenario.openscenario.scenario import EntitySelections, Scenario
 from eidrive_scenario.openscenario.validation.names import LEVELS, ReferenceMatch
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 
+E = TypeVar("E", bound=model.Element)
 WORD = re.compile(r"\w+")
 """Pattern of words that may be names of parameters, variables or entities in the text of a command."""
 
@@ -133,6 +135,10 @@ class Outline:
         trees = (self.scenario.document, *self.scenario.entries.values())
         return tuple(element for tree in trees for element in tree.walk())
 
+    def of(self, kind: type[E]) -> Iterator[E]:
+        """Yield the elements of a type."""
+        return (element for element in self.elements if isinstance(element, kind))
+
     @cached_property
     def performances(self) -> tuple[tuple[model.PrivateAction, tuple[str, ...]], ...]:
         """Return every private action and its actors; those of Init first."""
@@ -181,8 +187,8 @@ class Outline:
         later = {name for action, actors in self.performances if _is_placing(action) for name in actors}
         added = {
             name
-            for element in self.elements
-            if isinstance(element, model.EntityAction) and isinstance(element.add_entity_action, model.AddEntityAction)
+            for element in self.of(model.EntityAction)
+            if isinstance(element.add_entity_action, model.AddEntityAction)
             for name in self.members(element.entity_ref)
         }
         return self.at_start | later | added
@@ -201,7 +207,7 @@ class Outline:
     @cached_property
     def command_words(self) -> frozenset[str]:
         """Return all words in custom commands and added sources, which may use names in them."""
-        texts = [element.content for element in self.elements if isinstance(element, model.CustomCommandAction)]
+        texts = [command.content for command in self.of(model.CustomCommandAction)]
         texts += self.texts_of(self.added)
         return frozenset(word for text in texts for word in WORD.findall(text))
 

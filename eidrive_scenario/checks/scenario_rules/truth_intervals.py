@@ -132,13 +132,13 @@ def truth_intervals(condition: model.Condition, outline: Outline) -> TruthInterv
         case model.ParameterCondition(parameter_ref=name) if not _sets_parameter(outline, name):
             # Steady, but not certain: the user may choose the constant value
             return TruthIntervals(steady=f"no action sets the parameter {name!r}")
-        case model.TimeOfDayCondition() if not any(isinstance(part, model.TimeOfDay) for part in outline.elements):
+        case model.TimeOfDayCondition() if next(outline.of(model.TimeOfDay), None) is None:
             return never("no EnvironmentAction sets the time of day")
     return OPEN
 
 
 def _sets_parameter(outline: Outline, name: str) -> bool:
-    return any(isinstance(part, model.ParameterAction) and part.parameter_ref == name for part in outline.elements)
+    return any(action.parameter_ref == name for action in outline.of(model.ParameterAction))
 
 
 def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> TruthIntervals:
