@@ -22,7 +22,7 @@ from eidrive_scenario.experiments.sweeps.results import (
     value_of,
     values_of,
 )
-from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, FAILED, INVALID, NOT_JUDGED, PASSED, StoredRun
+from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, INVALID, NOT_JUDGED, PASSED, StoredRun
 
 NOT_WORSE, WORSE, UNDECIDED = "not worse", "worse", "undecided"
 """Conclusions of a comparison."""
@@ -180,15 +180,15 @@ def _compared(
     """Return the comparison of runs by identity; None if no pair has verdicts."""
     # Sums of metrics do not depend on the order in which runs ended
     pairs = [(base[key], changed[key]) for key in sorted(base, key=repr) if key in changed]
-    judged = [pair for pair in pairs if all(run.status in (PASSED, FAILED) for run in pair)]
+    judged = [(a, b) for a, b in pairs if a.has_verdict and b.has_verdict]
     if not judged:
         return None
     verdicts = PairedVerdicts.of([a.status == PASSED for a, _ in judged], [b.status == PASSED for _, b in judged])
-    with_verdict = sum(run.status in (PASSED, FAILED) for runs in (base, changed) for run in runs.values())
+    with_verdict = sum(run.has_verdict for runs in (base, changed) for run in runs.values())
     return Comparison(
         verdicts,
         with_verdict - 2 * len(judged),
-        sum(a.status in (PASSED, FAILED) and b.status in (ABORTED, CRASHED, INVALID, NOT_JUDGED) for a, b in pairs),
+        sum(a.has_verdict and b.status in (ABORTED, CRASHED, INVALID, NOT_JUDGED) for a, b in pairs),
         sum(a.result.get("trace_hash") == b.result.get("trace_hash") for a, b in judged),
         verdicts.interval(confidence),
         verdicts.p_value(),

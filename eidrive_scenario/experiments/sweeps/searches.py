@@ -183,13 +183,11 @@ def find_boundary(
         ]
         executed = execute(jobs)
         started += len(jobs)
-        verdicts = [
-            (value, run.status == PASSED) for value, run in zip(values, executed, strict=True) if _has_verdict(run)
-        ]
-        if not verdicts:
+        judged = [(value, run) for value, run in zip(values, executed, strict=True) if run.has_verdict]
+        if not judged:
             raise _without_verdict(executed)
-        for value, passed in verdicts:
-            search.add(value, passed)
+        for value, run in judged:
+            search.add(value, run.status == PASSED)
         boundary = search.estimate()
         shown(boundary)
         if is_found(boundary, tolerance):
@@ -250,10 +248,10 @@ def falsify(
             for index, trial in enumerate(trials)
         ]
         batch = execute(jobs)
-        if not any(_has_verdict(run) for run in batch):
+        if not any(run.has_verdict for run in batch):
             raise _without_verdict(batch)
         for trial, run in zip(trials, batch, strict=True):
-            value = _objective(run, objective) if _has_verdict(run) else None
+            value = _objective(run, objective) if run.has_verdict else None
             if value is None:
                 study.tell(trial, state=optuna.trial.TrialState.FAIL)
             else:
@@ -344,10 +342,6 @@ def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:
         else:
             distributions[axis.name] = kinds.CategoricalDistribution(axis.values)
     return distributions
-
-
-def _has_verdict(run: StoredRun) -> bool:
-    return run.status in (PASSED, FAILED)
 
 
 def _without_verdict(runs: Sequence[StoredRun]) -> SettingError:

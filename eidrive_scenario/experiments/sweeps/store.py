@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import msgspec
@@ -87,11 +85,14 @@ class StoredRun(msgspec.Struct, frozen=True):
     wall_s: float
     settings: str = ""
 
+    @property
+    def has_verdict(self) -> bool:
+        """Whether criteria judged the run."""
+        return self.status in (PASSED, FAILED)
+
 
 class ResultStore:
     """Results of sweeps. Only one process writes; the results of runs are on the disk when `add` returns.
-
-    Any thread may call its methods, one at a time.
 
     The journal is a separate file, as in all SQLite files that network file systems may hold.
     """
@@ -286,7 +287,7 @@ def _scalars(column: str, text: str) -> dict[str, Any]:
 def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
     """Return a connection whose statements end, even those of a forged file with pages that refer to each other."""
     uri = f"{path.absolute().as_uri()}{'?mode=ro' if read_only else ''}"
-    connection = sqlite3.connect(uri, uri=True, timeout=30.0, check_same_thread=False)
+    connection = sqlite3.connect(uri, uri=True, timeout=30.0)
     calls = count(1)
 
     def is_exceeded() -> bool:
@@ -343,56 +344,3 @@ def _damaged(what: str, path: Path) -> SettingError:
 
 def _error(message: str, hint: str, path: Path) -> SettingError:
     return SettingError(Diagnostic(message, hint, str(path)))
-
-
-class RunWriter:
-    """Writer of ended runs in a separate thread, so that workers do not wait for the disk.
-
-    Runs that end during a transaction are written together in the next one.
-
-    written  function that gets each run once it is on the disk, in the thread of `collect`
-    """
-
-    def __init__(self, store: ResultStore, written: Callable[[StoredRun], None]) -> None:
-        self._store = store
-        self._written = written
-        self._waiting: list[StoredRun] = []
-        self._batch: list[StoredRun] = []
-        self._thread = ThreadPoolExecutor(1, "store")
-        self.transaction: Future[None] | None = None
-        """Transaction in progress."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Write the runs that wait, also if an error ends the sweep."""
-        try:
-            while self.transaction is not None:
-                self.collect()
-        finally:
-            self._thread.shutdown()
-
-    def add(self, run: StoredRun) -> None:
-        """Write a run as soon as the transaction in progress has ended."""
-        self._waiting.append(run)
-        self._start()
-
-    def collect(self) -> None:
-        """Wait for the transaction in progress, report its runs, and start the next one.
-
-        Raise SimulationError if the store cannot be written.
-        """
-        if self.transaction is not None:
-            transaction, self.transaction = self.transaction, None
-            transaction.result()
-            for run in self._batch:
-                self._written(run)
-            self._start()
-
-    def _start(self) -> None:
-        if self.transaction is None and self._waiting:
-            self._batch, self._waiting = self._waiting, []
-            self.transaction = self._thread.submit(self._store.add, *self._batch)

@@ -7,7 +7,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.hung_runs import HungRunError, describe_report
@@ -21,7 +21,6 @@ from eidrive_scenario.experiments.sweeps.store import (
     PASSED,
     REPEATABLE,
     ResultStore,
-    RunWriter,
     StoredRun,
 )
 from eidrive_scenario.experiments.sweeps.workers import KeptFiles, Workers, execute, without_result
@@ -145,9 +144,12 @@ def run_sweep(
             else:
                 progress.stored[status] += 1
 
-    def written(run: StoredRun) -> None:
-        progress.count(run)
-        shown(progress, run)
+    def write() -> None:
+        """Write the runs that have ended in one transaction."""
+        store.add(*ended)
+        while ended:
+            progress.count(ended[0])
+            shown(progress, ended.popleft())
 
     def end(future: Future[StoredRun]) -> None:
         job, tries = running.pop(future)
@@ -158,41 +160,40 @@ def run_sweep(
             )
         error = future.exception()
         if error is None:
-            writer.add(future.result())
+            ended.append(future.result())
         elif isinstance(error, HungRunError):
-            writer.add(without_result(job, ABORTED, describe_report(str(error), wall_limit), wall_limit or 0.0))
+            ended.append(without_result(job, ABORTED, describe_report(str(error), wall_limit), wall_limit or 0.0))
         elif not workers.is_crash(error):
             raise error
         elif tries < TRIES:
             again.append((job, tries + 1))
         else:
             text = f"the worker process ended in {tries} of {tries} tries: {error}"
-            writer.add(without_result(job, CRASHED, text, 0.0))
+            ended.append(without_result(job, CRASHED, text, 0.0))
 
     waiting = left()
     again: deque[tuple[SweepJob, int]] = deque()
+    ended: deque[StoredRun] = deque()
     shown(progress, None)
-    with RunWriter(store, written) as writer:
-        try:
-            while True:
-                while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
-                    start(job, 1)
-                if again and not running:  # alone, so that the end of its worker has no other cause
-                    start(*again.popleft())
-                events: list[Future[Any]] = [*running]
-                if writer.transaction is not None:
-                    events.append(writer.transaction)
-                if not events:
-                    break
-                ended = wait(events, return_when=FIRST_COMPLETED).done
-                if writer.transaction in ended:
-                    writer.collect()
-                for future in [future for future in running if future in ended]:
-                    end(future)
-        except BaseException:
-            for future in [future for future in running if future.done() and not future.cancelled()]:
-                if future.exception() is None:
-                    writer.add(future.result())
-            raise
+    try:
+        while True:
+            while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
+                start(job, 1)
+            if again and not running:  # alone, so that the end of its worker has no other cause
+                start(*again.popleft())
+            write()  # while the workers execute the next runs
+            if not running:
+                break
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            for future in [future for future in running if future in done]:
+                end(future)
+    except BaseException:
+        ended += [
+            future.result()
+            for future in running
+            if future.done() and not future.cancelled() and future.exception() is None
+        ]
+        write()
+        raise
     shown(progress, None)
     return progress

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
 from eidrive_scenario.experiments.sweeps.results import runs_with_stores
-from eidrive_scenario.experiments.sweeps.store import FAILED, FOLDER, PASSED, StoredRun
+from eidrive_scenario.experiments.sweeps.store import FOLDER, StoredRun
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.run_files import RESULT, read_result, result_of
 
@@ -72,7 +72,7 @@ def read_sweeps(stores: Sequence[Path]) -> tuple[list[ReportedRun], list[str]]:
     without: Counter[tuple[str, str]] = Counter()
     commands: dict[tuple[str, str], str] = {}
     for run, store in runs_with_stores(stores):
-        if run.status not in (PASSED, FAILED):
+        if not run.has_verdict:
             reason = run.status, run.error.partition("\n")[0]
             without[reason] += 1
             commands.setdefault(reason, run.command)
