@@ -36,11 +36,10 @@ def readable_name(parts: Sequence[str], digest: str) -> str:
 
 
 class RunFolder:
-    """Locked folder of a run. Files are written under partial names, and `commit` renames them at the end."""
+    """Folder of a run. Files are written under partial names, and `commit` renames them at the end."""
 
-    def __init__(self, path: Path, lock: FileLock) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock = lock
 
     @property
     def recording(self) -> Path:
@@ -77,17 +76,6 @@ class RunFolder:
             return str(read_result(self.path / RESULT)["trace_hash"])
         return None
 
-    def discard(self) -> None:
-        """Remove all files of a run that never started."""
-        with suppress(OSError):
-            self.prepare()
-            self._lock.release()
-            self.path.rmdir()
-
-    def release(self) -> None:
-        """Release the folder for other runs."""
-        self._lock.release()
-
 
 def _remove(recording: Path, images: Path) -> None:
     """Remove a recording with its page by `eidrive view`, and a folder of images."""
@@ -109,25 +97,32 @@ def run_folder(parent: Path, settings: ResolvedSettings, *, own: bool) -> Iterat
     name, reason = folder_name(settings), ""
     names = (name if number == 1 else f"{name}-{number}" for number in range(1, _MAX_COPIES + 1))
     for path in (parent / name for name in names) if own else (parent,):
-        folder = _claim(path, settings)
-        if isinstance(folder, RunFolder):
+        lock = _lock(path)
+        if lock is None:
+            reason = "another run writes to this folder"
+        elif _is_free(path, settings):
             break
-        reason = folder
+        else:
+            reason = "the folder contains the result of a run with other settings"
+            lock.release()
     else:
         message = f"{_MAX_COPIES} folders of this name are in use" if own else reason
         raise OutputError(Diagnostic(message, "choose another folder", str(path)))
-    try:
-        folder.prepare()
-        yield folder
-    except InputError:
-        folder.discard()
-        raise
-    except OSError as error:
-        if error.filename is None:
-            error.filename = str(folder.path)
-        raise
-    finally:
-        folder.release()
+    folder = RunFolder(path)
+    with lock:
+        try:
+            folder.prepare()
+            yield folder
+        except InputError:  # the run never started
+            with suppress(OSError):
+                folder.prepare()
+                lock.release()
+                path.rmdir()
+            raise
+        except OSError as error:
+            if error.filename is None:
+                error.filename = str(path)
+            raise
 
 
 def check_writable(folder: Path) -> None:
@@ -140,17 +135,6 @@ def check_writable(folder: Path) -> None:
         raise OutputError(
             Diagnostic(f"cannot write: {error.strerror}", "choose another folder", str(folder))
         ) from error
-
-
-def _claim(path: Path, settings: ResolvedSettings) -> RunFolder | str:
-    """Return a folder, or why it cannot be used for a run with these settings."""
-    lock = _lock(path)
-    if lock is None:
-        return "another run writes to this folder"
-    if not _is_free(path, settings):
-        lock.release()
-        return "the folder contains the result of a run with other settings"
-    return RunFolder(path, lock)
 
 
 def _lock(path: Path) -> FileLock | None:

@@ -68,4 +68,4 @@ def rgba(color: Color) -> dict[str, float]:
 
 
 UPRIGHT = rotation(0.0)
-"""Rotation of what has no orientation of its own."""
+"""Rotation of texts, lines and clouds, which have no orientation."""

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.base.detections import Detections
@@ -379,20 +380,8 @@ def _raised(view: WorldView) -> dict[str, list[float]]:
 
 
 def _size(part: Mapping[str, Any]) -> int:
-    """Return the approximate size of the data of one frame in the page [bytes]."""
-    poses = sum(40 + len(name) for name in part["poses"][0])
-    changes = sum(len(path) + len(name) + len(why) for _, path, name, _, why in part["changes"])
-    contacts = sum(40 + len(first) + len(second) for _, first, second, _ in part["contacts"])
-    return 40 + poses + changes + contacts + sum(map(_station_size, part["stations"].values()))
-
-
-def _station_size(station: Mapping[str, Any] | None) -> int:
-    if station is None:
-        return 60
-    received = sum(len(sender) + 45 * len(boxes) for sender, boxes in station["received"].items())
-    links = sum(40 + len(sender) for sender, _ in station["links"])
-    path = 18 * len(station["path"])
-    return 160 + 45 * len(station["own"]) + 65 * len(station["fused"]) + received + links + path + len(station["plan"])
+    """Return the size of the data of one frame [bytes]; the page omits repetitions, and contains each actor once."""
+    return len(msgspec.json.encode({**part, "actors": None}))
 
 
 def _station(snapshot: StationSnapshot) -> Data:

@@ -92,13 +92,8 @@ def street_models(network: RoadNetwork | None) -> Data:
     level     whether all roads are at z = 0
     """
     if network is None:
-        return {
-            "surfaces": None,
-            "houses": None,
-            "objects": [],
-            "land": _land(np.zeros((1, 3)), "asphalt"),
-            "level": True,
-        }
+        land = _land(np.zeros((1, 3)), "asphalt")
+        return {"surfaces": None, "houses": None, "objects": [], "land": land, "level": True}
     meshes = surface_meshes(network)
     surfaces = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
     points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))

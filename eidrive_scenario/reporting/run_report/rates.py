@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
+from typing import TypeVar
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -24,6 +25,7 @@ from eidrive_scenario.reporting.drawing.charts import (
 from eidrive_scenario.reporting.drawing.vector_canvas import Size
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 
+Cell = TypeVar("Cell", bound=Hashable)
 MOST_VALUES = 24
 """Maximum number of values that are shown one by one."""
 RANGES = 10
@@ -138,15 +140,23 @@ def _matrix(
     corner: str, cells: Sequence[tuple[str, str, ReportedRun]], least_rows: int = 1, *, ordered: bool = True
 ) -> Matrix | None:
     """Return the matrix of runs with their rows and columns; None for too few or too many of these."""
-    table: dict[str, dict[str, list[ReportedRun]]] = {}
-    for row, column, run in cells:
-        table.setdefault(row, {}).setdefault(column, []).append(run)
+    names = list(dict.fromkeys(row for row, _, _ in cells))
     columns = sorted({column for _, column, _ in cells}, key=_order)
-    if len(table) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(table) * len(columns) > MOST_CELLS:
+    if len(names) < least_rows or not 2 <= len(columns) <= MOST_COLUMNS or len(names) * len(columns) > MOST_CELLS:
         return None
-    names = sorted(table, key=_order) if ordered else list(table)
-    rows = [(name, tuple([success_rate(table[name].get(column, ())) for column in columns])) for name in names]
+    if ordered:
+        names.sort(key=_order)
+    rates = _rates(((row, column), run) for row, column, run in cells)
+    rows = [(name, tuple([rates.get((name, column)) for column in columns])) for name in names]
     return Matrix(corner, tuple(columns), tuple(rows))
+
+
+def _rates(runs: Iterable[tuple[Cell, ReportedRun]]) -> dict[Cell, Proportion]:
+    """Return the success rate of each cell with judged runs."""
+    by_cell: dict[Cell, list[ReportedRun]] = defaultdict(list)
+    for cell, run in runs:
+        by_cell[cell].append(run)
+    return {cell: rate for cell, members in by_cell.items() if (rate := success_rate(members)) is not None}
 
 
 def success_rate(runs: Sequence[ReportedRun]) -> Proportion | None:
@@ -233,13 +243,9 @@ def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> Char
     levels = levels_of(runs, axis)
     if levels is None or (not runs[0].is_swept and len(levels.centers) == len(runs)):
         return None
-    verdicts: dict[int, list[bool]] = defaultdict(list)
-    for run in runs:
-        if run.is_judged:
-            verdicts[levels.index(run)].append(run.passed)
-    if not verdicts:
+    rates = dict(sorted(_rates((levels.index(run), run) for run in runs).items()))
+    if not rates:
         return None
-    rates = {level: wilson(sum(passed), len(passed)) for level, passed in sorted(verdicts.items())}
     return ChartSeries(
         name,
         color,
@@ -270,12 +276,10 @@ def _maps(group: RunGroup) -> Iterator[tuple[Levels, Levels, dict[tuple[int, int
         return
     for pair in combinations(group.numbers, 2):
         columns, rows = (levels_of(group.distinct, name) for name in pair)
-        passed: dict[tuple[int, int], list[bool]] = defaultdict(list)
         if columns is not None and rows is not None:
-            for run in (run for run in group.distinct if run.is_judged):
-                passed[columns.index(run), rows.index(run)].append(run.passed)
-            if passed:
-                yield columns, rows, {cell: wilson(sum(verdicts), len(verdicts)) for cell, verdicts in passed.items()}
+            rates = _rates(((columns.index(run), rows.index(run)), run) for run in group.distinct)
+            if rates:
+                yield columns, rows, rates
 
 
 def rate_figures(groups: Sequence[RunGroup], size: Size) -> Iterator[tuple[str, Figure]]:

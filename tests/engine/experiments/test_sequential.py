@@ -55,7 +55,7 @@ def characteristics(test: RatioTest, rate: float) -> Characteristics:
                 waiting[failures] = share
             else:
                 ends[decision] += share
-    return Characteristics(*(ends[decision] for decision in Decision), mean)
+    return Characteristics(ends[Decision.PASSED], ends[Decision.FAILED], ends[Decision.UNDECIDED], mean)
 
 
 def test_bounds_and_steps_equal_those_of_wald() -> None:
