@@ -134,14 +134,11 @@ def added_sources(settings: RunSettings | None) -> tuple[str | Path, ...]:
 def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
     """Check an OpenDRIVE file. Raise SettingError if `ignored` has an unknown name."""
     check_rule_names(ignored)
-    return CheckReport.collect(_road_file_diagnostics(path, ignored))
-
-
-def _road_file_diagnostics(path: Path, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
     try:
-        yield from _run_rules(ROAD_FILE_RULES, RoadNetwork.load(path), ignored)
+        network = RoadNetwork.load(path)
     except InputError as error:
-        yield from _errors(error)
+        return CheckReport.collect(_errors(error))
+    return CheckReport.collect(_run_rules(ROAD_FILE_RULES, network, ignored))
 
 
 def _errors(error: InputError) -> Iterator[tuple[Level, Diagnostic]]:
@@ -206,7 +203,7 @@ def check_distribution(
     try:
         expansion = load_distribution(path)
     except InputError as error:
-        return DistributionCheckReport.collect((Level.ERROR, diagnostic) for diagnostic in error.diagnostics)
+        return DistributionCheckReport.collect(_errors(error))
     diagnostics = _DistributionDiagnostics(expansion, ignored, settings)
     if not any(level is Level.ERROR for level, _ in diagnostics):
         diagnostics.read_runs()

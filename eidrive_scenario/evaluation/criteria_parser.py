@@ -10,11 +10,9 @@ A command is parsed once, before the run. `build_criteria` then creates new crit
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from functools import lru_cache
 from itertools import chain, count
 from typing import Any
 
@@ -128,13 +126,7 @@ class CriterionDeclaration:
 def declaration_text(declaration: CriterionDeclaration, name: str) -> str:
     """Return a declaration with all settings, and the name of its verdict, as YAML that `parse_criteria` reads."""
     settings = declaration.settings.model_dump(mode="json", by_alias=True) | {"name": name}
-    return _flow_text(json.dumps({declaration.kind: settings}), name)
-
-
-@lru_cache(maxsize=256)
-def _flow_text(declaration: str, name: str) -> str:
-    """Return a declaration in JSON as YAML. Runs of a sweep declare the same criteria."""
-    return flow_yaml(json.loads(declaration), setting=f"criterion {name!r}")
+    return flow_yaml({declaration.kind: settings}, setting=f"criterion {name!r}")
 
 
 @dataclass(frozen=True)

@@ -57,12 +57,11 @@ def write_with_topics(run: RecordedRun, path: Path, topics: Iterable[str] = ALL_
 
     The copy of a damaged recording contains its readable frames, and has no seal. Raise SettingError as `add_topics`.
     """
-    chosen = check_topics(topics)
     source = run.recording
     with atomic_output(path) as partial:
         recorder = Recorder(partial, metadata=source.metadata, attachments=source.attachments)
         try:
-            written = [_TOPICS[name][1](recorder.writer, run) for name in chosen]
+            written = [_TOPICS[name][1](recorder.writer, run) for name in topics]
             for frame in run.frames():
                 recorder.observe(frame)
                 for tool_topics in written:

@@ -134,7 +134,10 @@ def values_of(runs: Iterable[StoredRun]) -> dict[str, list[Any]]:
 
     Numbers are in ascending order, then texts in order of appearance.
     """
-    points = [{**run.point, **_varied_parameters(run)} for run in runs]
+    return _values_of({**run.point, **_varied_parameters(run)} for run in runs)
+
+
+def _values_of(points: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
     values: dict[str, dict[Any, None]] = {}
     for point in points:
         for name, value in point.items():
@@ -221,12 +224,15 @@ def summaries(
     if unknown:
         raise SettingError(Diagnostic(f"--by: no axis {unknown[0]!r}", f"expected {', '.join(names)}"))
     summarized = []
-    key = _ranks(map(dict, groups))
-    for point, counts in sorted(groups.items(), key=lambda group: key(dict(group[0]))):
+    for point, counts in groups.items():
         trials = counts[PASSED] + counts[FAILED]
         rate = INTERVALS[interval](counts[PASSED], trials, confidence) if trials else None
         summarized.append(PointSummary(dict(point), {name: count for name, count in counts.items() if count}, rate))
-    return summarized
+    points = [summary.point for summary in summarized]
+    lacking = dict.fromkeys(name for point in points for name in point)  # a missing value precedes texts
+    values = _values_of([lacking, *points])
+    ranks = {name: {value: rank for rank, value in enumerate(several)} for name, several in values.items()}
+    return sorted(summarized, key=lambda summary: [rank[summary.point.get(name)] for name, rank in ranks.items()])
 
 
 def _varied_parameters(run: StoredRun) -> dict[str, Any]:
@@ -254,22 +260,6 @@ def _settings_of(run: StoredRun) -> _Settings:
         return msgspec.convert(json.loads(run.settings or "{}"), _Settings)
     except (ValueError, RecursionError):
         return _Settings()
-
-
-def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:
-    """Return the sort key of points: along each axis numbers in ascending order, then texts in order of appearance."""
-    ranks: dict[str, dict[Any, int]] = {}
-    for point in points:
-        for name, value in point.items():
-            ranks.setdefault(name, {}).setdefault(value, len(ranks[name]))
-
-    def key(point: Mapping[str, Any]) -> list[tuple[int, float]]:
-        values = [(rank_of, point.get(name)) for name, rank_of in ranks.items()]
-        return [
-            (0, value) if isinstance(value, int | float) else (1, rank_of.get(value, -1)) for rank_of, value in values
-        ]
-
-    return key
 
 
 def columns_of(run: StoredRun) -> dict[str, Any]:

@@ -58,7 +58,6 @@ def write_foxglove(run: RecordedRun, path: Path) -> None:
 
     Raise SettingError if a library is missing, or if the file cannot be written.
     """
-    check_foxglove()
     metadata = run.recording.metadata
     write_topics(run, path, FoxgloveTopics, {name: metadata[name] for name in _METADATA if name in metadata})
 

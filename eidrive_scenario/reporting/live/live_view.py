@@ -136,9 +136,6 @@ class LiveView:
         self._builder: ReplayBuilder | None = None
         self._feed = Feed()
         self._values: dict[str, Any] = {}
-        self._page: tuple[dict[str, Any], bytes] = {}, b""
-        """Rendered page and its values."""
-        self._rendering = threading.Lock()
         self._instants: Data = {"contact": None, "decisive": None}
         self._building = threading.RLock()
         """Lock of the frames that are not yet sent."""
@@ -257,11 +254,7 @@ class LiveView:
 
     def _render(self) -> bytes:
         """Return the page without frames."""
-        with self._rendering:
-            values = self._values
-            if self._page[0] is not values:
-                self._page = values, render_page(TEMPLATE, **values).encode(errors="replace")
-            return self._page[1]
+        return render_page(TEMPLATE, **self._values).encode(errors="replace")
 
 
 def _write_address(address: str) -> None:
