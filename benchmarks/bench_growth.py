@@ -26,7 +26,8 @@ from msgspec.structs import replace
 from timing import minimum_time
 
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory

@@ -263,7 +263,7 @@ class _Runs:
     def _execute(self, source: Path | ConcreteRun, seed: int) -> int:
         """Execute and print one run, and return its exit code."""
         from eidrive_scenario.experiments.single_run import run_and_save
-        from eidrive_scenario.recording import Explanation
+        from eidrive_scenario.recording.text.explanation import Explanation
 
         parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
         suffixes = [*parts, f"seed-{seed}"] if len(self.seeds) > 1 else parts

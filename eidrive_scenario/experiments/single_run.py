@@ -30,7 +30,7 @@ from eidrive_scenario.simulation.observers import checked_observers
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
-    from eidrive_scenario.recording import Explanation
+    from eidrive_scenario.recording.text.explanation import Explanation
 
 
 def record_mode(value: bool | str) -> RecordMode:
@@ -101,11 +101,11 @@ def run_and_save(
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
                     stack.enter_context(exclusive(path_argument(log, "log")))
-                from eidrive_scenario.recording import RunLog
+                from eidrive_scenario.recording.text.run_log import RunLog
 
                 simulation.add_observer(RunLog(log))
             if csv is not None:
-                from eidrive_scenario.recording import CsvWriter
+                from eidrive_scenario.recording.text.csv_writer import CsvWriter
 
                 simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(path_argument(csv, "csv")))))
             if folder is not None and kept is not RecordMode.NEVER:
@@ -139,7 +139,7 @@ def _record(
     at_once: bool,
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
-    from eidrive_scenario.recording import CameraImageWriter
+    from eidrive_scenario.recording.camera_images import CameraImageWriter
     from eidrive_scenario.simulation.recorded_outcome import RunRecorder, scenario_metadata
 
     images = CameraImageWriter(folder.images)

@@ -10,7 +10,8 @@ from street_scene import NOTHING, after
 from whole_run import Run
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.trace_hash import TraceHash
 
 LIGHTS = """<TrafficSignals><TrafficSignalController name="crossing">

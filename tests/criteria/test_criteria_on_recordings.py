@@ -12,7 +12,8 @@ from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import Frame, Verdict, evaluate_criteria
 from eidrive_scenario.evaluation.criteria_parser import CriteriaContext, build_criteria, parse_criteria
 from eidrive_scenario.extensions.registry import registry
-from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import read_recording
 
 ROAD = Path(__file__).parents[2] / "xosc" / "roads" / "coop_1.xodr"
 SIGN = 'dynamic="no" orientation="+" zOffset="2.4" country="DE" type="206"'

@@ -17,7 +17,8 @@ from msgspec.structs import replace
 from pydantic import ValidationError
 
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
-from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, run_file
 
 STRAIGHT = [(0.0, 0.0), (100.0, 0.0)]

@@ -15,8 +15,9 @@ from eidrive_scenario.cli import app
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.extensions.library import resolve_scenario
-from eidrive_scenario.recording import RunLog, read_recording
 from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import read_recording
+from eidrive_scenario.recording.text.run_log import RunLog
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed, run_file
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage

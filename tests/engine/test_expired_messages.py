@@ -16,7 +16,7 @@ from eidrive_scenario.cli import app
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.export.tables import write_csv
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.text.run_log import RunLog
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.report import write_run_report

@@ -14,7 +14,7 @@ from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 STEP = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)

@@ -12,7 +12,7 @@ from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.gym import EidriveEnv
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, run_file
 
 PASSING_BY = Path(__file__).parents[1] / "data" / "passing_by.xosc"

@@ -12,7 +12,7 @@ from eidrive_scenario.base.imports import lazy_exports
 
 @pytest.mark.parametrize(
     "package",
-    ["openscenario", "recording", "traffic", "world"],
+    ["openscenario", "traffic", "world"],
 )
 def test_package_with_lazy_exports_has_all_its_names(package: str) -> None:
     module = importlib.import_module(f"eidrive_scenario.{package}")

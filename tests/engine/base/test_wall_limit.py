@@ -20,7 +20,8 @@ from eidrive_scenario.base import wall_limit
 from eidrive_scenario.base.wall_limit import LastResort, current_limit, limit_wall_time, set_last_resort, signal_name
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.recording import Frame, read_recording
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 pytestmark = pytest.mark.timeout(600)

@@ -14,7 +14,7 @@ import eidrive_scenario
 from eidrive_scenario.base import wall_limit
 from eidrive_scenario.base.wall_limit import LastResort, Limit, limit_wall_time, set_last_resort
 from eidrive_scenario.errors import WallLimitError
-from eidrive_scenario.recording import Frame
+from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.simulation.attribution import describe_dump, describe_hung_run
 

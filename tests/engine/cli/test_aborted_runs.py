@@ -14,7 +14,7 @@ import pytest
 from faulty_extensions import install, line_of, write_scenario
 from openscenario_xml import deterministic_xml, distribution_xml, parameters_xml, values_xml
 
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 
 pytestmark = pytest.mark.timeout(600)
 """Hung runs last for the limit and the grace period, and several processes load the engine."""

@@ -10,7 +10,7 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings
 
 

@@ -9,7 +9,7 @@ from command_fixtures import Eidrive
 from mcap.reader import make_reader
 from osi3trace.osi_trace import OSITrace
 
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ import pytest
 from command_fixtures import Eidrive
 from openscenario_xml import deterministic_xml, distribution_xml, values_xml
 
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 
 PATIENCE = 30.0
 """Maximum time for which a test waits for another process [s]."""

@@ -23,8 +23,8 @@ from command_fixtures import Eidrive
 
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.extensions.library import resolve_scenario
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.reporting.live.live_view import LiveView
 from eidrive_scenario.reporting.run_report.report import write_run_report
 

@@ -15,7 +15,7 @@ from storyboard_xml import end_xml, init_xml, teleport_xml, world_position_xml
 
 from eidrive_scenario.cli.console import show
 from eidrive_scenario.cli.run import run
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, load_for_seed
 
 

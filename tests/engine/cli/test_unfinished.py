@@ -13,7 +13,7 @@ from sweep_runs import RUN, opened
 
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.files.atomic import exclusive
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.simulation.commands import RunState
 from eidrive_scenario.simulation.run_outcome import end_reason

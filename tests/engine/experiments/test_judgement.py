@@ -21,9 +21,9 @@ from eidrive_scenario.evaluation.criteria_parser import CRITERION, declaration_t
 from eidrive_scenario.experiments.judgement import INCOMPLETE, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.files.atomic import partial_path
-from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.frame import ExecutedCommand
-from eidrive_scenario.recording.recording import open_recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import open_recording, read_recording
 from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.simulation import RunResult, RunSettings
 from eidrive_scenario.simulation.recorded_outcome import CONTEXT, OUTCOME, recorded_outcome

@@ -21,7 +21,8 @@ from eidrive_scenario.experiments.run_folder import folder_name, run_folder
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.files.atomic import FileLock
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.recording import TraceHash, read_recording
+from eidrive_scenario.recording.recording import read_recording
+from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.simulation import RunResult, RunSettings
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 

@@ -11,8 +11,9 @@ from eidrive_scenario.evaluation import evaluate_criteria
 from eidrive_scenario.evaluation.criteria_parser import build_criteria, parse_criteria
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.extensions.registry import registry
-from eidrive_scenario.recording import TraceHash, read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.run_files import read_result, result_paths
+from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.simulation import RunSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"

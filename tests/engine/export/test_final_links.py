@@ -11,7 +11,7 @@ from eidrive_scenario.experiments.judgement import judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.export.tables import write_csv
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.recorded_outcome import recorded_outcome

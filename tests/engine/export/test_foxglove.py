@@ -23,9 +23,9 @@ from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.foxglove.writer import write_foxglove
 from eidrive_scenario.export.recorded_run import open_run
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.camera_images import camera_file, image_file
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.messages.point_cloud import compress

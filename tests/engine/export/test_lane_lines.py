@@ -10,8 +10,8 @@ from written_recording import view, write_run
 
 from eidrive_scenario.export.geometry import center_line, edge_line, lane_edges
 from eidrive_scenario.export.tool_topics import write_with_topics
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.roads import RoadNetwork
 
 ROAD = """<OpenDRIVE><header revMajor="1" revMinor="7"/><road id="1" length="100" junction="-1"><planView>

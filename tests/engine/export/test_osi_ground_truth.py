@@ -18,8 +18,8 @@ from written_recording import Body, detected, step, view, write_run
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.osi.trace import GROUND_TRUTH, write_osi
 from eidrive_scenario.export.recorded_run import open_run
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.world.appearance import Appearance, LightState

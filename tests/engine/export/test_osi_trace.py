@@ -17,8 +17,8 @@ from written_recording import detected, step, view, write_run
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.export.osi.trace import sensor_data_topic, write_osi
 from eidrive_scenario.export.recorded_run import open_run
-from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.sensing.readings import EgoState
 
 ROAD = Path(__file__).parents[3] / "xosc" / "roads" / "coop_1.xodr"

@@ -18,8 +18,8 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run
 from eidrive_scenario.export.tables import TABLES, write_csv, write_parquet
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.text.csv_writer import COLUMNS, text_of_csv
 from eidrive_scenario.simulation import RunResult, RunSettings
 

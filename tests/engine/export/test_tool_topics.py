@@ -18,8 +18,8 @@ from eidrive_scenario.export.osi.trace import write_osi
 from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.export.tool_topics import ALL_TOPICS, write_with_topics
 from eidrive_scenario.pytest_plugin.option_values import TOPICS
-from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.simulation import RunSettings
 
 

@@ -10,9 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.recording import CsvWriter
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.csv_writer import csv_text, text_of_csv
+from eidrive_scenario.recording.text.csv_writer import CsvWriter, csv_text, text_of_csv
 
 
 def test_csv_writer_writes_one_row_per_actor_and_tick(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:

@@ -23,9 +23,10 @@ from typer.testing import CliRunner
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.recording import mcap_records, read_recording
+from eidrive_scenario.recording import mcap_records
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.simulation import RunSettings
 
 from .mutants import ATTACHMENT, CHUNK, MUTATIONS, join, messages, mutant, pack, split, unpack

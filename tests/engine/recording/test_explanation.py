@@ -23,7 +23,7 @@ from storyboard_xml import (
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.recording import Explanation
+from eidrive_scenario.recording.text.explanation import Explanation
 from eidrive_scenario.simulation import RunSettings, Simulation
 
 

@@ -10,10 +10,12 @@ from mcap.reader import make_reader
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError, SettingError, SimulationError
-from eidrive_scenario.recording import Recorder, TraceHash, read_recording
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame, check_frame
 from eidrive_scenario.recording.json_text import JsonText
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import read_recording
+from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.simulation.recorded_outcome import RunRecorder
 
 MakeFrame = Callable[..., Frame]

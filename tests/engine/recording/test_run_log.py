@@ -10,7 +10,8 @@ from msgspec.structs import replace
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.recording import Frame, RunLog
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.text.run_log import RunLog
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.recording import TraceHash
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.world.view import Contact
 
 MakeFrame = Callable[..., Frame]
@@ -67,7 +67,7 @@ def test_trace_hash_does_not_depend_on_reason_text(make_frame: MakeFrame) -> Non
 
 def test_trace_hash_is_equal_in_other_processes() -> None:
     script = (
-        "import numpy as np; from eidrive_scenario.recording import TraceHash\n"
+        "import numpy as np; from eidrive_scenario.recording.trace_hash import TraceHash\n"
         "from eidrive_scenario.recording.frame import Frame; from eidrive_scenario.world.view import WorldView\n"
         "one, three = np.ones(1), np.ones((1, 3))\n"
         "view = WorldView(0.05, 1, ('Ego',), ('car',), three, one, one, one, three, three, one, one, three, three)\n"

@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.extensions.library import resolve_scenario
-from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.reporting.drawing.image_canvas import ImageCanvas
 from eidrive_scenario.reporting.drawing.labels import label_places, overlaps, write_labels

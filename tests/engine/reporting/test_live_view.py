@@ -18,8 +18,8 @@ from lxml import html
 from eidrive_scenario.api.live import LiveView
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.reporting.live import live_view
 from eidrive_scenario.reporting.live.live_view import Pace
 from eidrive_scenario.reporting.replay.frame_data import replay_data

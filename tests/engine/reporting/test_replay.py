@@ -14,10 +14,10 @@ from lxml import html
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
-from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.settings_text import short_number

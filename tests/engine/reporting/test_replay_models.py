@@ -14,8 +14,8 @@ import pytest
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.extensions.library import library_path
-from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.rendering.meshes import BUILDERS, actor_mesh
 from eidrive_scenario.rendering.model import linear
 from eidrive_scenario.reporting import replay

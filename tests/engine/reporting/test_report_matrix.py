@@ -12,8 +12,8 @@ import pytest
 from report_table import listed_runs
 
 from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
-from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.reporting.replay.page import make_replay, write_replays

@@ -10,8 +10,8 @@ import numpy as np
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run
-from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.view import WorldView

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.recording import TraceHash
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
