@@ -105,7 +105,7 @@ _HEADERS = {
 _log = logging.getLogger(__name__)
 
 
-class LiveServer:
+class LiveServer(ThreadingHTTPServer):
     """HTTP server of one page and its events, in separate threads.
 
     page   function that returns the HTML of the page; it is called in a thread of the server
@@ -114,42 +114,36 @@ class LiveServer:
     Raise SettingError if the port cannot be used.
     """
 
+    daemon_threads = True
+    block_on_close = False
+
     def __init__(self, page: Callable[[], bytes], feed: Feed, *, port: int = 0) -> None:
         if not isinstance(port, int) or not 0 <= port <= 65535:
             raise SettingError(Diagnostic(f"port {port!r} does not exist", "give 1 to 65535, or 0 for a free one"))
-        self._feed = feed
-        self._token = secrets.token_urlsafe(16)
+        self.page, self.feed = page, feed
+        self.token = secrets.token_urlsafe(16)
         try:
-            self._server = _Server((HOST, port), _Handler)
+            super().__init__((HOST, port), _Handler)
         except OSError as error:
             message = f"port {port} of {HOST} cannot be used: {error.strerror or error}"
             raise SettingError(Diagnostic(message, "give another port, or 0 for a free one")) from error
-        self._server.feed, self._server.page, self._server.token = feed, page, self._token
         self._thread = threading.Thread(
-            target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, name="eidrive live view", daemon=True
+            target=self.serve_forever, kwargs={"poll_interval": 0.1}, name="eidrive live view", daemon=True
         )
         self._thread.start()
 
     @property
     def address(self) -> str:
         """Address of the page."""
-        return f"http://{HOST}:{self._server.server_address[1]}/{self._token}/"
+        return f"http://{HOST}:{self.server_port}/{self.token}/"
 
     def stop(self) -> None:
         """Send the remaining events, and end the server. A second call has no effect."""
         if self._thread.is_alive():
-            self._feed.stop(timeout=2.0)
-            self._server.shutdown()
+            self.feed.stop(timeout=2.0)
+            self.shutdown()
             self._thread.join()
-            self._server.server_close()
-
-
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    block_on_close = False
-    feed: Feed
-    page: Callable[[], bytes]
-    token: str
+            self.server_close()
 
     def server_bind(self) -> None:
         """Bind the socket without the search for a host name of HTTPServer, which may ask a name server."""
@@ -163,7 +157,7 @@ class _Server(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: _Server
+    server: LiveServer
     timeout = SEND_TIMEOUT
     server_version, sys_version = "eidrive", ""
 
