@@ -7,7 +7,6 @@ import re
 from collections.abc import Hashable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
@@ -163,8 +162,7 @@ def _load(text: str, source: str, line: int | None, quote: bool) -> tuple[Any, d
         diagnostic = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
         raise SettingError(diagnostic)
     try:
-        data, lines = _parsed(text)
-        return _copy(data), lines
+        return _parse(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         error_line = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
@@ -196,18 +194,11 @@ def key_lines(text: str, first: int = 1) -> dict[str, int]:
 
     Nested keys are joined by dots, and entries of lists are numbered: `delay`, `delay.seconds`, `limits.0`.
     """
-    return {path: first + line for path, line in _parsed(text)[1].items()}
-
-
-def _parsed(text: str) -> tuple[Any, dict[str, int]]:
-    """Return the data of a text, and the line of each key, from 0. Both are shared by all calls with the text.
-
-    A run reads a text several times, and each run of a sweep reads the same texts. Long ones are not kept.
-    """
-    return _remembered(text) if len(text) <= _MAX_REMEMBERED else _parse(text)
+    return {path: first + line for path, line in _parse(text)[1].items()}
 
 
 def _parse(text: str) -> tuple[Any, dict[str, int]]:
+    """Return the data of a text, and the line of each key, from 0."""
     if yaml.__with_libyaml__ and _COMMON.fullmatch(text):
         with suppress(yaml.YAMLError, ValueError):  # the other parser describes the error
             return _loaded(_FastLoader(text))
@@ -218,20 +209,6 @@ def _loaded(loader: _Loader) -> tuple[Any, dict[str, int]]:
     node = loader.get_single_node()
     data = None if node is None else loader.construct_document(node)
     return data, _lines_of(node)
-
-
-_MAX_REMEMBERED = 4096
-"""Maximum number of characters of a text whose data is kept in the process."""
-_remembered = lru_cache(maxsize=256)(_parse)
-
-
-def _copy(data: Any) -> Any:
-    """Return data of YAML with copies of its mappings, lists and sets; all other values are immutable."""
-    if isinstance(data, dict):
-        return {key: _copy(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_copy(value) for value in data]
-    return set(data) if isinstance(data, set) else data
 
 
 def _lines_of(root: yaml.Node | None) -> dict[str, int]:
