@@ -21,12 +21,15 @@ from eidrive_scenario.extensions.registry import third_party_files
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
+from eidrive_scenario.recording.camera_images import CameraImageWriter
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE, RecordMode
-from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
+from eidrive_scenario.recording.text.csv_writer import CsvWriter
+from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT, RunLog
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_settings
 from eidrive_scenario.simulation import Observer, RunResult, Simulation
 from eidrive_scenario.simulation.observers import checked_observers
+from eidrive_scenario.simulation.recorded_outcome import RunRecorder, scenario_metadata
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
@@ -101,12 +104,8 @@ def run_and_save(
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
                     stack.enter_context(exclusive(path_argument(log, "log")))
-                from eidrive_scenario.recording.text.run_log import RunLog
-
                 simulation.add_observer(RunLog(log))
             if csv is not None:
-                from eidrive_scenario.recording.text.csv_writer import CsvWriter
-
                 simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(path_argument(csv, "csv")))))
             if folder is not None and kept is not RecordMode.NEVER:
                 recording = folder.recording
@@ -139,12 +138,7 @@ def _record(
     at_once: bool,
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
-    from eidrive_scenario.recording.camera_images import CameraImageWriter
-    from eidrive_scenario.simulation.recorded_outcome import RunRecorder, scenario_metadata
-
-    images = CameraImageWriter(folder.images)
-    images.watch(simulation.stack)
-    simulation.add_observer(images)
+    simulation.add_observer(CameraImageWriter(folder.images, simulation.stack))
     scenario, resolved = simulation.scenario, simulation.resolved
     # Settings of the caller as texts, without those that use the value of the file
     given = {option.name: option.form.recorded(getattr(settings, option.name)) for option in OPTIONS}

@@ -45,19 +45,13 @@ class CameraImageWriter:
     detections of the station are projected into the image.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, stack: DrivingStack) -> None:
         self._folder = folder
-        self._stack: DrivingStack | None = None
-        self._described: set[tuple[str, str]] = set()
-
-    def watch(self, stack: DrivingStack) -> None:
-        """Select the driving stack whose camera images are written."""
         self._stack = stack
+        self._described: set[tuple[str, str]] = set()
 
     def observe(self, frame: Frame) -> None:
         """Write the images of this tick. Raise SettingError if a file cannot be written."""
-        if self._stack is None:
-            return
         for station, readings in self._stack.readings.items():
             detections = self._stack.image_detections(station)
             for camera, reading in readings.cameras.items():
