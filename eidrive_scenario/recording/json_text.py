@@ -20,8 +20,6 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.recording.codec import codec, encode_array
 
-_TEXTS, _LARGEST = 2048, 1024
-"""Number of texts of arrays that are kept, and maximum number of elements of such an array."""
 Check = Callable[[Any], bool]
 """Function that returns whether all numbers of a value outside of arrays are finite."""
 
@@ -35,8 +33,9 @@ class JsonText:
     def __init__(self, kind: type) -> None:
         self._codec = codec(kind)
         self._is_finite = _check_of(kind)
-        self._arrays = _ArrayTexts()
-        self._encoder = msgspec.json.Encoder(enc_hook=self._arrays.plain)
+        self._arrays: dict[int, tuple[Array, msgspec.Raw]] = {}
+        """Text of each array of the record by its `id`, with the array, so that no other one gets this `id`."""
+        self._encoder = msgspec.json.Encoder(enc_hook=self._plain)
         # The hook gets arrays: other types that msgspec does not support have no encoding
         self._decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(
             kind, dec_hook=lambda array_kind, data: codec(array_kind).decode(data)
@@ -56,53 +55,28 @@ class JsonText:
     def encode(self, record: Any) -> bytes:
         """Return the text, which `codec(kind).decode` reads after parsing."""
         if self._is_finite is None or self._is_finite(record):
-            self._arrays.begin()
+            self._arrays.clear()
             return self._encoder.encode(record)
         return msgspec.json.encode(self._codec.encode(record))
 
+    def _plain(self, value: Any) -> Any:
+        """Return a value of a type that msgspec does not support as one that it supports.
 
-class _ArrayTexts:
-    """Texts of arrays, of which most occur several times in a record or did not change since the record before."""
-
-    def __init__(self) -> None:
-        self._encode = msgspec.json.Encoder().encode
-        self._by_content: dict[tuple[Any, ...], msgspec.Raw] = {}
-        self._in_record: dict[int, tuple[Array, msgspec.Raw]] = {}
-        """Text of each array of the record by its `id`, with the array, so that no other one gets this `id`."""
-
-    def begin(self) -> None:
-        """Begin a record. An array may have other content than in the record before."""
-        self._in_record.clear()
-        if len(self._by_content) > _TEXTS:
-            self._by_content.clear()
-
-    def plain(self, value: Any) -> Any:
-        """Return a value of a type that msgspec does not support as one that it supports."""
-        if type(value) is not np.ndarray:
-            return _plain(value)
-        stored = self._in_record.get(id(value))
-        if stored is None:
-            stored = self._in_record[id(value)] = value, self._text(value)
-        return stored[1]
-
-    def _text(self, value: Array) -> msgspec.Raw:
-        if value.size > _LARGEST or value.dtype.hasobject:
-            return msgspec.Raw(self._encode(encode_array(value)))
-        key = value.tobytes(), value.shape, value.dtype
-        text = self._by_content.get(key)
-        if text is None:
-            text = self._by_content[key] = msgspec.Raw(self._encode(encode_array(value)))
-        return text
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Mapping):
-        return dict(value)
-    if isinstance(value, Sequence):
-        return list(value)
-    raise TypeError(f"{type(value).__name__}: no JSON encoding is defined for this type")
+        Of arrays, most occur several times in a record: each is encoded once.
+        """
+        if type(value) is np.ndarray:
+            stored = self._arrays.get(id(value))
+            if stored is None:
+                text = msgspec.Raw(msgspec.json.encode(encode_array(value)))
+                stored = self._arrays[id(value)] = value, text
+            return stored[1]
+        if isinstance(value, np.generic):
+            return value.item()
+        if isinstance(value, Mapping):
+            return dict(value)
+        if isinstance(value, Sequence):
+            return list(value)
+        raise TypeError(f"{type(value).__name__}: no JSON encoding is defined for this type")
 
 
 @cache

@@ -101,14 +101,6 @@ def test_arrays_of_other_type_or_shape_are_distinguished(make_frame: MakeFrame, 
     check(with_plan(make_frame(0), speeds=speeds, points=np.zeros((1, 2))))
 
 
-def test_number_of_kept_texts_is_bounded(make_frame: MakeFrame) -> None:
-    """6,000 different arrays in one encoder: the texts of all would take some megabytes."""
-    text = JsonText(Frame)
-    for number in range(6000):
-        text.encode(with_plan(make_frame(0), speeds=np.array([float(number)])))
-    assert len(text._arrays._by_content) < 4096
-
-
 def test_other_mappings_and_scalars_of_numpy_are_encoded(make_frame: MakeFrame) -> None:
     signals: Mapping[str, str] = MappingProxyType({"1": "red", "Ä": "grün \u2028 \U0001f6a6"})
     light = Appearance({"lowBeam": LightState("lowBeam", "on", color=(0.5, 0.25, 0.0))})
