@@ -110,20 +110,12 @@ def _record(kind: type) -> Check | None:
     """Return the check of a record, which reads only the fields with numbers."""
     hints = get_type_hints(kind)
     names = msgspec.structs.fields(kind) if issubclass(kind, msgspec.Struct) else fields(kind)  # type: ignore[arg-type]
-    checks = [(field.name, check) for field in names if (check := _check_of(hints[field.name])) is not None]
-    numbers = [name for name, check in checks if check is isfinite]
-    if not checks:
-        return None
-    several = attrgetter(*numbers) if len(numbers) > 1 else None
-    others = [(attrgetter(name), check) for name, check in checks if several is None or check is not isfinite]
+    checks = [(attrgetter(field.name), check) for field in names if (check := _check_of(hints[field.name])) is not None]
 
     def is_finite(record: Any) -> bool:
-        # The sum of finite numbers is finite but for an overflow, which only costs time
-        if several is not None and not isfinite(sum(several(record))):
-            return False
-        for field, check in others:  # noqa: SIM110 - faster than all()
+        for field, check in checks:  # noqa: SIM110 - faster than all()
             if not check(field(record)):
                 return False
         return True
 
-    return is_finite
+    return is_finite if checks else None
