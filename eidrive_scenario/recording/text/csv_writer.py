@@ -50,7 +50,6 @@ class CsvWriter:
 
     def __init__(self, path: str | Path) -> None:
         self._file = io.TextIOWrapper(create(path), encoding="utf-8", newline="")
-        self._fields: dict[str, str] = {}
         self._file.write(",".join(COLUMNS) + "\n")
 
     def observe(self, frame: Frame) -> None:
@@ -59,11 +58,8 @@ class CsvWriter:
         columns = (view.position.tolist(), view.yaw.tolist(), view.pitch.tolist(), view.roll.tolist())
         rows = []
         for name, position, yaw, pitch, roll, speed in zip(view.names, *columns, view.speed.tolist(), strict=True):
-            field = self._fields.get(name)
-            if field is None:
-                field = self._fields[name] = csv_text(name)
             numbers = ",".join([f"{number:.6f}" for number in (*position, yaw, pitch, roll, speed)])
-            rows.append(f"{view.time:.6f},{field},{numbers}\n")
+            rows.append(f"{view.time:.6f},{csv_text(name)},{numbers}\n")
         self._file.write("".join(rows))
 
     def close(self) -> None:
