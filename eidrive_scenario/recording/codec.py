@@ -13,23 +13,30 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache
+from operator import attrgetter
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 import numpy as np
 
 Json = Any
+Check = Callable[[Any], bool]
 _SCALARS = {bool: "boolean", int: "integer", str: "string"}
 _NUMBER = {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}
 
 
 @dataclass(frozen=True)
 class Codec:
-    """Encoder, decoder and JSON schema of one type."""
+    """Encoder, decoder and JSON schema of one type.
+
+    is_plain  returns whether msgspec writes a value as `encode` does: all numbers outside of arrays are finite. None if
+              it does so for all values
+    """
 
     encode: Callable[[Any], Json]
     decode: Callable[[Json], Any]
     schema: Mapping[str, Json]
+    is_plain: Check | None = None
 
 
 @cache
@@ -40,7 +47,7 @@ def codec(kind: Any) -> Codec:
     """
     origin, arguments = get_origin(kind), get_args(kind)
     if kind is float:
-        return Codec(_encode_float, float, _NUMBER)
+        return Codec(_encode_float, float, _NUMBER, math.isfinite)
     if kind in _SCALARS:
         return Codec(kind, kind, {"type": _SCALARS[kind]})
     if origin is Literal:
@@ -100,10 +107,12 @@ def _spell(nested: Any) -> Json:
 
 
 def _optional(inner: Codec) -> Codec:
+    is_plain = inner.is_plain
     return Codec(
         lambda value: None if value is None else inner.encode(value),
         lambda data: None if data is None else inner.decode(data),
         {"anyOf": [inner.schema, {"type": "null"}]},
+        is_plain and (lambda value: value is None or is_plain(value)),
     )
 
 
@@ -111,24 +120,35 @@ def _sequence(origin: type, arguments: tuple[Any, ...]) -> Codec:
     if origin is frozenset or arguments[-1] is Ellipsis:
         item = codec(arguments[0])
         order = sorted if origin is frozenset else list
+        check = item.is_plain
+        is_plain = check and (lambda values: all(map(check, values)))
         return Codec(
             lambda values: [item.encode(value) for value in order(values)],
             lambda data: origin(item.decode(value) for value in data),
             {"type": "array", "items": item.schema},
+            (lambda values: False) if origin is frozenset else is_plain,  # msgspec does not sort
         )
     items = [codec(argument) for argument in arguments]
+    checks = [item.is_plain for item in items]
+
+    def are_plain(values: Any) -> bool:
+        return all(check is None or check(value) for check, value in zip(checks, values, strict=True))
+
     return Codec(
         lambda values: [item.encode(value) for item, value in zip(items, values, strict=True)],
         lambda data: tuple(item.decode(value) for item, value in zip(items, data, strict=True)),
         {"type": "array", "prefixItems": [item.schema for item in items], "minItems": len(items)},
+        are_plain if any(checks) else None,
     )
 
 
 def _mapping(value_codec: Codec) -> Codec:
+    check = value_codec.is_plain
     return Codec(
         lambda mapping: {key: value_codec.encode(value) for key, value in mapping.items()},
         lambda data: {key: value_codec.decode(value) for key, value in data.items()},
         {"type": "object", "additionalProperties": value_codec.schema},
+        check and (lambda mapping: all(map(check, mapping.values()))),
     )
 
 
@@ -143,9 +163,18 @@ def _record(kind: type) -> Codec:
     def decode(data: Json) -> Any:
         return kind(**{name: codecs[name].decode(value) for name, value in data.items()})
 
+    checks = [(attrgetter(name), field.is_plain) for name, field in codecs.items() if field.is_plain is not None]
+
+    def is_plain(record: Any) -> bool:
+        for field, check in checks:  # noqa: SIM110 - faster than all()
+            if not check(field(record)):
+                return False
+        return True
+
     properties = {name: field.schema for name, field in codecs.items()}
     names = [name for name, is_required in required.items() if is_required]
-    return Codec(encode, decode, {"type": "object", "properties": properties, "required": names})
+    schema = {"type": "object", "properties": properties, "required": names}
+    return Codec(encode, decode, schema, is_plain if checks else None)
 
 
 def _required_by_field(kind: type) -> dict[str, bool]:

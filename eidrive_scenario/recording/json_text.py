@@ -6,22 +6,14 @@ by hooks. A record with a non-finite number outside of arrays is encoded and dec
 
 from __future__ import annotations
 
-import types
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from functools import cache
-from math import isfinite
-from operator import attrgetter
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.recording.codec import codec, encode_array
-
-Check = Callable[[Any], bool]
-"""Function that returns whether all numbers of a value outside of arrays are finite."""
 
 
 class JsonText:
@@ -32,7 +24,6 @@ class JsonText:
 
     def __init__(self, kind: type) -> None:
         self._codec = codec(kind)
-        self._is_finite = _check_of(kind)
         self._arrays: dict[int, tuple[Array, msgspec.Raw]] = {}
         """Text of each array of the record by its `id`, with the array, so that no other one gets this `id`."""
         self._encoder = msgspec.json.Encoder(enc_hook=self._plain)
@@ -54,7 +45,7 @@ class JsonText:
 
     def encode(self, record: Any) -> bytes:
         """Return the text, which `codec(kind).decode` reads after parsing."""
-        if self._is_finite is None or self._is_finite(record):
+        if self._codec.is_plain is None or self._codec.is_plain(record):
             self._arrays.clear()
             return self._encoder.encode(record)
         return msgspec.json.encode(self._codec.encode(record))
@@ -77,45 +68,3 @@ class JsonText:
         if isinstance(value, Sequence):
             return list(value)
         raise TypeError(f"{type(value).__name__}: no JSON encoding is defined for this type")
-
-
-@cache
-def _check_of(kind: Any) -> Check | None:
-    """Return the check of a type; None if it contains no number outside of arrays."""
-    origin, arguments = get_origin(kind), get_args(kind)
-    if kind is float:
-        return isfinite
-    if origin in (Union, types.UnionType):
-        check = next(filter(None, map(_check_of, arguments)), None)
-        return check and (lambda value: value is None or check(value))
-    if origin is frozenset:
-        raise TypeError(f"{kind!r}: the order of its members is undefined")
-    if origin is tuple and arguments[-1] is not Ellipsis:
-        checks = list(map(_check_of, arguments))
-        if not any(checks):
-            return None
-        return lambda values: all(each is None or each(value) for each, value in zip(checks, values, strict=True))
-    if origin in (tuple, Sequence):
-        of_entry = _check_of(arguments[0])
-        return of_entry and (lambda values: all(map(of_entry, values)))
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        of_value = _check_of(arguments[1])
-        return of_value and (lambda mapping: all(map(of_value, mapping.values())))
-    if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, msgspec.Struct)):
-        return _record(kind)
-    return None
-
-
-def _record(kind: type) -> Check | None:
-    """Return the check of a record, which reads only the fields with numbers."""
-    hints = get_type_hints(kind)
-    names = msgspec.structs.fields(kind) if issubclass(kind, msgspec.Struct) else fields(kind)  # type: ignore[arg-type]
-    checks = [(attrgetter(field.name), check) for field in names if (check := _check_of(hints[field.name])) is not None]
-
-    def is_finite(record: Any) -> bool:
-        for field, check in checks:  # noqa: SIM110 - faster than all()
-            if not check(field(record)):
-                return False
-        return True
-
-    return is_finite if checks else None
