@@ -69,6 +69,17 @@ def test_area_without_room_is_a_warning_with_its_line(run: Run, continuous: str)
     assert 1 <= int(found[2]) <= 2
 
 
+@pytest.mark.parametrize(("rate", "reached"), [(0.5, None), (4.0, "[01](.[0-9]+)?")])
+def test_source_above_the_capacity_of_its_lane_is_a_warning(run: Run, rate: float, reached: str | None) -> None:
+    """At 10 m/s a car of 4.5 m with a time gap of 1 s and a standstill gap of 2 m needs 1.65 s."""
+    played = run(10.0, driven=False, ego=(1, 900.0, 0.0), globally=traffic(source(rate, 300.0, speed=10.0)))
+    warnings = [text for text in played.result.warnings if "traffic 'crowd'" in text]
+    assert len(warnings) == (reached is not None)
+    for warning in warnings:
+        expected = rf".+:\d+: traffic 'crowd': {reached} road users per second entered \(expected 4\); reduce .+"
+        assert re.fullmatch(expected, warning)
+
+
 def test_swarm_below_its_maximum_number_is_no_warning(run: Run) -> None:
     """A ring of 40 m on each side has no site for 500 cars, and one of no width has none at all."""
     played = run(0.2, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm(500, reach=70)))

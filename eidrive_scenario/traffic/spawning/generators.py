@@ -25,6 +25,8 @@ RETRY = 0.5
 """Delay of the next attempt if no site was free [s]."""
 ATTEMPTS = 5
 """Maximum number of failed attempts to spawn a car in one step."""
+ON_RATE = 0.9
+"""Share of the rate of a source below which it is a shortage."""
 RIM = 0.8
 """Share of the axes of the ellipse from which on a swarm is replenished."""
 
@@ -203,6 +205,8 @@ class Source(TrafficGenerator):
     speed: float | None
     started: float
     _made: int = field(default=0, init=False)
+    _elapsed: float = field(default=0.0, init=False)
+    """Time from the start to the last step [s]."""
     _waiting: Participant | None = field(default=None, init=False)
     _without_lane: set[str] = field(default_factory=set, init=False)
     """Categories of participants without a suitable lane."""
@@ -213,6 +217,7 @@ class Source(TrafficGenerator):
 
     def step(self, population: Population) -> None:
         """Spawn cars that are due. A car without a free site is retried."""
+        self._elapsed = population.time - self.started
         while self.is_due(population):
             rng = self.rng(population)
             participant = self._waiting or self.mixture.draw(rng)
@@ -231,11 +236,17 @@ class Source(TrafficGenerator):
 
     @property
     def shortage(self) -> Diagnostic | None:
-        """Warning that participants had no suitable lane; None if all had one."""
-        if not self._without_lane:
+        """Warning that participants had no suitable lane, or were fewer than the rate gives.
+
+        A car may wait at the end, so that one less than those that were due is enough.
+        """
+        if self._without_lane:
+            missing = ", ".join(sorted(self._without_lane))
+            return self._warning(f"no lane at the source is suitable for: {missing}", "remove them, or move the source")
+        if self._made >= ON_RATE * math.floor(self._elapsed * self.rate):
             return None
-        missing = ", ".join(sorted(self._without_lane))
-        return self._warning(f"no lane at the source is suitable for: {missing}", "remove them, or move the source")
+        message = f"{self._made / self._elapsed:.2g} road users per second entered (expected {self.rate:g})"
+        return self._warning(message, "reduce the rate, or enlarge the radius")
 
 
 @dataclass
@@ -337,7 +348,7 @@ class BackgroundTraffic:
                 instance.active = False
 
     def shortages(self) -> Iterator[Diagnostic]:
-        """Yield a warning for each generator whose road users were never complete so far, or had no suitable lane."""
+        """Yield a warning for each generator whose road users were fewer than requested, or had no suitable lane."""
         for instance in self._generators:
             if (shortage := instance.shortage) is not None:
                 yield shortage
