@@ -159,7 +159,7 @@ class Population:
             desired_speed=WALKING * factor if participant.walks else None,
             driver=participant.driver,
             factor=factor,
-            fallback=FREE if given_speed is None else given_speed,
+            fallback=given_speed or FREE,
             ignores_lights=ignores,
         )
         group.members[name] = None

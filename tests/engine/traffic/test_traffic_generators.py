@@ -51,6 +51,14 @@ def test_source_spawns_cars_at_its_rate() -> None:
     assert times == pytest.approx([2.5 * n for n in range(24)])
 
 
+def test_car_from_standstill_drives_on_a_lane_without_limit() -> None:
+    """With 1 m/s² and a desired speed of 13.9 m/s it covers less than 10²/2 m and more than half of it in 10 s."""
+    scene = Scene(0, 1)
+    source(scene, rate=0.05, speed=0.0, radius=0.0)
+    placements = [changes.placements["source.0001"] for changes in scene.run(10.0)]
+    assert 25.0 < placements[-1].x - placements[0].x < 50.0
+
+
 def test_source_without_free_site_delays_cars() -> None:
     """A car stands at the source for 20 s. The cars that were due meanwhile are spawned afterwards."""
     scene = Scene(0, 1)
