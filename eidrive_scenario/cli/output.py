@@ -173,7 +173,12 @@ def print_notes(error: BaseException) -> None:
 def print_warnings(warnings: Iterable[str]) -> None:
     """Print warnings on stderr, one per line."""
     for warning in warnings:
-        echo(f"warning: {warning}", color="yellow", err=True)
+        print_warning(warning)
+
+
+def print_warning(warning: str) -> None:
+    """Print a warning on stderr."""
+    echo(f"warning: {warning}", color="yellow", err=True)
 
 
 def _attribute(error: BaseException) -> BaseException:

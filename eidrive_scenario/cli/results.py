@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.output import echo, print_warning, print_warnings
 from eidrive_scenario.errors import FAILED, PASSED, Diagnostic, SettingError
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def results(
     if not 0.0 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
     check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
-    runs = list(stored_runs(stores))
+    runs = list(stored_runs(stores, print_warning))
     names = None if by is None else [name.strip() for name in by.split(",")]
     points = summaries(runs, by=names, interval=interval, confidence=confidence)
     mixed = (indistinct(runs), mixed_versions(runs))
@@ -160,11 +160,19 @@ def compare(
         name, equals, listed = between.partition("=")
         values = [typed_value(text.strip()) for text in listed.split(",")] if equals else []
         comparisons = compare_values(
-            stores, name.strip(), values, margin=margin, confidence=confidence, metrics=metric or []
+            stores,
+            name.strip(),
+            values,
+            margin=margin,
+            confidence=confidence,
+            metrics=metric or [],
+            warn=print_warning,
         )
     elif len(stores) == 2:
         first, second = stores
-        compared = compare_stores([first], [second], margin=margin, confidence=confidence, metrics=metric or [])
+        compared = compare_stores(
+            [first], [second], margin=margin, confidence=confidence, metrics=metric or [], warn=print_warning
+        )
         comparisons = [NamedComparison("", str(first), str(second), compared)]
     else:
         hint = "give two, or --between NAME, such as --between channel, for the values of an axis"

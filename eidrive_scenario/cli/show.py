@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.output import echo, print_warning, print_warnings
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 PictureSize = Annotated[
@@ -282,7 +282,7 @@ def report(
         runs,
         out,
         replays=replays,
-        warn=lambda text: print_warnings([text]),
+        warn=print_warning,
         figures=figures,
         size=parse_size(size),
     )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -100,15 +101,17 @@ def compare(
     margin: float = 0.05,
     confidence: float = 0.95,
     metrics: Sequence[str] = (),
+    warn: Callable[[str], None] = warnings.warn,
 ) -> Comparison:
     """Compare the runs of two sweeps with equal scenario, seed and values of the axes.
 
     margin   largest decrease of the success rate that counts as not worse
     metrics  metrics whose means are compared, with Student's t intervals
+    warn     function that gets a line for each damaged result, which is omitted
 
     Raise SettingError if a file is not a store, if no runs are equal, or for an unknown metric.
     """
-    sides = stored_sides(first, second)
+    sides = stored_sides(first, second, warn=warn)
     base, changed = (_by_identity(runs, paths) for runs, paths in zip(sides, (first, second), strict=True))
     comparison = _compared(base, changed, margin, confidence, metrics)
     if comparison is None:
@@ -125,17 +128,19 @@ def compare_values(
     margin: float = 0.05,
     confidence: float = 0.95,
     metrics: Sequence[str] = (),
+    warn: Callable[[str], None] = warnings.warn,
 ) -> list[NamedComparison]:
     """Compare the values of an axis of one sweep: each one with the first, by runs that are equal otherwise.
 
     paths   stores or folders of results, which are combined
     axis    axis, or a parameter that a distribution varies
     values  values of the axis, the reference first; () for all, numbers in ascending order
+    warn    function that gets a line for each damaged result, which is omitted
 
     Raise SettingError if a file is not a store, without such an axis or value, with a single or a repeated value, if no
     runs are equal, or for an unknown metric.
     """
-    runs = list(stored_runs(paths))
+    runs = list(stored_runs(paths, warn))
     axes = values_of(runs)
     name = next((name for name in axes if axis_identity(name) == axis_identity(axis)), None)
     if name is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, cast
@@ -44,11 +44,12 @@ class _Settings(msgspec.Struct):
     varied: tuple[str, ...] = ()
 
 
-def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
+def folder_runs(locations: Sequence[Path], warn: Callable[[str], None]) -> list[StoredRun]:
     """Return the runs whose results are in these files and folders, and the interrupted ones, which are aborted.
 
     They are numbered in the order of their paths. Their points have all settings that a sweep could vary (see
-    `with_axes`). Raise InputError for a damaged result, and for a location without runs.
+    `with_axes`). A damaged result below a folder is omitted, with a line for `warn`. Raise InputError for a damaged
+    result that `locations` names, and for a location without runs.
     """
     runs: list[StoredRun] = []
     for location in locations:
@@ -56,9 +57,17 @@ def folder_runs(locations: Sequence[Path]) -> list[StoredRun]:
             raise SettingError(
                 Diagnostic("no such file or folder", "give a store or a folder of results", str(location))
             )
-        before = len(runs)
-        runs += [_finished(path, number) for number, path in enumerate(result_paths([location]), before)]
+        before, damaged = len(runs), list[Diagnostic]()
+        for path in result_paths([location]):
+            try:
+                runs.append(_finished(path, len(runs)))
+            except InputError as error:
+                damaged += error.diagnostics
         runs += _interrupted(location, len(runs))
+        if damaged and len(runs) == before:
+            raise InputError(damaged)
+        for diagnostic in damaged:
+            warn(f"{diagnostic.source}: {diagnostic.message}, it is omitted")
         if len(runs) == before:
             hint = "give a store of a sweep, or a folder that eidrive run --out or pytest --eidrive-out wrote"
             raise SettingError(Diagnostic(f"no {RESULT} in this folder", hint, str(location)))

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,22 +51,24 @@ class PointSummary:
     rate: Proportion | None
 
 
-def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
+def stored_runs(paths: Sequence[Path], warn: Callable[[str], None] = warnings.warn) -> Iterator[StoredRun]:
     """Yield the runs of several stores and folders of results; of equal runs, the last one with a verdict.
 
-    Raise InputError for a damaged store or result.
+    warn  function that gets a line for each damaged result below a folder, which is omitted
+
+    Raise InputError for a damaged store, and for a damaged result that `paths` name.
     """
-    (runs,) = stored_sides(paths)
+    (runs,) = stored_sides(paths, warn=warn)
     return iter(runs)
 
 
-def stored_sides(*sides: Sequence[Path]) -> list[list[StoredRun]]:
+def stored_sides(*sides: Sequence[Path], warn: Callable[[str], None] = warnings.warn) -> list[list[StoredRun]]:
     """Return the runs of each side as `stored_runs`, all with the same axes.
 
     They are those of all stores, and the settings that vary within the folders of any side.
     """
     stores = [[run for run, _ in _all_runs(path for path in paths if not _has_results(path))] for paths in sides]
-    folders = [folder_runs([path for path in paths if _has_results(path)]) for paths in sides]
+    folders = [folder_runs([path for path in paths if _has_results(path)], warn) for paths in sides]
     varied = [name for runs in folders for name in varying(runs)]
     axes = _axes([*(name for runs in stores for run in runs for name in run.point), *varied])
     joined: list[list[StoredRun]] = []

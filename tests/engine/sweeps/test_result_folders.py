@@ -149,10 +149,26 @@ def test_interrupted_run_is_aborted(runs: Path) -> None:
 def test_damaged_result_is_an_error_that_names_the_file(runs: Path, text: str, message: str) -> None:
     damaged = next(runs.rglob("result.json"))
     damaged.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError) as caught:
-        stored_runs([runs])
-    assert message in str(caught.value)
-    assert str(damaged) in str(caught.value)
+    for location in (damaged, damaged.parent):
+        with pytest.raises(InputError) as caught:
+            stored_runs([runs, location], lambda _: None)
+        assert message in str(caught.value)
+        assert str(damaged) in str(caught.value)
+
+
+def test_damaged_result_below_a_folder_is_omitted_with_a_warning(eidrive: Eidrive, runs: Path) -> None:
+    damaged = next(runs.rglob("result.json"))
+    damaged.write_text("{", encoding="utf-8")
+    with pytest.warns(UserWarning, match=r"not JSON: .*, it is omitted"):
+        assert len(list(stored_runs([runs]))) == 3
+    separate = runs / "5", runs / "30.0"
+    for shown in (
+        eidrive("results", runs),
+        eidrive("compare", *separate),
+        eidrive("compare", runs, "--between", "Speed"),
+    ):
+        (warning,) = [line for line in shown.stderr.splitlines() if "omitted" in line]
+        assert warning.startswith(f"warning: {damaged}: not JSON")
 
 
 def test_folder_without_results_is_an_error(tmp_path: Path, runs: Path) -> None:
