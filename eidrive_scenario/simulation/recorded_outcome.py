@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from eidrive_scenario.base.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, InputError
@@ -20,7 +20,6 @@ from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCateg
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
-from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.simulation.commands import criteria_context
 from eidrive_scenario.simulation.result import RunResult
@@ -28,6 +27,9 @@ from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.world.actor import ExtraAxle, Vector3
 from eidrive_scenario.world.specs import actor_spec
+
+if TYPE_CHECKING:
+    from eidrive_scenario.recording.recording import Recording
 
 _Entry = TypeVar("_Entry")
 
