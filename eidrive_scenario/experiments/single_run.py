@@ -21,7 +21,6 @@ from eidrive_scenario.extensions.registry import third_party_files
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
-from eidrive_scenario.recording.camera_images import CameraImageWriter
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE, RecordMode
 from eidrive_scenario.recording.text.csv_writer import CsvWriter
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT, RunLog
@@ -29,7 +28,6 @@ from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run_options import DEFAULT_SEED, OPTIONS, RunSettings, checked_settings
 from eidrive_scenario.simulation import Observer, RunResult, Simulation
 from eidrive_scenario.simulation.observers import checked_observers
-from eidrive_scenario.simulation.recorded_outcome import RunRecorder, scenario_metadata
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
@@ -138,6 +136,10 @@ def _record(
     at_once: bool,
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
+    # Runs without a recording start faster without these
+    from eidrive_scenario.recording.camera_images import CameraImageWriter
+    from eidrive_scenario.simulation.recorded_outcome import RunRecorder, scenario_metadata
+
     simulation.add_observer(CameraImageWriter(folder.images, simulation.stack))
     scenario, resolved = simulation.scenario, simulation.resolved
     # Settings of the caller as texts, without those that use the value of the file
