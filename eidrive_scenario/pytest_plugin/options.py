@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from _pytest.config.findpaths import locate_config  # the search for ini files has no public interface
 
 from eidrive_scenario.pytest_plugin.option_values import (
     NO_LIMIT,
@@ -192,24 +191,11 @@ def read_options(config: pytest.Config) -> None:
         for folder in config.getini("eidrive_paths") or ():
             if not folder.exists():
                 raise pytest.UsageError(f"ini option eidrive_paths: no folder '{folder}'; quote a path with spaces")
-        _warn_of_unused_files(config)
 
 
 def send_paths(node: Any) -> None:
     """Send the paths of the command line to a worker of pytest-xdist, whose own arguments omit them."""
     node.workerinput[_WORKER_KEY] = [str(path) for path in node.config.stash[_GIVEN]]
-
-
-def _warn_of_unused_files(config: pytest.Config) -> None:
-    """Warn of ini files with options of this plugin that pytest does not read, as a session has one ini file."""
-    if config.getoption("inifilename"):
-        return
-    located = (locate_config(config.invocation_params.dir, [path]) for path in config.stash[_GIVEN])
-    for file, values in {file: values for _, file, values, *_ in located if file != config.inipath}.items():
-        if unused := ", ".join(name for name in values if name.startswith("eidrive_")):
-            used = "no ini file" if config.inipath is None else config.inipath
-            message = f"{unused} of {file} have no effect: the session uses {used}; run pytest for each project"
-            config.issue_config_time_warning(pytest.PytestConfigWarning(message), stacklevel=2)
 
 
 def _check_exclusive(config: pytest.Config) -> None:

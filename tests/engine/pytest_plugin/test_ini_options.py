@@ -56,19 +56,6 @@ def test_command_line_takes_precedence_over_ini_options(project: pytest.Pytester
     assert collected(project, "drives", *arguments) == ["channel=none-planner=behavior-seed=1]"]
 
 
-def test_options_of_second_ini_file_warn(project: pytest.Pytester) -> None:
-    """As in pytest, the ini file of the first argument is that of the session. A file without own options is silent."""
-    for name, option in (("one", "eidrive_seeds = 2"), ("two", "eidrive_seeds = 3"), ("three", "addopts = -v")):
-        shutil.copytree(project.path / "drives", project.path / name)
-        (project.path / name / "pytest.ini").write_text(f"[pytest]\n{option}\n")
-    result = project.runpytest_subprocess("--collect-only", "-q", "one", "two", "three", "two/first.xosc")
-    assert len([line for line in result.outlines if "first.xosc::" in line]) == 6
-    warned = [line.partition("PytestConfigWarning: ")[2] for line in result.outlines if "ConfigWarning: " in line]
-    one, two = (project.path / name / "pytest.ini" for name in ("one", "two"))
-    text = f"eidrive_seeds of {two} have no effect: the session uses {one}; run pytest for each project"
-    assert warned == [text]
-
-
 @pytest.mark.statistical
 def test_marker_takes_precedence_over_ini_options(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_channel = ideal\neidrive_success_rate = 0.9\n")
