@@ -12,6 +12,7 @@ from eidrive_scenario.driving.planning.path import nearest_segment
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,6 @@ STANDSTILL = 0.3
 """Speed below which a stopping vehicle holds its brake [m/s]."""
 GRAVITY = 9.81
 """[m/s²]; the pedals compensate its part along a slope."""
-ROLLING_RESISTANCE = 0.012 * GRAVITY
-"""Deceleration by the rolling resistance of tires on asphalt [m/s²]."""
 HOLDING = 3.0
 """Deceleration that corresponds to the held brake: sufficient on a slope of 30 % [m/s²]."""
 
@@ -99,6 +98,7 @@ class PidController(VehicleController):
         self._speed = PID(LONGITUDINAL, low=-LARGEST_DECELERATION, high=LARGEST_ACCELERATION, dt=dt, band=SPEED_BAND)
         self._direction = PID(LATERAL, low=-spec.max_steering, high=spec.max_steering, dt=dt, band=LEARNING)
         self._steering = 0.0
+        self._rolling = VehicleParameters.of(spec).rolling_resistance * GRAVITY
 
     def control(self, ego: EgoState, plan: Plan) -> Control:
         """Return throttle, brake and steering of the next time step. The braking of a plan overrides its speeds."""
@@ -107,14 +107,16 @@ class PidController(VehicleController):
             self._speed.reset()
             braking = max(plan.braking + _downhill(ego), 0.0)
             return Control(0.0, _pedal(braking, self.spec.max_deceleration), steering)
-        target, falling = _speed_here(ego, plan)
         if plan.acceleration < 0.0:  # exact, unlike the profile between two points; the tires take their part
-            target, falling = float(plan.speeds[0]), plan.acceleration + ROLLING_RESISTANCE
+            target, fed_forward = float(plan.speeds[0]), plan.acceleration + self._rolling
+        else:
+            target, falling = _speed_here(ego, plan)
+            fed_forward = falling or plan.acceleration
         if target < STANDSTILL and ego.speed < STANDSTILL:
             self._speed.reset()
             acceleration = -HOLDING
-        else:  # fed forward with the deceleration of the speed profile
-            acceleration = self._speed.update(target - ego.speed, falling or plan.acceleration)
+        else:
+            acceleration = self._speed.update(target - ego.speed, fed_forward)
         acceleration -= _downhill(ego)
         if acceleration >= 0.0:
             return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
