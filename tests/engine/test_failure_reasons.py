@@ -35,10 +35,10 @@ CASES = {
     "ncap/crossing_car": (delayed(1.0), {"collision", "reach_position"}),
     "ncap/crossing_child": (delayed(1.0), {"collision", "reach_position"}),
     "driving/lead_braking": (delayed(1.9, own=True), {"collision"}),
-    "ei/scenario_17": (delayed(1.5, own=True), {"reach_position", "time_limit"}),
+    "ei/scenario_01": (delayed(1.5, own=True), {"reach_position", "time_limit"}),
 }
 """Channel and failed criteria of ten scenarios of the library, all of which pass without a delay."""
-LONG = {"coop/scenario_5", "driving/lead_braking", "ei/scenario_17"}
+LONG = {"coop/scenario_5", "driving/lead_braking", "ei/scenario_01"}
 """Runs that take several seconds with their recording."""
 TIME_LIMIT = 60.0
 """Setting `within` of the criterion `time_limit` of the EIScenarios [s]."""
