@@ -12,6 +12,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import VULNERABLE, Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
+from eidrive_scenario.driving.planning.behavior.right_of_way import Course
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 
@@ -90,6 +91,8 @@ class KnownObject(msgspec.Struct):
     """Speed over about the last second [m/s]."""
     z: float = 0.0
     """Height of the lower side of its box [m]."""
+    followed: list[Course] = []
+    """Courses that it was last predicted to follow."""
     kinds: dict[str, float] = {}
     """Shares of the classes that were observed over about the last second; empty while there is only one."""
 

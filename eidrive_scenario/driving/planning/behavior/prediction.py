@@ -11,7 +11,13 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
-from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
+from eidrive_scenario.driving.planning.behavior.right_of_way import (
+    FASTEST_TURN,
+    Course,
+    JunctionRules,
+    LaneCourses,
+    Passage,
+)
 from eidrive_scenario.driving.planning.path import ALIGNED
 from eidrive_scenario.roads import RoadNetwork
 
@@ -22,8 +28,9 @@ LEAVING_RATE = 0.3
 LEAVING_ERROR = 3.5
 """Lateral speed of a vehicle that leaves its lane per standard deviation of its position [1/s], if that is larger: with
 a velocity from noisy positions."""
-CUTTING = 0.15
-"""Angle between the motion of a vehicle and its lane in a junction up to which it cuts the curve [rad]; a choice."""
+CUTTING, STILL_CUTTING = 0.15, 0.3
+"""Angle between the motion of a vehicle and its lane in a junction up to which it cuts the curve, and that up to which
+one that has been predicted to follow the lane still does [rad]; choices."""
 LANE_WIDTH = 3.5
 """Lateral distance after which a lane change is predicted to end [m]."""
 NOTICEABLE, GREATEST = 0.8, 4.0
@@ -35,6 +42,9 @@ STOPPING, FIRM = 2.0, 3.05
 [m/s²]; 3.05 is that of the ITE for stops."""
 AT_SIGN = 1.0
 """Distance of the front from a sign within which the vehicle has stopped there or passes it [m]."""
+HARSH = math.sqrt(7.0 / FASTEST_TURN)
+"""Ratio of the speeds in a curve at the limit of the tires (0.7 g) and at that of comfort. A vehicle that has been
+predicted to follow a lane may be that fast."""
 MOST_HYPOTHESES = 4
 """Maximum number of hypotheses of one object."""
 
@@ -148,6 +158,9 @@ class Predictor:
         """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
+        kept: list[Hypothesis] = []
+        """Along lanes that it followed, and still may: else the prediction alternates where a turn is near a limit."""
+        followed: list[Course] = []
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         for course in courses:
@@ -161,23 +174,39 @@ class Predictor:
             aside = now * math.sin(turn)
             offset: float | Array = left
             wandering = max(LEAVING_RATE, LEAVING_ERROR * known_object.error)
-            if any(passage.start <= along <= passage.end for passage in course.passages):
+            in_junction = any(passage.start <= along <= passage.end for passage in course.passages)
+            if in_junction:
                 wandering = max(wandering, CUTTING * now)
             leaves = abs(aside) > wandering
+            fits = now <= noise or course.can_follow(along, now - noise)
+            is_inside = abs(left) <= course.half_width + known_object.error
+            fitting = leaving if leaves or not is_inside else following if fits else too_fast
+            keeps = (
+                fitting is not following
+                and in_junction
+                and is_inside
+                and course in known_object.followed
+                and abs(aside) <= max(wandering, STILL_CUTTING * now)
+                and course.can_follow(along, (now - noise) / HARSH)
+            )
+            leaves = leaves and not keeps
             if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known_object, course, along, times) or (along_lane, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
-            fits = now <= noise or course.can_follow(along, now - noise)
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            is_inside = abs(left) <= course.half_width + known_object.error
-            fitting = leaving if leaves or not is_inside else following if fits else too_fast
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
+            if keeps:
+                kept.append(fitting[-1])
+            if keeps or fitting is following:
+                followed.append(course)
             if len(following) == MOST_HYPOTHESES:
                 break
-        following = following or too_fast or leaving[:MOST_HYPOTHESES]
-        return following or [_straight_on(known_object, travelled, speed)]
+        known_object.followed = followed
+        likely = following or too_fast or leaving[:MOST_HYPOTHESES]
+        likely += [hypothesis for hypothesis in kept if all(hypothesis is not other for other in likely)]
+        return likely or [_straight_on(known_object, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""

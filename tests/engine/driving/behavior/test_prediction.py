@@ -222,3 +222,18 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     box = KnownBox(x, y, 8.0 * math.cos(heading), 8.0 * math.sin(heading), yaw=heading)
     prediction = predictor.predict(known(box))
     assert (prediction.y[:, -1] < -20.0).any()
+
+
+@pytest.mark.parametrize(("speed", "late"), [(8.5, 0.0), (8.0, 1.0), (6.0, 2.0)])
+def test_turn_stays_predicted_until_it_is_over(speed: float, late: float) -> None:
+    """A car turns left at the speed at which it entered, with the curve of the lane some meters behind that."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    predictor, memory = Predictor(roads, TIMES), ObjectMemory(BehaviorSettings())
+    (courses,) = predictor.lanes(known(KnownBox(52.0, 3.5, -speed, yaw=math.pi)))
+    turn = next(course for course in courses if course.points[-1, 1] < -50.0)
+    start, _, _ = turn.project(52.0, 3.5)
+    for time in np.arange(0.0, 3.0, 0.1).tolist():
+        x, y, heading = (float(values[0]) for values in turn.poses(np.array([start + speed * time - late]), 0.0))
+        box = KnownBox(x - late, y, speed * math.cos(heading), speed * math.sin(heading), yaw=heading)
+        prediction = predictor.predict(memory.update(detections(time, box), time))
+        assert (prediction.y[:, -1] < -20.0).any(), time
