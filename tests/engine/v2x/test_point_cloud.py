@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -38,6 +40,18 @@ def test_compress_steps_are_encoded_in_groups_of_seven_bits() -> None:
     assert cloud.steps.tolist() == [0, 1, 128 + 72, 1, 128 + 32, 128 + 28, 1]
     assert cloud.size == HEADER_BYTES + 7
     np.testing.assert_allclose(cloud.points(), row + np.array([0.5, 0.5, 0.0]))
+
+
+def test_header_has_documented_layout() -> None:
+    """Points in the cells (-2, 3, 0) and (0, 3, 1) of 500 mm: a grid of 3 x 1 x 2 cells, 0 and 5 are full."""
+    data = compress(np.array([[-0.8, 1.6, 0.1], [0.2, 1.6, 0.7]]), 12.5, 0.5, duration=0.1).encode()
+    assert struct.unpack_from("<d", data, 0) == (12.5,)
+    assert struct.unpack_from("<H", data, 8) == (100,)
+    assert struct.unpack_from("<3i", data, 10) == (-2, 3, 0)
+    assert struct.unpack_from("<H", data, 22) == (500,)
+    assert (data[24:27], data[27:30]) == (b"\x01\x00\x00", b"\x02\x00\x00")
+    assert struct.unpack_from("<I", data, 30) == (2,)
+    assert list(data[34:]) == [0, 5]
 
 
 def test_compress_points_of_one_cell_become_one() -> None:
