@@ -51,7 +51,7 @@ def codec(kind: Any) -> Codec:
     if kind in _SCALARS:
         return Codec(kind, kind, {"type": _SCALARS[kind]})
     if origin is Literal:
-        return Codec(_same, _same, {"enum": list(arguments)})
+        return _literal(arguments)
     if isinstance(kind, type) and issubclass(kind, Enum):
         return Codec(lambda member: member.value, kind, {"enum": [member.value for member in kind]})
     if origin is np.ndarray:
@@ -71,6 +71,15 @@ def codec(kind: Any) -> Codec:
 
 def _same(value: Any) -> Any:
     return value
+
+
+def _literal(values: tuple[Any, ...]) -> Codec:
+    def decode(data: Json) -> Any:
+        if data not in values:
+            raise ValueError(f"{str(data)[:80]!r} is none of {', '.join(map(str, values))}")
+        return data
+
+    return Codec(_same, decode, {"enum": list(values)})
 
 
 def _encode_float(value: float) -> Json:

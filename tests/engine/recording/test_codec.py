@@ -60,6 +60,12 @@ def test_codec_of_each_supported_type_is_lossless() -> None:
     assert round_trip(Literal["x", "y"], "x") == "x"
 
 
+@pytest.mark.parametrize("value", ["z", {"x": 1}, ["x"], None, 1])
+def test_codec_of_literal_refuses_other_values(value: object) -> None:
+    with pytest.raises(ValueError, match="is none of x, y"):
+        codec(Literal["x", "y"]).decode(value)
+
+
 def test_codec_of_missing_field_uses_default() -> None:
     @dataclass(frozen=True)
     class Newer:
