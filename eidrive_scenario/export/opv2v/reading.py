@@ -31,6 +31,8 @@ FRAME_STEP = 0.05
 """Time between successive frame numbers [s]."""
 MAX_FRAMES = 100_000
 """Maximum number of frames of all stations of a scenario."""
+MAX_SHIFT = 0.1
+"""Motion of the lidar of a roadside unit that counts as standing [m]."""
 _STATION = re.compile(r"-?\d{1,9}", re.ASCII)
 _FRAME = re.compile(r"(\d{1,9})\.yaml", re.ASCII)
 _EXPONENT = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d{1,3}", re.ASCII)
@@ -164,6 +166,11 @@ def read_scene(folder: Path) -> TrafficScene:
     mobile = {number: station for number, station in stations.items() if number >= 0}
     warnings = [text for number, station in mobile.items() for text in _add_station(number, station, objects)]
     empty = sorted(path.name for path in _numbered_folders(folder) if int(path.name) not in stations)
+    warnings += [
+        f"roadside unit {number} moves by up to {moved:.1f} m, but stays at its first pose in the scenario"
+        for number, station in stations.items()
+        if number < 0 and (moved := _motion(station)) > MAX_SHIFT
+    ]
     warnings += [f"folder {name} has no frame NUMBER.yaml, so that its station is missing" for name in empty]
 
     def name_of(number: int) -> str:
@@ -202,6 +209,12 @@ def _read_objects(file: _FrameFile, key: str, frame: int, objects: dict[int, _Sa
         angle = file.numbers(content, "angle", 3, path)
         # The offset of the center is along the axes of the map, as readers of OPV2V add it.
         samples.poses[frame] = pose_matrix([*np.add(location, center).tolist(), *angle])
+
+
+def _motion(station: _Station) -> float:
+    """Return the largest distance of a lidar from its first position [m]."""
+    positions = np.stack(list(station.lidars.values()))[:, :3, 3]
+    return float(np.linalg.norm(positions - positions[0], axis=1).max())
 
 
 def _add_station(number: int, station: _Station, objects: dict[int, _Samples]) -> Iterator[str]:

@@ -46,11 +46,15 @@ _UNIT_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) fo
 
 
 def check_sensors(sensors: Mapping[str, SensorSettings], source: str = "") -> None:
-    """Raise SettingError unless the sensors of all stations are one lidar and any number of cameras."""
+    """Raise SettingError unless the sensors of all stations are one lidar and any number of cameras, at 10 Hz."""
     kinds = [settings.kind for settings in sensors.values()]
     if kinds.count("lidar") != 1 or set(kinds) - {"lidar", "camera"}:
         message = f"a frame of OPV2V has one lidar and cameras (got {', '.join(kinds) or 'no sensor'})"
         raise SettingError(Diagnostic(message, "give one sensor of kind lidar", source))
+    for name, settings in sensors.items():
+        if settings.rate not in (None, RATE):
+            message = f"sensor {name!r} measures in each frame, at {RATE:g} Hz (got rate {settings.rate:g})"
+            raise SettingError(Diagnostic(message, "remove the rate", source))
 
 
 class Opv2vWriter:

@@ -230,6 +230,9 @@ def _scene(folder: Path, name: str, frames: list[_Frame]) -> TrafficScene:
         time = round(frame.time - start, 6)
         if times and time - times[-1] < 1e-6:
             continue  # one scan of the vehicle paired with several of the roadside unit
+        if time > MAX_NUMBER:
+            message = f"pointcloud_timestamp of frame {quoted(frame.vehicle)} is {time:g} s after the first one"
+            raise SettingError(Diagnostic(message, "give microseconds", str(folder / VEHICLE / "data_info.json")))
         times.append(time)
         lidars.append(_vehicle_lidar(folder, frame.vehicle))
         if unit is None:

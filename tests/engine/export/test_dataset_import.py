@@ -256,6 +256,16 @@ def test_station_folder_without_frames_is_a_warning(tmp_path: Path) -> None:
     assert "folder 2 has no frame NUMBER.yaml, so that its station is missing" in warnings
 
 
+def test_roadside_unit_that_moves_is_a_warning(tmp_path: Path) -> None:
+    for number, x in ((0, 0.0), (2, 3.0)):
+        write_frame(tmp_path / "in" / "scene", 1, number, frame(0.0))
+        write_frame(tmp_path / "in" / "scene", -1, number, frame(x))
+        write_frame(tmp_path / "in" / "scene", -2, number, frame(10.0))
+    _, warnings = imported(tmp_path / "in", tmp_path / "out")
+    moving = "roadside unit -1 moves by up to 3.0 m, but stays at its first pose in the scenario"
+    assert [text for text in warnings if "roadside" in text] == [moving]
+
+
 def test_folder_without_recording_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
     for folder, message in ((tmp_path, "the folder contains no recording"), (tmp_path / "missing", "cannot read")):
         result = eidrive("dataset", "--import", folder, "--out", tmp_path / "out")
@@ -427,6 +437,16 @@ def test_damaged_recording_of_dair_v2x_is_an_error(file: str, content: str, mess
     folder = dair(tmp_path / "in", frames=1)
     (folder / file).write_text(content)
     with pytest.raises(SettingError, match=message):
+        list(import_recordings(folder, tmp_path / "out"))
+
+
+def test_time_in_another_unit_is_an_error_with_its_frame(tmp_path: Path) -> None:
+    folder = dair(tmp_path / "in", frames=2)
+    index = folder / "vehicle-side/data_info.json"
+    entries = json.loads(index.read_text())
+    entries[1]["pointcloud_timestamp"] = str(10**18)  # nanoseconds
+    write_json(index, entries)
+    with pytest.raises(SettingError, match=r"data_info\.json: pointcloud_timestamp of frame '000101' is .* after"):
         list(import_recordings(folder, tmp_path / "out"))
 
 

@@ -361,6 +361,11 @@ def test_sensors_without_exactly_one_lidar_are_an_error(sensors: str, tmp_path: 
         read_sensors(path)
 
 
+def test_sensor_with_another_rate_than_that_of_frames_is_an_error() -> None:
+    with pytest.raises(SettingError, match=r"sensor 'front' measures in each frame, at 10 Hz \(got rate 5\)"):
+        read_sensors("{roof: {kind: lidar, rate: 10}, front: {kind: camera, rate: 5}}")
+
+
 def test_run_without_a_common_frame_is_an_error(tmp_path: Path) -> None:
     writer = Opv2vWriter(tmp_path)
     writer.stations = {"A": 1001, "B": 1002}
