@@ -119,8 +119,7 @@ def scenario_diagnostics(
         for diagnostic in (*simulation.progress_warnings, *simulation.start_warnings):
             yield Level.WARNING, diagnostic
         if not simulation.can_be_judged:
-            hint = f"{HOW_TO_JUDGE} of `eidrive run`"
-            yield Level.NOTE, Diagnostic(UNJUDGED, hint, str(scenario.path or ""))
+            yield Level.NOTE, Diagnostic(UNJUDGED, HOW_TO_JUDGE, str(scenario.path or ""))
     except InputError as error:
         yield from ((level, diagnostic) for level, diagnostic in _errors(error) if diagnostic not in errors)
 

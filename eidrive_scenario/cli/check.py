@@ -14,10 +14,13 @@ from eidrive_scenario.cli.options import HelpAll, check_output_paths, takes_run_
 from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError
-from eidrive_scenario.run_options import RunSettings, check_seconds
+from eidrive_scenario.run_options import FLAGS, RunSettings, check_seconds, diagnostic_with_option_names
 
 if TYPE_CHECKING:
     from eidrive_scenario.checks.rule import CheckReport
+
+_NAMES = {**FLAGS, "no_criteria": f"{FLAGS['no_criteria']} of `eidrive run`"}
+"""Options by the name of the setting, in diagnostics of a command that runs nothing."""
 
 
 @takes_run_options("check", at="wall_limit", before={"planner": "criteria"})
@@ -74,7 +77,8 @@ def check(
             print_error(error, "check", path)
             aborted.append(error)
             continue
-        for level, diagnostics in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
+        for level, reported in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
+            diagnostics = [diagnostic_with_option_names(diagnostic, _NAMES) for diagnostic in reported]
             for diagnostic in diagnostics:
                 if diagnostic not in printed[level]:
                     echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")

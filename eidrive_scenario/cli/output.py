@@ -37,10 +37,19 @@ def make_writable() -> None:
 def echo(message: object, *, err: bool = False, color: str = "") -> None:
     """Print a line on stdout or stderr. All commands print by this function, or by `console` of `verdicts`.
 
-    Control characters are escaped, as names and messages of files may contain them.
+    Settings have the names of their options. Control characters are escaped, as names and messages of files may contain
+    them.
     """
-    text = printable(str(message))
+    text = printable(_with_option_names(str(message)))
     typer.echo(typer.style(text, fg=color) if color else text, err=err)
+
+
+def _with_option_names(text: str) -> str:
+    if "RunSettings." not in text:
+        return text
+    from eidrive_scenario.run_options import with_option_names  # late, as help and version do without the options
+
+    return with_option_names(text)
 
 
 def flush_output() -> None:

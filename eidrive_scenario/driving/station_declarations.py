@@ -35,7 +35,7 @@ def declared_settings(
     selected  detector and fusion method of options, by the property that each replaces
     """
     diagnostics = [
-        registry(SELECTED[part]).unknown(name, source=f"--{part}")
+        registry(SELECTED[part]).unknown(name, source=f"RunSettings.{part}")
         for part, name in selected.items()
         if name not in registry(SELECTED[part])
     ]
@@ -65,7 +65,7 @@ def declared_settings(
         if sender not in controllers:
             what = "selection without stations" if sender in selections.declared else "no station"
             hint = _sender_hint(sender, selections, controllers)
-            diagnostics.append(Diagnostic(f"{what} {sender!r}", hint, "--cooperate"))
+            diagnostics.append(Diagnostic(f"{what} {sender!r}", hint, "RunSettings.cooperate"))
     if diagnostics:
         raise SettingError(diagnostics)
     updated = {}
@@ -164,7 +164,7 @@ def _origin(
 ) -> tuple[str, int | None]:
     """Return file and line of a detector or fusion method, or its option if this and no property determines it."""
     if part in selected and not getattr(station, f"{part}_settings"):
-        return f"--{part}", None
+        return f"RunSettings.{part}", None
     return controller.source, property_line(controller, f"{part}_settings", part)
 
 

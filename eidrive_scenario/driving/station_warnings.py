@@ -79,7 +79,7 @@ def short_channel_delay(
         what = "the delay" if isinstance(delay, ConstantDelay) else "the median delay"
         yield Diagnostic(
             f"most messages take one step of {dt:g} s: {what} of the channel {profile.name!r} is only {median:.3g} s",
-            "use a smaller step (--dt) to resolve it",
+            "use a smaller step (RunSettings.dt) to resolve it",
             source,
             line,
         )
@@ -92,7 +92,7 @@ def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -
             yield Diagnostic(
                 f"detections of {name!r} are known one step of {dt:g} s later: "
                 f"its detector_latency is only {station.detector_latency:g} s",
-                "use a smaller step (--dt) to resolve it",
+                "use a smaller step (RunSettings.dt) to resolve it",
             )
 
 

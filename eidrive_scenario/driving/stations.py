@@ -157,7 +157,7 @@ class Stations(DrivingStack):
         """Versions of the libraries that compute the detections of any station, by name."""
         self._encoders = declared_encoders(scenario, self._settings)
         if context.channel is not None:
-            self._channel.select(context.channel, origin="--channel", line=None, scope=scenario.scope)
+            self._channel.select(context.channel, origin="RunSettings.channel", line=None, scope=scenario.scope)
 
     @property
     def settings(self) -> Mapping[str, AgentSettings]:
@@ -208,7 +208,7 @@ class Stations(DrivingStack):
         yield from short_detector_latencies(self._settings, context.dt)
         yield from short_views({name: self._settings[name] for name in self.possible_drivers}, self._detectors)
         if context.channel is not None:
-            yield from short_channel_delay(self._channel.profile, context.dt, "--channel")
+            yield from short_channel_delay(self._channel.profile, context.dt, "RunSettings.channel")
 
     def add(self, spec: ActorSpec) -> None:
         settings = self._settings.get(spec.name)

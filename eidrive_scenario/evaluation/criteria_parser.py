@@ -320,7 +320,8 @@ def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
         translated = translation(condition)
         name = condition.name.removeprefix(CRITERION_PREFIX)
         if name in INEXPRESSIBLE:
-            hint = f"its arguments are not one number; declare {INEXPRESSIBLE[name]} ({CRITERION} or --criterion)"
+            places = f"{CRITERION} or RunSettings.criteria"
+            hint = f"its arguments are not one number; declare {INEXPRESSIBLE[name]} ({places})"
         elif translated is None:
             hint = suggestion(name, sorted(CLASSES))
         elif _lacks_roads(translated[0], scenario):

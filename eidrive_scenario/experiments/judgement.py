@@ -23,7 +23,7 @@ from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.run_options import RunSettings
+from eidrive_scenario.run_options import RunSettings, with_option_names
 from eidrive_scenario.simulation.attribution import report_extension
 from eidrive_scenario.simulation.commands import parse_added_criteria
 from eidrive_scenario.simulation.recorded_outcome import (
@@ -72,7 +72,7 @@ class Judgement:
             "passed": self.passed,
             "end_reason": self.end_reason,
             "criteria": list(map(verdict_json, self.criteria)),
-            "warnings": list(self.warnings),
+            "warnings": list(map(with_option_names, self.warnings)),
             "metrics": dict(self.metrics),
             "simulated_s": self.simulated_s,
             "recording": str(self.recording),
@@ -116,7 +116,7 @@ def _judge(recording: Recording, others: Any) -> Judgement:
     elif CONTEXT not in recording.metadata:
         version = recording.metadata.get("eidrive-scenario", "unknown")
         message = f"the recording contains no criteria (written by version {version})"
-        raise SettingError(Diagnostic(message, "give criteria (--criterion)", source))
+        raise SettingError(Diagnostic(message, "give criteria (RunSettings.criteria)", source))
     observer, context = CriteriaObserver(criteria), CriteriaContext(has_roads=roads is not None)
     exit_command: Verdict | None = None
     end: float | None = None
@@ -138,7 +138,8 @@ def _judge(recording: Recording, others: Any) -> Judgement:
         criterion.observe_final_links(() if outcome is None else outcome.final_links)
         criterion.observe_links(links)
     verdicts = tuple(map(plain_verdict, observer.verdicts(exit_command)))
-    warnings = [] if verdicts else [f"{UNJUDGED}; give one by --criterion, such as '{{collision: {{of: Ego}}}}'"]
+    hint = "give one by RunSettings.criteria, such as '{collision: {of: Ego}}'"
+    warnings = [] if verdicts else [f"{UNJUDGED}; {hint}"]
     warnings += [f"the recording is damaged: {line}" for line in damage]
     if others is None and outcome is not None and not damage:
         warnings += _differences(verdicts, outcome.criteria)
@@ -162,7 +163,7 @@ def _criteria_of_run(text: str, context: CriteriaContext, recording: Recording) 
         return parse_criteria(text, context)
     except SettingError as error:
         run = recording.metadata.get("command") or "the run"
-        hint = f"judge it with the extensions of {run}, or with other criteria (--criterion)"
+        hint = f"judge it with the extensions of {run}, or with other criteria (RunSettings.criteria)"
         source = str(recording.path)
         raise SettingError([Diagnostic(entry.message, hint, source) for entry in error.diagnostics]) from error
 

@@ -189,7 +189,7 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             message = 'run_scenario: no scenario (expected run_scenario("coop/scenario_1") or the marker scenario)'
             pytest.fail(message, pytrace=False)
         if channel is not None:
-            variant = replace(variant, channel=channel, replaced=())
+            settings["channel"], variant = channel, replace(variant, replaced=())
         if seed is not None:
             variant = replace(variant, seed=seed, replaced=(), rate=None)
         try:

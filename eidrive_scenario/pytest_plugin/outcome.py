@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -25,7 +24,13 @@ from eidrive_scenario.pytest_plugin.options import (
     wall_limit,
 )
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant
-from eidrive_scenario.run_options import Criteria, Stacks, option_of
+from eidrive_scenario.run_options import (
+    Criteria,
+    Stacks,
+    diagnostic_with_option_names,
+    option_of,
+    with_option_names,
+)
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 if TYPE_CHECKING:
@@ -124,10 +129,11 @@ def _run(
     for keyword in overrides:
         if keyword not in names:
             raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, names)))
+    option_names = _option_names(config, variant, overrides)
     settings: dict[str, Any] = {}
     for option in OPTIONS:
         if (value := option_value(config, option.name)) is not None and option.setting:
-            settings[option.setting] = option_of(option.setting).form.parse(option.flag, value)
+            settings[option.setting] = option_of(option.setting).form.parse(option_names[option.setting], value)
     settings |= {
         "channel": _channel(config, variant.channel),
         "no_criteria": option_value(config, "without_criteria") in ("warn", "pass"),
@@ -147,8 +153,9 @@ def _run(
             command=_command(item, source),
         )
     except InputError as error:
-        raise type(error)([_with_own_options(diagnostic) for diagnostic in error.diagnostics]) from None
-    result = replace(result, warnings=tuple(map(_rename_options, result.warnings)))
+        renamed = [diagnostic_with_option_names(diagnostic, option_names) for diagnostic in error.diagnostics]
+        raise type(error)(renamed) from None
+    result = replace(result, warnings=tuple(with_option_names(text, option_names) for text in result.warnings))
     if option_value(config, "without_criteria") == "pass":
         result = replace(result, warnings=tuple(text for text in result.warnings if text != UNJUDGED))
     if result.folder is not None:
@@ -160,19 +167,24 @@ def _run(
     return result
 
 
-_FLAGS = {option_of(option.setting).flag: option.flag for option in OPTIONS if option.setting}
-"""Options of pytest by those of `eidrive run`."""
-_FLAG = re.compile(rf"(?<![\w-])(?:{'|'.join(_FLAGS)})(?![\w-])")
+def _option_names(config: pytest.Config, variant: RunVariant, keywords: Collection[str]) -> dict[str, str]:
+    """Return what gives each setting of a run, for messages: an option, an ini option, or a keyword of the test.
 
-
-def _rename_options(text: str) -> str:
-    """Return a message of the engine with the options of pytest in place of those of `eidrive run`."""
-    return _FLAG.sub(lambda match: _FLAGS[match[0]], text)
-
-
-def _with_own_options(diagnostic: Diagnostic) -> Diagnostic:
-    message, hint, source = map(_rename_options, (diagnostic.message, diagnostic.hint, diagnostic.source))
-    return replace(diagnostic, message=message, hint=hint, source=source)
+    A setting that nothing gives has the name of its option.
+    """
+    channel = None if variant.channel in split_channels(",".join(listed_value(config, "channel"))) else variant.channel
+    of_marker = {"channel": channel, **vars(variant.added)}
+    names = {"no_criteria": "--eidrive-without-criteria pass"}
+    for option in OPTIONS:
+        if not option.setting:
+            continue
+        names[option.setting] = option.flag
+        if command_line_value(config, option.name) is None:
+            if of_marker.get(option.setting) is not None:
+                names[option.setting] = option.setting
+            elif option_value(config, option.name) is not None:
+                names[option.setting] = f"ini option {option.key}"
+    return {**names, **{name: name for name in keywords}}
 
 
 def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, Any]:

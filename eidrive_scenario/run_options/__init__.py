@@ -9,6 +9,9 @@ from eidrive_scenario.run_options.forms import Switch as Switch
 from eidrive_scenario.run_options.forms import YamlSource as YamlSource
 from eidrive_scenario.run_options.forms import as_setting_text as as_setting_text
 from eidrive_scenario.run_options.forms import check_seconds as check_seconds
+from eidrive_scenario.run_options.names import FLAGS as FLAGS
+from eidrive_scenario.run_options.names import diagnostic_with_option_names as diagnostic_with_option_names
+from eidrive_scenario.run_options.names import with_option_names as with_option_names
 from eidrive_scenario.run_options.table import DEFAULT_SEED as DEFAULT_SEED
 from eidrive_scenario.run_options.table import OPTIONS as OPTIONS
 from eidrive_scenario.run_options.table import PytestForm as PytestForm

@@ -46,7 +46,7 @@ from eidrive_scenario.world.view import WorldView
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
-CRITERION_OPTION = "--criterion"
+CRITERION_OPTION = "RunSettings.criteria"
 ROUTING = (AcquirePositionAction, AssignRouteAction, RandomRouteAction)
 """Actions that request a route."""
 

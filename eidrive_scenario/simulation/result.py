@@ -13,7 +13,7 @@ from typing import Any
 
 from eidrive_scenario.errors import NOT_JUDGED
 from eidrive_scenario.evaluation.criterion import Verdict
-from eidrive_scenario.run_options import OPTIONS
+from eidrive_scenario.run_options import OPTIONS, with_option_names
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
@@ -124,7 +124,7 @@ class RunResult:
         return {**row, "settings_sha256": self.settings.digest, "trace_hash": self.trace_hash}
 
     def as_json(self) -> dict[str, Any]:
-        """Return the object that `--json` prints."""
+        """Return the object that `--json` prints, whose warnings name the options of the command line."""
         return {
             "scenario": self.scenario,
             **({} if self.run is None else {"run": self.run}),
@@ -135,7 +135,7 @@ class RunResult:
             "end_reason": self.end_reason,
             "criteria": list(map(verdict_json, self.criteria)),
             "final_state": list(self.final_state),
-            "warnings": list(self.warnings),
+            "warnings": list(map(with_option_names, self.warnings)),
             "metrics": dict(self.metrics),
             "links": [
                 {"sender": sender, "receiver": receiver, **statistics.as_json()}

@@ -34,7 +34,10 @@ EXPIRED_SHARE = 0.1
 """Share of the received messages of a link that may be too old for their receiver without a warning."""
 UNJUDGED = "the run is not judged: it has no criterion"
 """Start of the warning of a run without verdicts."""
-HOW_TO_JUDGE = "add one to the scenario or by --criterion '{collision: {of: Ego}}', or accept the run by --no-criteria"
+HOW_TO_JUDGE = (
+    "add one to the scenario or by RunSettings.criteria '{collision: {of: Ego}}', or accept the run by "
+    "RunSettings.no_criteria"
+)
 """Hint to the warning."""
 
 

@@ -21,7 +21,7 @@ from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.run_options import RunSettings, option_of
+from eidrive_scenario.run_options import RunSettings
 from eidrive_scenario.simulation.commands import DeclaredCriteria, RunState, check_added_criteria, check_commands
 from eidrive_scenario.simulation.scenario_options import drive_entities, select_planner
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -120,7 +120,7 @@ def set_up_run(
         criteria = tuple(stop_trigger_declarations(scenario))
     with errors:
         if settings.weather is not None:
-            weather = load_weather(settings.weather, origin=option_of("weather").flag)
+            weather = load_weather(settings.weather, origin="RunSettings.weather")
     errors.raise_if_any()
     declarations = [*criteria, *(declaration for of_source in declared.values() for declaration in of_source), *added]
     all_criteria = [declaration.build() for declaration in declarations]

@@ -13,12 +13,12 @@ from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.files.yaml_text import YamlContent, flow_yaml, read_yaml_source
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.conventions import MODULE, is_agent_controller, property_entries
-from eidrive_scenario.run_options import YamlSource, option_of
+from eidrive_scenario.run_options import YamlSource
 from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
 from eidrive_scenario.world.specs import actor_spec
 
-DRIVE = option_of("drive").flag
-PLANNER = option_of("planner").flag
+DRIVE = "RunSettings.drive"
+PLANNER = "RunSettings.planner"
 _TOWED = (model.VehicleCategory.TRAILER, model.VehicleCategory.SEMITRAILER)
 _OF_SPEED = ("target_speed", "follow_speed_limit")
 _EXAMPLE = "{planner: route, detector: oracle}"
@@ -134,7 +134,7 @@ def select_planner(scenario: Scenario, planner: str | None, *, only: str | None 
     }
     if controllers == dict(scenario.controllers) and not _has_driver(scenario):
         message = f"planner {quoted(planner)} has no effect: the scenario has no station that drives"
-        raise SettingError(Diagnostic(message, "remove the option, or give a vehicle a stack by --drive", PLANNER))
+        raise SettingError(Diagnostic(message, f"remove the option, or give a vehicle a stack by {DRIVE}", PLANNER))
     return replace(scenario, controllers=controllers)
 
 

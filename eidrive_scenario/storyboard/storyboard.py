@@ -106,7 +106,7 @@ class Storyboard:
         """Raise SettingError if no controller model of the entity accepts poses from outside."""
         if not any(model.accepts_external_poses and model.actor.name == name for model in self._controller_models):
             message = f"entity {name!r} has no controller model that accepts poses"
-            hint = "assign the model `external` to its controller (--controller NAME=external)"
+            hint = "assign the model `external` to its controller (RunSettings.controllers NAME=external)"
             raise SettingError(Diagnostic(message, hint, "set_pose"))
 
     def initial(self) -> Commands:

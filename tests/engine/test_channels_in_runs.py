@@ -223,7 +223,7 @@ INVALID = [
 def test_run_with_invalid_channel_raises_before_the_start(tmp_path: Path, channel: str, message: str) -> None:
     with pytest.raises(InputError) as caught:
         Simulation(load_for_seed(ONE, 1, {}), settings=RunSettings(channel=channel))
-    assert str(caught.value).startswith("--channel: ")
+    assert str(caught.value).startswith("RunSettings.channel: ")
     assert message in str(caught.value)
     profile = tmp_path / "mine.yaml"
     profile.write_text(channel)

@@ -88,7 +88,8 @@ def test_controller_of_another_tool_is_replaced_with_a_warning(tmp_path: Path, a
         tmp_path, speed_xml(6), assign_xml(activate=activate), controller=controller_xml({"gain": 1}, name="Acc")
     )
     result = run_file(path, settings=RunSettings(drive="Ego"))
-    assert any("controller 'Acc' of 'Ego' is replaced by a driving stack (--drive)" in one for one in result.warnings)
+    message = "controller 'Acc' of 'Ego' is replaced by a driving stack (RunSettings.drive)"
+    assert any(message in warning for warning in result.warnings)
     unused = [one for one in result.warnings if "no effect: the driving stack of the run drives 'Ego'" in one]
     assert len(unused) == (2 if activate else 1), result.warnings
     assert not any("is not executed" in one for one in result.warnings)
@@ -126,12 +127,12 @@ def test_every_unsuitable_entity_is_reported_with_its_reason(tmp_path: Path) -> 
     with pytest.raises(InputError) as caught:
         run_file(path, settings=RunSettings(drive=("Walker", "Mast", "Own", "Egg"), criteria="{collision: {of: Walk}}"))
     assert [str(one) for one in caught.value.diagnostics] == [
-        "--drive: 'Walker' is a pedestrian, not a vehicle; the scenario has the vehicles Ego, Own",
-        "--drive: 'Mast' is a miscellaneous object, not a vehicle; the scenario has the vehicles Ego, Own",
-        f"--drive: 'Own' has a driving stack already ({path}:{line}); change the properties of its controller, "
-        "or remove the option",
-        "--drive: the scenario has no entity 'Egg'; did you mean 'Ego'?",
-        "--criterion: criterion 'collision': unknown entity 'Walk'; did you mean 'Walker'?",
+        "RunSettings.drive: 'Walker' is a pedestrian, not a vehicle; the scenario has the vehicles Ego, Own",
+        "RunSettings.drive: 'Mast' is a miscellaneous object, not a vehicle; the scenario has the vehicles Ego, Own",
+        f"RunSettings.drive: 'Own' has a driving stack already ({path}:{line}); change the properties of its "
+        "controller, or remove the option",
+        "RunSettings.drive: the scenario has no entity 'Egg'; did you mean 'Ego'?",
+        "RunSettings.criteria: criterion 'collision': unknown entity 'Walk'; did you mean 'Walker'?",
     ]
 
 
@@ -193,12 +194,15 @@ def test_setting_of_wrong_type_raises(setting: str, value: Any, message: str) ->
 @pytest.mark.parametrize(
     ("criterion", "message"),
     [
-        ("{colision: {of: Ego}}", "--criterion: unknown criterion 'colision'; did you mean 'collision'?"),
-        ("{collision: {oof: Ego}}", "--criterion: unknown setting 'oof'; did you mean 'of'?"),
-        ("{collision: Ego}", "--criterion: criterion 'collision': settings are not a mapping (got 'Ego')"),
-        ("collision", "--criterion: no file 'collision'; give the path of a YAML file, or a mapping {key: value}"),
-        ("{}", "--criterion: no criterion is declared (got {}); write min_distance:"),
-        ("{collision: {of: Ego}", "--criterion:1: not valid YAML"),
+        ("{colision: {of: Ego}}", "RunSettings.criteria: unknown criterion 'colision'; did you mean 'collision'?"),
+        ("{collision: {oof: Ego}}", "RunSettings.criteria: unknown setting 'oof'; did you mean 'of'?"),
+        ("{collision: Ego}", "RunSettings.criteria: criterion 'collision': settings are not a mapping (got 'Ego')"),
+        (
+            "collision",
+            "RunSettings.criteria: no file 'collision'; give the path of a YAML file, or a mapping {key: value}",
+        ),
+        ("{}", "RunSettings.criteria: no criterion is declared (got {}); write min_distance:"),
+        ("{collision: {of: Ego}", "RunSettings.criteria:1: not valid YAML"),
     ],
 )
 def test_invalid_criterion_is_reported(criterion: str, message: str) -> None:

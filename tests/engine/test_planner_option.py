@@ -71,13 +71,13 @@ def test_planner_applies_to_stacks_of_the_option_drive() -> None:
 @pytest.mark.parametrize(
     ("planner", "message"),
     [
-        ("rout", "--planner: unknown planner 'rout'; did you mean 'route'?"),
-        ("none", "--planner: unknown planner 'none'"),
-        ("", "--planner: unknown planner ''"),
+        ("rout", "RunSettings.planner: unknown planner 'rout'; did you mean 'route'?"),
+        ("none", "RunSettings.planner: unknown planner 'none'"),
+        ("", "RunSettings.planner: unknown planner ''"),
         (
             "route",
-            "--planner: planner 'route' has no effect: the scenario has no station that drives; remove the option, or "
-            "give a vehicle a stack by --drive",
+            "RunSettings.planner: planner 'route' has no effect: the scenario has no station that drives; "
+            "remove the option, or give a vehicle a stack by RunSettings.drive",
         ),
         (5, "planner is 5"),
     ],

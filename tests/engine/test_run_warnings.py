@@ -138,7 +138,8 @@ def test_delay_below_one_step_is_reported(channel: str, dt: float, median: str) 
     warnings = ours(run_file("coop/scenario_1", settings=RunSettings(channel=channel, dt=dt, time_limit=0.3)).warnings)
     assert len(warnings) == bool(median)
     assert all(
-        warning.startswith(f"--channel: most messages take one step of {dt:g} s: {median}") for warning in warnings
+        warning.startswith(f"RunSettings.channel: most messages take one step of {dt:g} s: {median}")
+        for warning in warnings
     )
 
 

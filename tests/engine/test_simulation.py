@@ -176,11 +176,11 @@ def test_invalid_setting_is_reported_with_file_and_line_before_run(
 
 
 def test_unknown_detector_and_sender_are_reported_with_their_option() -> None:
-    with pytest.raises(InputError, match="--detector: unknown detector 'yolo'"):
+    with pytest.raises(InputError, match=r"RunSettings\.detector: unknown detector 'yolo'"):
         play(detector="yolo")
-    with pytest.raises(InputError, match="--cooperate: no station 'RSU2'; did you mean 'RSU'"):
+    with pytest.raises(InputError, match=r"RunSettings\.cooperate: no station 'RSU2'; did you mean 'RSU'"):
         play(cooperate=("RSU2",))
-    with pytest.raises(InputError, match="--channel: no channel profile 'latency'"):
+    with pytest.raises(InputError, match=r"RunSettings\.channel: no channel profile 'latency'"):
         play(channel="latency")
 
 

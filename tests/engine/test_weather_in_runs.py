@@ -78,7 +78,7 @@ def test_unknown_preset_is_reported_with_other_diagnostics_before_run(tmp_path: 
     wrong = tmp_path / "mine.yaml"
     wrong.write_text("name: mine\nfog: 40\n")
     scenario = load_scenario(resolve_scenario("coop/scenario_1"))
-    with pytest.raises(InputError, match=r"--weather: no weather preset 'hail'"):
+    with pytest.raises(InputError, match=r"RunSettings.weather: no weather preset 'hail'"):
         Simulation(scenario, settings=RunSettings(weather="hail"))
     with pytest.raises(InputError, match=r"mine\.yaml:2: unknown setting 'fog'"):
         Simulation(scenario, settings=RunSettings(weather=wrong))

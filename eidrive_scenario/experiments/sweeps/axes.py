@@ -222,7 +222,7 @@ def _profile_of(point: Point, profile: Mapping[str, Any] | None, changes: Mappin
         profile = None if selected is None else selected.model_dump(mode="json", exclude_unset=True)
     if profile is None:
         message = f"{CHANNEL}.{next(iter(changes))}: the runs have no channel"
-        raise SettingError(Diagnostic(message, "select a profile by --channel"))
+        raise SettingError(Diagnostic(message, "select a profile by RunSettings.channel"))
     return profile
 
 

@@ -327,7 +327,7 @@ def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunS
     if RUN in names:
         hint = f"give {PARAMETER}{RUN} for a parameter of this name; all runs of a distribution are executed"
         raise SettingError(Diagnostic(f"--vary: {RUN!r} is the number of a run of a distribution", hint))
-    given = dict.fromkeys(settings.parameters, "--param")
+    given = dict.fromkeys(settings.parameters, "RunSettings.parameters")
     given |= {name.removeprefix(PARAMETER): "--vary" for name in names if not is_setting(name)}
     for name, element in load_distribution(scenario).varied.names.items() if is_distribution else ():
         if name in given:

@@ -40,6 +40,7 @@ from eidrive_scenario.experiments.sweeps.store import (
 from eidrive_scenario.extensions.library import name_of
 from eidrive_scenario.openscenario import ConcreteRun
 from eidrive_scenario.perception.learned import image_memory
+from eidrive_scenario.run_options import with_option_names
 from eidrive_scenario.simulation.result import typed
 
 _is_worker = False
@@ -71,6 +72,8 @@ class KeptFiles:
 def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = None) -> StoredRun:
     """Run a job and return its row; errors are rows, too, also interruptions that an extension raises in a worker.
 
+    Messages name the options of the command line, as in `result.json`.
+
     wall_limit  limit of the wall time of loading and run [s]
     files       files that are kept; None for none
     """
@@ -97,7 +100,7 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
             status=PASSED if result.passed else NOT_JUDGED if unjudged else FAILED,
             point=dict(job.point),
             result={**result.to_dict(), **folder},
-            error=result.warnings[0] if unjudged else "",
+            error=with_option_names(result.warnings[0]) if unjudged else "",
             command=result.command,
             wall_s=round(time.perf_counter() - start, 4),
             settings=result.settings.canonical,
@@ -131,7 +134,7 @@ def without_result(job: SweepJob, status: str, message: str, wall_s: float) -> S
         status=status,
         point=dict(job.point),
         result={f"parameter.{name}": typed(text) for name, text in varied.items()},
-        error=message,
+        error=with_option_names(message),
         command=command_of_source(source, job.seed, job.settings) if is_known else "",
         wall_s=round(wall_s, 4),
     )

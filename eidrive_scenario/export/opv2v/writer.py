@@ -97,7 +97,7 @@ class Opv2vWriter:
         scenario = simulation.scenario
         names = list(self._stack.settings)
         if not names:
-            hint = "give entities a driving stack by --drive NAME"
+            hint = "give entities a driving stack by RunSettings.drive NAME"
             raise SettingError(Diagnostic("the scenario has no station", hint, str(scenario.path or "")))
         self._assign_ids(scenario, names)
 

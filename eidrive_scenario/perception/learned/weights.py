@@ -47,7 +47,8 @@ def torchscript_is_allowed(option: bool) -> bool:
 def refused_torchscript(path: Path) -> SettingError:
     """Return the error for TorchScript weights without permission."""
     message = f"weights {quoted(str(path))} are TorchScript, which can execute any code with your rights"
-    hint = f"export the model to ONNX; or, if you trust it, run with --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
+    permission = f"RunSettings.allow_torchscript or {ALLOW_TORCHSCRIPT}=1"
+    hint = f"export the model to ONNX; or, if you trust it, run with {permission}"
     return SettingError(Diagnostic(message, hint))
 
 

@@ -114,7 +114,7 @@ class ScenarioPicture:
         sectors = dict(_sectors(simulation, view))
         drivers = [name for name in simulation.stack.possible_drivers if name in sectors]
         if station is not None and station not in sectors:
-            raise SettingError(Diagnostic(f"--station: no station {station!r}", suggestion(station, sectors)))
+            raise SettingError(Diagnostic(f"no station {station!r}", suggestion(station, sectors)))
         chosen = station or next(iter([*drivers, *sectors]), "")
         settings = simulation.stack.settings.values()
         areas = [np.array(area) for agent in settings for area in agent.planner_settings.areas]

@@ -84,7 +84,7 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Map
     names = {controller.name for _, controller in assigned}
     ours = {controller.name for _, controller in assigned if is_agent_controller(controller)}
     unmatched = sorted(name for name in assignments if name not in names)
-    hint = "add the property module=eidrive, or assign a controller model (--controller NAME=MODEL)"
+    hint = "add the property module=eidrive, or assign a controller model (RunSettings.controllers NAME=MODEL)"
     if unmatched:
         hint += f"; no controller is named {' or '.join(map(repr, unmatched))}"
     unassigned = [
@@ -98,7 +98,7 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Map
     ]
     diagnostics = [
         Diagnostic(
-            f"--controller: controller {name!r} belongs to a station",
+            f"RunSettings.controllers: controller {name!r} belongs to a station",
             "got a controller with module=eidrive; expected a controller of another tool",
         )
         for name in assignments
@@ -106,6 +106,6 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Map
     ]
     if not unassigned:
         assignable = names - ours
-        message = "--controller: no controller is named {!r}"
+        message = "RunSettings.controllers: no controller is named {!r}"
         diagnostics += [Diagnostic(message.format(name), suggestion(name, assignable)) for name in unmatched]
     return [*diagnostics, *unassigned]

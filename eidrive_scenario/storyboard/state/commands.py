@@ -92,7 +92,8 @@ def user_value_warnings(
         if name not in given:
             where = f"{element.source}:{element.line}"
             effect = f"UserDefinedValueCondition {name!r} is never fulfilled: no value is set"
-            yield f"{where}: {effect}; use --user-value {name}=VALUE or set_user_value"
+            yield f"{where}: {effect}; use RunSettings.user_values {name}=VALUE or set_user_value"
     for name in settings:
         if name not in requested:
-            yield f"--user-value {name}: no UserDefinedValueCondition reads the value; {suggestion(name, requested)}"
+            message = f"RunSettings.user_values {name}: no UserDefinedValueCondition reads the value"
+            yield f"{message}; {suggestion(name, requested)}"

@@ -10,7 +10,15 @@ import pytest
 from command_fixtures import Eidrive
 from lxml import html
 
-from eidrive_scenario.api.run import NOT_JUDGED, PASSED, RunSettings, judge_recording, run_and_save, run_file
+from eidrive_scenario.api.run import (
+    NOT_JUDGED,
+    PASSED,
+    RunSettings,
+    judge_recording,
+    read_results,
+    run_and_save,
+    run_file,
+)
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.statistics.sequential import success_rate
 from eidrive_scenario.experiments.success_rate import decide_rate
@@ -38,8 +46,8 @@ def test_result_is_not_passed_and_has_a_warning(bare: Path) -> None:
     assert result.end_reason == "stop trigger"
     (warning,) = result.warnings
     assert warning.startswith(WORDS)
-    assert "--criterion" in warning
-    assert "--no-criteria" in warning
+    assert "RunSettings.criteria" in warning
+    assert "RunSettings.no_criteria" in warning
     assert "not judged (stop trigger at 3.00 s, 1 warning)" in str(result)
     assert "not judged</b>" in result._repr_html_()
     row = result.to_dict()
@@ -136,6 +144,7 @@ def test_sweep_has_no_verdict(eidrive: Eidrive, bare: Path, tmp_path: Path) -> N
     assert done.exit_code == 4
     assert "2 not judged" in done.stdout
     assert f"2 not judged: {WORDS}" in done.stderr
+    assert all("by --criterion '{collision" in error for error in read_results(store)["error"])
     (line, _) = eidrive("results", store, "--json").stdout.splitlines()
     assert json.loads(line)["runs"] == {"not judged": 1}
     assert f"not judged: eidrive run {bare}" in eidrive("results", store, "--failures").stdout

@@ -60,7 +60,7 @@ def test_selection_without_stations_is_an_error(tmp_path: Path, senders: str, me
     with pytest.raises(InputError, match=message):
         simulate(listening_to(tmp_path, senders, MASTS, TRUCKS, RING), "ideal", time_limit=0.1)
     if senders == "trucks":
-        with pytest.raises(InputError, match="--cooperate: selection without stations 'trucks'; give one"):
+        with pytest.raises(InputError, match=r"RunSettings\.cooperate: selection without stations 'trucks'; give one"):
             simulate(listening_to(tmp_path, "none", TRUCKS), "ideal", time_limit=0.1, cooperate=("trucks",))
 
 

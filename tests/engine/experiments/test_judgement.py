@@ -210,7 +210,7 @@ def test_unknown_criterion_of_the_run_is_reported_with_its_command(tmp_path: Pat
     for frame in read_recording(result.recording).frames():
         recorder.observe(msgspec.structs.replace(frame, commands=(ExecutedCommand(CRITERION, "keep_gap: {}", 0.0),)))
     recorder.close()
-    hint = f"judge it with the extensions of {command}, or with other criteria (--criterion)"
+    hint = f"judge it with the extensions of {command}, or with other criteria (RunSettings.criteria)"
     with pytest.raises(SettingError) as caught:
         judge_recording(tmp_path / "r.mcap")
     assert str(caught.value) == f"{tmp_path / 'r.mcap'}: unknown criterion 'keep_gap'; {hint}"

@@ -324,7 +324,7 @@ def test_second_roadside_unit_gets_an_id_of_vehicles_with_warning(tmp_path: Path
 
 
 def test_export_without_station_or_with_other_time_steps_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match=r"no station; give entities a driving stack by --drive"):
+    with pytest.raises(SettingError, match=r"no station; give entities a driving stack by RunSettings.drive"):
         export(tmp_path / "none", NO_STATION, 0.1)
     with pytest.raises(SettingError, match="time step does not divide"):
         export(tmp_path / "step", "coop/scenario_1", 0.1, dt=0.03)

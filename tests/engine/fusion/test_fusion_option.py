@@ -53,13 +53,13 @@ def test_unknown_methods_and_detectors_of_options_are_reported_together() -> Non
     with pytest.raises(InputError) as caught:
         Simulation(SCENARIO, settings=RunSettings(fusion="averag", detector="orcale"))
     assert [str(diagnostic) for diagnostic in caught.value.diagnostics] == [
-        "--detector: unknown detector 'orcale'; did you mean 'oracle'?",
-        "--fusion: unknown fusion method 'averag'; did you mean 'average'?",
+        "RunSettings.detector: unknown detector 'orcale'; did you mean 'oracle'?",
+        "RunSettings.fusion: unknown fusion method 'averag'; did you mean 'average'?",
     ]
 
 
 def test_unsuitable_method_of_option_names_option() -> None:
-    with pytest.raises(InputError, match=r"^--fusion: fusion method 'early' shares points"):
+    with pytest.raises(InputError, match=r"^RunSettings.fusion: fusion method 'early' shares points"):
         Simulation(SCENARIO, settings=RunSettings(fusion="early"))
 
 

@@ -139,7 +139,7 @@ def test_missing_sensor_of_detector_is_error_with_line_of_sensors(write: Write) 
 
 def test_unknown_detector_option_is_error_with_suggestion(write: Write) -> None:
     (diagnostic,) = diagnostics_of(write(), detector="ldiar")
-    assert diagnostic.startswith("--detector: ")
+    assert diagnostic.startswith("RunSettings.detector: ")
     assert "did you mean 'lidar'?" in diagnostic
 
 

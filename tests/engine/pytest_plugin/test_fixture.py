@@ -176,3 +176,34 @@ def test_both(run_scenario):
     result = run(project, text)
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines(["*several markers scenario*"])
+
+
+def test_message_names_option_ini_option_or_keyword_of_the_setting(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\neidrive_planner = route\n")
+    text = """
+@pytest.mark.scenario("drives/first", drive="Egon")
+def test_marker(run_scenario):
+    run_scenario()
+@pytest.mark.scenario("drives/first", channel="idael")
+def test_channel_of_marker(run_scenario):
+    run_scenario()
+def test_ini(run_scenario):
+    run_scenario("drives/first.xosc", drive={"Ego": "{planner: none}"})
+def test_keyword(run_scenario):
+    run_scenario("coop/scenario_1", weather="sunni", channel="latency")
+def test_warning(run_scenario):
+    channel = "{delay: {kind: constant, seconds: 0.01}}"
+    warnings = run_scenario("coop/scenario_1", channel=channel, time_limit=0.1).warnings
+    assert any(text.startswith("channel: most") and "(RunSettings.dt)" in text for text in warnings), warnings
+"""
+    result = run(project, text)
+    result.assert_outcomes(failed=4, passed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "drive: the scenario has no entity 'Egon'*",
+            "channel: no channel profile 'idael'*",
+            "ini option eidrive_planner: planner 'route' has no effect*give a vehicle a stack by drive",
+            "channel: no channel profile 'latency'*",
+            "weather: no weather preset 'sunni'*",
+        ]
+    )

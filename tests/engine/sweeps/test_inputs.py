@@ -101,7 +101,7 @@ def test_axes_of_a_distribution_that_it_varies_itself_raise(
 
 
 def test_parameter_of_all_runs_that_the_distribution_varies_raises(distribution: Path) -> None:
-    with pytest.raises(SettingError, match="--param: the distribution varies parameter 'Speed'"):
+    with pytest.raises(SettingError, match=r"RunSettings\.parameters: the distribution varies parameter 'Speed'"):
         plan_of(distribution, [{}], RunSettings(parameters={"Speed": "8"}), is_distribution=True)
 
 
