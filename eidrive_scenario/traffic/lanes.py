@@ -29,7 +29,7 @@ class TrafficLanes:
     beside_left, beside_right  neighbor of the same direction with any marking
     following                  successors with the same kind of users, in the order of the map
     onward, backward           first successor and first predecessor, -1 if there is none
-    ends_at                    progress at which a lane ends while an adjacent lane continues, else inf
+    ends_at                    progress at which a lane ends or merges while an adjacent lane continues, else inf
     """
 
     def __init__(self, roads: RoadNetwork) -> None:
@@ -110,12 +110,17 @@ class TrafficLanes:
         return rule not in ("increase", "none"), rule not in ("decrease", "none")
 
     def _find_ends(self) -> None:
-        """Store the ends of lanes without a successor beside continuing lanes. Cars leave them before they are too
-        narrow.
+        """Store the ends of lanes beside continuing lanes: lanes without a successor, and lanes that narrow to merge
+        into the successor of a wider one. Cars leave them before they are too narrow.
         """
-        for lane in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction & (self.onward < 0)):
+        width = self.width(np.arange(len(self.keys)), self.length)
+        for lane in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction):
+            way = self.onward[lane]
             beside = [int(other) for other in (self.beside_left[lane], self.beside_right[lane]) if other >= 0]
-            if any(self.onward[other] >= 0 for other in beside):
+            if any(
+                (way < 0 <= self.onward[other]) or (0 <= way == self.onward[other] and width[lane] < width[other])
+                for other in beside
+            ):
                 progress = np.linspace(0.0, self.length[lane], max(math.ceil(self.length[lane] / SAMPLE), 1) + 1)
                 narrow = np.flatnonzero(self.width(np.full(len(progress), lane), progress) < NARROWEST)
                 first = narrow[narrow > 0]

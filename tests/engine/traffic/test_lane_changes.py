@@ -190,11 +190,11 @@ def test_dense_traffic_changes_lanes_without_contact() -> None:
     assert sum(len(found) > 2 for found in lanes.values()) > 10
 
 
-def ending_lane() -> RoadNetwork:
+def ending_lane(link: str) -> RoadNetwork:
     """Return two lanes, of which the right one tapers off from s = 250 to 300 m, and a following road."""
 
     taper = (
-        '<lane id="-2" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+        f'<lane id="-2" type="driving"><link>{link}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
         '<width sOffset="250" a="3.5" b="-0.07" c="0" d="0"/></lane>'
     )
     both = section_xml(right=lane_xml(-1, link=lane_links_xml(after=-1)) + taper)
@@ -208,9 +208,10 @@ def ending_lane() -> RoadNetwork:
 
 
 @pytest.mark.exhaustive
-def test_cars_leave_ending_lane() -> None:
+@pytest.mark.parametrize("link", ["", lane_links_xml(after=-1)])
+def test_cars_leave_lane_that_ends_or_merges(link: str) -> None:
     """The lane is narrower than 2.2 m from s = 250 + 1.3/0.07 = 268.6 m on; the next sample is at 270 m."""
-    roads = ending_lane()
+    roads = ending_lane(link)
     fleet = Fleet(roads)
     assert fleet.lanes.ends_at[np.isfinite(fleet.lanes.ends_at)] == pytest.approx([270.0])
     for k in range(6):
