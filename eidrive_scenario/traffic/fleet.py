@@ -31,7 +31,7 @@ class Plans:
         self._seed = seed
 
     def extend(self, cars: Cars, index: int) -> None:
-        """Extend the plan of a car. Lanes of a junction that it holds already are granted."""
+        """Extend the plan of a car. Further lanes of a passage that it holds already are granted."""
         lengths, name = self._lanes.lengths, cars.specs[index].name
         plan = [lane for lane in cars.plan[index].tolist() if lane >= 0]
         ahead = sum(lengths[lane] for lane in plan[1:])
@@ -45,7 +45,9 @@ class Plans:
                 pick = int(generator(self._seed, "traffic", name, turn).integers(len(choices)))
                 cars.turns[index] += 1
             cars.plan[index, len(plan)] = choices[pick]
-            cars.granted[index, len(plan)] = self._crossings.holds(name, choices[pick])
+            # On a closed path the next passage of a lane that it holds now has to be granted again.
+            passing = cars.granted[index, len(plan) - 1]
+            cars.granted[index, len(plan)] = passing and self._crossings.holds(name, choices[pick])
             plan.append(choices[pick])
             ahead += lengths[choices[pick]]
 

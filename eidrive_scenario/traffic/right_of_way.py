@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, number_in_groups
+from eidrive_scenario.base.arrays import Array, Bools, number_in_groups
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import SignalPlace
@@ -217,7 +217,7 @@ class RightOfWay:
         the junction loses its passage.
         """
         self._follow(cars, lights, begins)
-        distance = self._distances(cars, begins)
+        distance, first = self._distances(cars, begins), np.argmax(self._barred(cars), axis=1)
         v = cars.speed
         close = distance <= v * v / (2.0 * cars.drivers.deceleration) + cars.front + 4.0 * STOP_LINE + v
         gap = leaders.gap + cars.front
@@ -236,7 +236,7 @@ class RightOfWay:
             if all(self._crossings.free(lane, name, moving | kept_free) for lane in passage):
                 for lane in passage:
                     self._crossings.take(lane, name)
-                cars.granted[index] |= np.isin(cars.plan[index], passage)
+                cars.granted[index, first[index] : first[index] + len(passage)] = True
                 cars.asked[index] = np.nan
             elif time - since > PATIENCE:
                 kept_free.update(passage)
@@ -254,10 +254,14 @@ class RightOfWay:
 
     def _distances(self, cars: Cars, begins: Array) -> Array:
         """Return the distances (N,) to the first junction lane that a car may not enter yet [m], else inf."""
+        distance = np.where(self._barred(cars), begins, np.inf).min(axis=1)
+        return np.where(distance > LOOK_AHEAD, np.inf, distance)
+
+    def _barred(self, cars: Cars) -> Bools:
+        """Return which planned lanes (N, D) are in junctions that cars may not enter yet."""
         barred = (cars.plan >= 0) & self._lanes.in_junction[cars.plan] & ~cars.granted & ~cars.walks[:, None]
         barred[:, 0] = False
-        distance = np.where(barred, begins, np.inf).min(axis=1)
-        return np.where(distance > LOOK_AHEAD, np.inf, distance)
+        return np.asarray(barred)
 
     def _passage(self, cars: Cars, index: int) -> list[int]:
         """Return the lanes of the next junction that a car may not enter yet, up to its last connecting road."""

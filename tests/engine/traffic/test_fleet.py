@@ -5,7 +5,16 @@ import math
 import numpy as np
 import pytest
 from fleet_scene import LENGTH, WIDTH, car, view_of
-from opendrive_xml import lane_links_xml, lane_xml, ring_xml, section_xml
+from opendrive_xml import (
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    ring_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
@@ -176,6 +185,37 @@ def test_cars_wait_for_foreign_car_in_crossing(library_roads: RoadNetwork) -> No
         placements = fleet.step(view_of({"ego": ego}), DT)
         boxes = view_of({"ego": ego} | placements).boxes
         assert len(boxes) == 1 or not overlap(boxes[0], boxes[1])
+
+
+def test_car_on_a_circle_waits_before_its_second_passage() -> None:
+    """The circle of 107 m is within sight as a whole. Its lower half and a street across it are one junction, in which
+    the car starts. A foreign car drives on the street until 40 s, 33 m beyond the circle.
+    """
+    lane = section_xml(right=lane_xml(-1, 4, link=lane_links_xml(-1, -1)))
+    halves = [
+        road_xml(
+            name,
+            length=math.pi * 15.0,
+            x=x,
+            hdg=hdg,
+            curvature=1.0 / 15.0,
+            link=predecessor_xml(other) + successor_xml(other),
+            lanes=lane,
+            junction=junction,
+        )
+        for name, other, x, hdg, junction in (("a", "b", 15.0, math.pi / 2, "-1"), ("b", "a", -15.0, -math.pi / 2, "9"))
+    ]
+    street = road_xml("c", length=60.0, x=2.0, y=-5.0, hdg=-math.pi / 2, lanes=lane, junction="9")
+    fleet = Fleet(RoadNetwork.parse(map_xml(*halves, street)))
+    fleet.add(car("car"), fleet.lanes.roads.location("b", -1, 5.0), speed=5.0)
+    foreign = {"foreign": Placement(0.0, -50.0, yaw=-math.pi / 2, speed=1.0)}
+    below = []
+    for tick in range(1200):
+        (place,) = fleet.step(view_of(foreign if tick < 800 else {}), DT).values()
+        below.append(place.y < 0.0)
+    left = below.index(False)
+    assert not any(below[left:800])
+    assert any(below[800:])
 
 
 def test_branches_depend_on_the_seed(library_roads: RoadNetwork) -> None:
