@@ -12,6 +12,8 @@ from eidrive_scenario.world.actor import ActorSpec
 
 PLANNED = 12
 """Maximum number of planned lanes beyond the current one."""
+VAN_FRONT = 4.7
+"""Distance of the front of a van from its rear axle, which follows the lane [m]. Longer vehicles swing out farther."""
 
 
 def _floats() -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.car_following import Drivers, IntelligentDriver
 from eidrive_scenario.roads.routing.route import smoothstep
-from eidrive_scenario.traffic.cars import PLANNED, Cars
+from eidrive_scenario.traffic.cars import PLANNED, VAN_FRONT, Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, Occupants, find_followers, find_leaders
 
@@ -63,7 +63,12 @@ def incentive(changer: LaneChanger, prospect: Prospect, to_slow_side: Bools | bo
 DURATION = 4.0
 """Duration of a lane change at constant speed [s]. Toledo and Zohar, TRR 1999 (2007) 71, found a mean of 4.6 s."""
 SHORTEST = 12.0
-"""Minimum length of a lane change [m]."""
+"""Minimum length of a lane change of a vehicle up to a van [m]."""
+STRETCH = 4.4
+"""Minimum length of a lane change of a longer vehicle per distance from its rear axle to its front.
+
+With it the front corner of a bus of 2.55 m stays in a new lane of 3.5 m.
+"""
 SLOWEST = 2.0
 """Minimum speed for a lane change, unless the lane ends [m/s]."""
 LAST_CHANCE = 50.0
@@ -94,7 +99,7 @@ class LaneChanges:
         """
         lanes, lane = self._lanes, cars.lane[indices]
         ends_in = lanes.ends_at[lane] - cars.progress[indices]
-        room = self.length(cars.speed[indices])
+        room = self.length(cars.speed[indices], cars.front[indices])
         able = (np.abs(cars.offset[indices]) < SETTLED) & ~cars.walks[indices]
         able &= ~lanes.in_junction[lane] & ~cars.granted[indices].any(axis=1)
         able &= to_junction[indices] > room + cars.front[indices]
@@ -157,9 +162,9 @@ class LaneChanges:
         return np.where(number >= 0, Drivers(table).response(v, wish, behind, v - leader), 0.0)
 
     @staticmethod
-    def length(speed: Array) -> Array:
-        """Return the length of a lane change at speeds (N,) [m]."""
-        return np.maximum(speed * DURATION, SHORTEST)
+    def length(speed: Array, front: Array) -> Array:
+        """Return the length of a lane change at speeds (N,) [m/s] with distances (N,) to the front bumper [m]."""
+        return np.maximum(speed * DURATION, np.where(front > VAN_FRONT, STRETCH * front, SHORTEST))
 
     def begin(self, cars: Cars, index: int, target: int) -> None:
         """Start the change of a car. It belongs to the new lane from now on, still beside its center."""
@@ -168,7 +173,7 @@ class LaneChanges:
         cars.offset[index] -= apart
         cars.shift[index] = cars.offset[index]
         cars.shift_done[index] = 0.0
-        cars.shift_length[index] = float(self.length(cars.speed[[index]])[0])
+        cars.shift_length[index] = float(self.length(cars.speed[[index]], cars.front[[index]])[0])
 
     def advance(self, cars: Cars, covered: Array) -> None:
         """Move changing cars laterally on a quintic path of minimum jerk while they cover distances (N,) [m]."""

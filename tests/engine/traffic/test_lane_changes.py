@@ -13,6 +13,7 @@ from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, LaneChanger
 from eidrive_scenario.traffic.lane_changes import Prospect, incentive, safe
+from eidrive_scenario.traffic.spawning.bodies import library_bodies
 
 BUMPERS = 4.6
 """Distance between the reference points of two cars in contact [m]."""
@@ -155,6 +156,21 @@ def test_lateral_path_is_a_quintic_of_stated_duration() -> None:
     assert np.all(np.diff(y) > -1e-9)
     assert np.max(np.abs(yaw)) == pytest.approx(math.atan(1.875 * 3.5 / 80.0), rel=0.02)
     assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
+
+
+def test_bus_changes_lanes_without_its_front_in_the_oncoming_lane() -> None:
+    """The oncoming lane is at y > 0. The bus changes at 3 m/s from behind a car of 1 m/s."""
+    (bus,) = (spec for spec, _ in library_bodies("bus"))
+    roads = street(1, 2)
+    fleet = Fleet(roads)
+    fleet.add(bus, roads.location("1", -2, 400.0), speed=3.0, desired_speed=3.0)
+    fleet.add(car("leader"), roads.location("1", -2, 440.0), speed=1.0, desired_speed=1.0)
+    for _ in range(600):
+        place = fleet.step(None, 0.05)[bus.name]
+        length, width, _ = bus.size
+        front = bus.offset[0] + 0.5 * length
+        assert place.y + math.sin(place.yaw) * front + 0.5 * math.cos(place.yaw) * width < 0.0
+    assert place.y == pytest.approx(-1.75)
 
 
 def test_changing_car_brakes_for_standing_car_beyond_a_nearer_faster_one() -> None:
