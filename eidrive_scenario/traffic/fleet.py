@@ -317,7 +317,7 @@ class Fleet:
         leaders = self._occupancy.leaders(cars, occupants)
         lights = Leaders.none(len(cars)) if self._lines is None else self._lines.ahead(cars)
         self._right_of_way.grant_right_of_way(
-            cars, leaders.or_nearer(lights), lights, begins, self._occupancy.moving, self._ticks * dt
+            cars, leaders.or_nearer(lights), lights, begins, occupants, self._occupancy.moving, self._ticks * dt
         )
         desired = self._plans.desired_speeds(cars, begins)
         halted = leaders.or_nearer(lights).or_nearer(self._right_of_way.waits(cars, begins))

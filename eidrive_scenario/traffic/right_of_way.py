@@ -3,7 +3,8 @@
 In junctions: first come, first served, one car at a time on conflicting lanes. The first car of a queue requests all
 lanes of its passage through the junction within its braking distance, if there is space behind the junction. They are
 granted when no car holds a lane that crosses, merges or diverges. A car holds a lane until it has left it, and against
-diverging lanes until it has cleared the fork.
+diverging lanes until it has cleared the fork. Long vehicles hold the lanes that they sweep over as well, and need them
+without other vehicles, also outside the junction.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from eidrive_scenario.base.arrays import Array, Bools, number_in_groups
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import SignalPlace
-from eidrive_scenario.traffic.cars import Cars
+from eidrive_scenario.traffic.cars import VAN_FRONT, Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FIXED, LOOK_AHEAD, Leaders, Occupants, find_leaders, no_occupants
+from eidrive_scenario.traffic.sweeps import Sweep, Sweeps
 
 STOP_LINE = 1.0
 """Distance of waiting cars from the stop line [m]."""
@@ -90,8 +92,8 @@ It is less than that of adjacent lanes, and more than two cars need whose ends s
 """
 TIGHT = 6.0
 """Radius of bends below which long ends need more than `CLEARANCE` [m]."""
-FRONT, HALF_WIDTH = 4.7, 1.0
-"""Distance of the front of a van from its rear axle, which follows the lane, and half its width [m]."""
+HALF_WIDTH = 1.0
+"""Half the width of a van [m]."""
 FORK = 9.0
 """Distance from the start at which diverging lanes are separate [m]."""
 SAMPLE = 0.75
@@ -110,6 +112,8 @@ class Crossings:
                 self._by_junction.setdefault(junction, []).append(lane)
         self.holders: dict[int, dict[str, float]] = {}
         """Cars that hold each lane of a junction, with the progress of their rear on it [m]."""
+        self.sweeps: dict[str, Sweep] = {}
+        """Sweeps of the long vehicles that hold lanes."""
 
     def meeting(self, lane: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
@@ -167,6 +171,24 @@ class Crossings:
                     return False
         return True
 
+    def is_swept(self, name: str, passage: list[int], sweep: Sweep) -> bool:
+        """Return whether a long vehicle that holds lanes and `name` would sweep over a lane or each other's way."""
+        ways = {int(self._lanes.backward[passage[0]]), *passage, *self._lanes.following[passage[-1]]}
+        for holder, other in self.sweeps.items():
+            meets = any(
+                other[lane][0] <= sweep[lane][1] and sweep[lane][0] <= other[lane][1] for lane in other.keys() & sweep
+            )
+            if holder != name and (meets or not ways.isdisjoint(other)):
+                return True
+        for lane, held in self.holders.items() if sweep else ():
+            leaves = not sweep.keys().isdisjoint(self._lanes.following[lane])
+            enters = int(self._lanes.backward[lane]) in sweep
+            end = sweep[lane][1] if lane in sweep else -np.inf
+            for holder, rear in held.items():
+                if holder != name and (leaves or (enters and rear == -np.inf) or (lane in sweep and rear <= end)):
+                    return True
+        return False
+
     def take(self, lane: int, name: str) -> None:
         """Let `name` hold a lane."""
         self.holders.setdefault(lane, {})[name] = -np.inf
@@ -178,9 +200,12 @@ class Crossings:
     def release(self, name: str, lane: int) -> None:
         """Release a lane that `name` has left."""
         self.holders.get(lane, {}).pop(name, None)
+        if name in self.sweeps and not any(name in held for held in self.holders.values()):
+            del self.sweeps[name]
 
     def forget(self, name: str) -> None:
         """Release all lanes that `name` holds."""
+        self.sweeps.pop(name, None)
         for held in self.holders.values():
             held.pop(name, None)
 
@@ -188,7 +213,7 @@ class Crossings:
 def _swing(radius: Array) -> Array:
     """Return the width by which the outer front corner of a van is outside of the path of its rear end [m]."""
     outer = radius + HALF_WIDTH
-    return np.asarray(np.hypot(outer, FRONT) - outer)
+    return np.asarray(np.hypot(outer, VAN_FRONT) - outer)
 
 
 PATIENCE = 20.0
@@ -201,14 +226,37 @@ class RightOfWay:
     def __init__(self, lanes: TrafficLanes, crossings: Crossings) -> None:
         self._lanes = lanes
         self._crossings = crossings
+        self._sweeps = Sweeps(lanes)
+        self._requested: list[Sweep] = []
+        """Sweeps of the long vehicles that request a passage. Other vehicles do not stop in their ranges."""
 
     def waits(self, cars: Cars, begins: Array) -> Leaders:
-        """Return the stop lines of junctions that cars may not enter yet."""
+        """Return the stop lines of junctions that cars may not enter yet, and the starts of ranges that are swept."""
         wait = self._distances(cars, begins) - cars.front - STOP_LINE
-        return Leaders(np.maximum(wait, 1e-3), np.zeros(len(cars)))
+        lines = Leaders(np.maximum(wait, 1e-3), np.zeros(len(cars)))
+        swept = [
+            (lane, low - STOP_LINE)
+            for sweep in (*self._crossings.sweeps.values(), *self._requested)
+            for lane, (low, _) in sweep.items()
+            if not self._lanes.in_junction[lane]
+        ]
+        if not swept:
+            return lines
+        lane, low = np.array([lane for lane, _ in swept]), np.array([low for _, low in swept])
+        ranges = Occupants(lane, low, low, low, np.zeros(len(lane)), np.full(len(lane), FIXED))
+        starts = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, np.zeros(len(cars)), ranges)
+        passes = cars.granted.any(axis=1) | (cars.speed**2 > 2.0 * TOO_LATE * np.maximum(starts.gap, 0.0))
+        return lines.or_nearer(Leaders(np.where(passes, np.inf, starts.gap), starts.speed))
 
     def grant_right_of_way(
-        self, cars: Cars, leaders: Leaders, lights: Leaders, begins: Array, moving: set[int], time: float
+        self,
+        cars: Cars,
+        leaders: Leaders,
+        lights: Leaders,
+        begins: Array,
+        occupants: Occupants,
+        moving: set[int],
+        time: float,
     ) -> None:
         """Grant passages through junctions to approaching cars.
 
@@ -232,14 +280,38 @@ class RightOfWay:
                     (float(cars.asked[index]), float(distance[index]), cars.specs[index].name, index, passage)
                 )
         kept_free: set[int] = set()
+        self._requested = []
         for since, _, name, index, passage in sorted(asking):
-            if all(self._crossings.free(lane, name, moving | kept_free) for lane in passage):
+            sweep = self._sweeps.of(cars.specs[index], passage)
+            self._requested.append(sweep)
+            if self._is_occupied(sweep, occupants, index):
+                continue
+            blocked = moving | kept_free
+            if (
+                all(self._crossings.free(lane, name, blocked) for lane in passage)
+                and blocked.isdisjoint(sweep)
+                and not self._crossings.is_swept(name, passage, sweep)
+            ):
                 for lane in passage:
                     self._crossings.take(lane, name)
+                if sweep:
+                    self._crossings.sweeps[name] = sweep
                 cars.granted[index, first[index] : first[index] + len(passage)] = True
                 cars.asked[index] = np.nan
             elif time - since > PATIENCE:
                 kept_free.update(passage)
+
+    def _is_occupied(self, sweep: Sweep, occupants: Occupants, index: int) -> bool:
+        """Return whether another vehicle is in a swept range outside the junction, or cannot stop before it."""
+        stopping = occupants.front + occupants.speed**2 / (2.0 * TOO_LATE)
+        others = (occupants.owner != FIXED) & (occupants.owner != index)
+        return any(
+            np.any(
+                others & (occupants.lane == lane) & (stopping > low - STOP_LINE) & (occupants.rear < high + STOP_LINE)
+            )
+            for lane, (low, high) in sweep.items()
+            if not self._lanes.in_junction[lane]
+        )
 
     def _follow(self, cars: Cars, lights: Leaders, begins: Array) -> None:
         """Update the progress of cars in junctions, and revoke passages that a traffic light blocks."""

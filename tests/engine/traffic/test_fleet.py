@@ -1,10 +1,11 @@
 """Tests of cars that follow lanes and leaders."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from fleet_scene import LENGTH, WIDTH, car, view_of
+from fleet_scene import LENGTH, car, view_of
 from opendrive_xml import (
     lane_links_xml,
     lane_xml,
@@ -19,6 +20,7 @@ from opendrive_xml import (
 from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, IntelligentDriver
+from eidrive_scenario.traffic.spawning.bodies import library_bodies
 from eidrive_scenario.world.actor import Placement
 
 DT = 0.05
@@ -144,7 +146,7 @@ def test_cars_slow_down_ahead_of_a_bend(library_roads: RoadNetwork) -> None:
     assert turned
 
 
-def crossing_fleet(library_roads: RoadNetwork, seed: int) -> Fleet:
+def crossing_fleet(library_roads: RoadNetwork, seed: int, *, bus: bool = False) -> Fleet:
     fleet = Fleet(library_roads, seed=seed)
     lanes = [(road, n) for road, lanes in {"1": (-1, -2), "2": (2, 3), "3": (1,), "4": (-1,)}.items() for n in lanes]
     for road, n in lanes:
@@ -153,21 +155,27 @@ def crossing_fleet(library_roads: RoadNetwork, seed: int) -> Fleet:
             s = length - 12.0 - 16.0 * k if n < 0 else 12.0 + 16.0 * k
             if road in ("1", "4"):
                 s = length - 12.0 - 16.0 * k
-            fleet.add(car(f"{road}/{n}/{k}"), library_roads.location(road, n, s), speed=5.0)
+            spec = (
+                replace(library_bodies("bus")[0][0], name=f"{road}/{n}/{k}")
+                if bus and k % 2
+                else car(f"{road}/{n}/{k}")
+            )
+            fleet.add(spec, library_roads.location(road, n, s), speed=5.0)
     return fleet
 
 
 @pytest.mark.exhaustive
+@pytest.mark.parametrize("bus", [False, True])
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_cars_pass_a_crossing_without_contact(library_roads: RoadNetwork, seed: int) -> None:
-    fleet = crossing_fleet(library_roads, seed)
+def test_vehicles_pass_a_crossing_without_contact(library_roads: RoadNetwork, seed: int, bus: bool) -> None:
+    fleet = crossing_fleet(library_roads, seed, bus=bus)
     gone: set[str] = set()
     for tick in range(4000):
         placements = fleet.step(None, DT)
         gone |= fleet.departed
         if tick % 5 == 0 and len(placements) > 1:
-            boxes = view_of(placements).boxes
-            near = np.hypot(*(boxes[:, None, :2] - boxes[None, :, :2]).transpose(2, 0, 1)) < LENGTH + WIDTH
+            boxes = fleet.boxes
+            near = np.hypot(*(boxes[:, None, :2] - boxes[None, :, :2]).transpose(2, 0, 1)) < 13.0
             for i, j in zip(*np.nonzero(np.triu(near, 1)), strict=True):
                 assert not overlap(boxes[i], boxes[j]), (list(placements)[i], list(placements)[j])
         if not placements:
