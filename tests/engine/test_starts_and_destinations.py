@@ -199,7 +199,8 @@ def test_destination_off_the_road_is_a_warning_of_the_check(tmp_path: Path) -> N
 def test_route_criterion_of_a_scenario_with_a_destination(tmp_path: Path) -> None:
     path = write(tmp_path, lane_position_xml(-1, 20))
     criterion = {"route_completion": {"of": "Ego"}}
-    assert errors(path, criteria=criterion)[0].startswith("--criterion: criterion 'route_completion' evaluates a route")
+    (text, *_) = errors(path, criteria=criterion)
+    assert text.startswith("RunSettings.criteria: criterion 'route_completion' evaluates a route")
     acquire = f"<AcquirePositionAction><Position>{lane_position_xml(-1, 90)}</Position></AcquirePositionAction>"
     text = path.read_text().replace(
         "</PrivateAction></Private>",

@@ -64,6 +64,8 @@ class Situation(msgspec.Struct, frozen=True):
     """Speed limits (M,) by curves and the end of the route only [m/s]; None if `limits` has no others."""
     change: LaneChange | None = None
     """Next lane change that the route requires."""
+    junction: float = math.inf
+    """Distance along the line at which the current or next junction begins [m]."""
 
     @property
     def motion(self) -> tuple[float, float]:
@@ -175,6 +177,8 @@ INSIDE = 0.1
 """Clearance to a lane of the opposite direction within which the vehicle is not in it [m]."""
 TOGETHER = 25.0
 """Gap below which two obstacles are passed in one maneuver [m]."""
+BEFORE_JUNCTION = 30.0
+"""Distance before a junction at which overtaking ends [m]: 100 ft, section 11-306 of the Uniform Vehicle Code."""
 NEAR_STOP = 40.0
 """Distance of a place where traffic stops, ahead of a standing vehicle, within which it queues [m]."""
 
@@ -243,7 +247,8 @@ def passing_profiles(
         if moves:
             one_lane = math.isnan(beside.left) and math.isnan(beside.right)
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
-            sides = (overtaking,) if one_lane and not solid else ()
+            is_over = obstacle.end < situation.junction - BEFORE_JUNCTION
+            sides = (overtaking,) if one_lane and not solid and is_over else ()
         profiles += [
             profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
         ]

@@ -267,6 +267,7 @@ class BehaviorPlanner(RoutePlanner):
             hidden=hidden,
             road_limits=self._curve_limits if hidden or self._limited[1] else None,
             change=self._change(line, s),
+            junction=next((passage.start for passage in self._passages if passage.end > s), math.inf),
         )
         return self._decider.decide(situation)
 

@@ -12,6 +12,7 @@ from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 from signal_street import CAR
 
 from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
 
@@ -168,6 +169,16 @@ def test_moving_vehicle_is_not_overtaken_over_a_solid_line(mark: str, overtakes:
     run.world.close()
     assert (run.front > 60.0 + 4.5 * 24.0 + 5.0) == overtakes
     assert overtakes or max(y for _, y, _ in run.path) < 0.0
+
+
+def test_moving_vehicle_is_not_overtaken_before_a_junction() -> None:
+    """The junction begins at x = 29 m, the cyclist is up to 34 m before it, and the other lane is free."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    run = PlannedDrive(behavior(roads), roads, start=-75.0, y=0.0)
+    run.run(14.0, lambda now: [KnownBox(-5.0 + 2.0 * now, -0.6, vx=2.0, kind="bicycle", size=(1.8, 0.6))])
+    run.world.close()
+    assert run.front < -5.0 + 2.0 * 14.0
+    assert max(abs(y) for _, y, _ in run.path) < 0.2
 
 
 def test_standing_vehicle_is_passed_over_a_solid_line() -> None:
