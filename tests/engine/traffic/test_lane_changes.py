@@ -166,11 +166,11 @@ def test_bus_changes_lanes_without_its_front_in_the_oncoming_lane() -> None:
     fleet.add(bus, roads.location("1", -2, 400.0), speed=3.0, desired_speed=3.0)
     fleet.add(car("leader"), roads.location("1", -2, 440.0), speed=1.0, desired_speed=1.0)
     for _ in range(600):
-        place = fleet.step(None, 0.05)[bus.name]
+        pose = fleet.step(None, 0.05)[bus.name]
         length, width, _ = bus.size
         front = bus.offset[0] + 0.5 * length
-        assert place.y + math.sin(place.yaw) * front + 0.5 * math.cos(place.yaw) * width < 0.0
-    assert place.y == pytest.approx(-1.75)
+        assert pose.y + math.sin(pose.yaw) * front + 0.5 * math.cos(pose.yaw) * width < 0.0
+    assert pose.y == pytest.approx(-1.75)
 
 
 def test_changing_car_brakes_for_standing_car_beyond_a_nearer_faster_one() -> None:

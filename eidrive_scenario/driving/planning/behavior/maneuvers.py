@@ -244,14 +244,14 @@ def passing_profiles(
         # A moving vehicle is overtaken on one side only. With several lanes of its direction that is a change of lane:
         # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
         sides: tuple[int, ...] = (overtaking, -overtaking)
+        may_cross = True
         if moves:
             one_lane = math.isnan(beside.left) and math.isnan(beside.right)
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
-            is_over = obstacle.end < situation.junction - BEFORE_JUNCTION
-            sides = (overtaking,) if one_lane and not solid and is_over else ()
-        profiles += [
-            profile for side in sides if (profile := _around(situation, settings, obstacle, body, side)) is not None
-        ]
+            may_cross = not solid and obstacle.end < situation.junction - BEFORE_JUNCTION
+            sides = (overtaking,) if one_lane else ()
+        around = [_around(situation, settings, obstacle, body, side) for side in sides]
+        profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]
     return profiles
 
 

@@ -181,6 +181,16 @@ def test_moving_vehicle_is_not_overtaken_before_a_junction() -> None:
     assert max(abs(y) for _, y, _ in run.path) < 0.2
 
 
+def test_cyclist_at_the_edge_of_the_lane_is_passed_before_a_junction() -> None:
+    """The other lane, from y = 1.75 m on, is not needed: the car is 1.84 m wide."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    run = PlannedDrive(behavior(roads), roads, start=-75.0, y=0.0)
+    run.run(14.0, lambda now: [KnownBox(-5.0 + 2.0 * now, -1.6, vx=2.0, kind="bicycle", size=(1.8, 0.6))])
+    run.world.close()
+    assert run.front > -5.0 + 2.0 * 14.0 + 5.0
+    assert max(y for _, y, _ in run.path) < 1.75 - 1.84 / 2.0
+
+
 def test_standing_vehicle_is_passed_over_a_solid_line() -> None:
     roads = marked_road("solid")
     run = PlannedDrive(behavior(roads), roads)
