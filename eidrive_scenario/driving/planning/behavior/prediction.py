@@ -37,6 +37,9 @@ NOTICEABLE, GREATEST = 0.8, 4.0
 """Accelerations below which an object keeps its speed, and maximum acceleration that is considered [m/s²]."""
 PERSISTENCE = 1.5
 """Time constant with which the predicted acceleration decreases [s]."""
+REACTION = 1.0
+"""Time for which a vehicle that accelerates is expected to do so before it can brake for a curve [s]; a usual reaction
+time."""
 STOPPING, FIRM = 2.0, 3.05
 """Deceleration with which a vehicle is predicted to stop at a sign, and the one from which on it is predicted to pass
 [m/s²]; 3.05 is that of the ITE for stops."""
@@ -163,6 +166,7 @@ class Predictor:
         followed: list[Course] = []
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
+        soon = now + max(known_object.acceleration, 0.0) * REACTION - noise
         for course in courses:
             along, left, heading = course.project(known_object.x, known_object.y)
             turn = float(wrap_angle(direction - heading))
@@ -178,7 +182,7 @@ class Predictor:
             if in_junction:
                 wandering = max(wandering, CUTTING * now)
             leaves = abs(aside) > wandering
-            fits = now <= noise or course.can_follow(along, now - noise)
+            fits = now <= noise or course.can_follow(along, soon)
             is_inside = abs(left) <= course.half_width + known_object.error
             fitting = leaving if leaves or not is_inside else following if fits else too_fast
             keeps = (

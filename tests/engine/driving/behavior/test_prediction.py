@@ -224,6 +224,21 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     assert (prediction.y[:, -1] < -20.0).any()
 
 
+@pytest.mark.parametrize(("acceleration", "turns"), [(0.0, True), (1.0, False)])
+def test_vehicle_that_accelerates_beyond_the_speed_of_a_turn_does_not_turn(acceleration: float, turns: bool) -> None:
+    """The left turn of a radius of 10 m, passed with 6.3 m/s (4 m/s²), is 8 m after the place of the oncoming car.
+
+    The car turns with up to (6.3² + 2 · 2 · 8)^0.5 = 8.5 m/s there, since it brakes with 2 m/s².
+    """
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    predictor, memory = Predictor(roads, TIMES), ObjectMemory(BehaviorSettings())
+    for time in np.arange(-3.0, 0.01, 0.1).tolist():
+        x = 52.0 - 8.4 * time - acceleration * time**2 / 2.0
+        box = KnownBox(x, 3.5, -8.4 - acceleration * time, yaw=math.pi)
+        prediction = predictor.predict(memory.update(detections(time, box), time))
+    assert bool((prediction.y[:, -1] < -20.0).any()) == turns
+
+
 @pytest.mark.parametrize(("speed", "late"), [(8.5, 0.0), (8.0, 1.0), (6.0, 2.0)])
 def test_turn_stays_predicted_until_it_is_over(speed: float, late: float) -> None:
     """A car turns left at the speed at which it entered, with the curve of the lane some meters behind that."""
