@@ -161,8 +161,6 @@ class Predictor:
         """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
-        kept: list[Hypothesis] = []
-        """Along lanes that it followed, and still may: else the prediction alternates where a turn is near a limit."""
         followed: list[Course] = []
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
@@ -181,19 +179,18 @@ class Predictor:
             in_junction = any(passage.start <= along <= passage.end for passage in course.passages)
             if in_junction:
                 wandering = max(wandering, CUTTING * now)
-            leaves = abs(aside) > wandering
-            fits = now <= noise or course.can_follow(along, soon)
             is_inside = abs(left) <= course.half_width + known_object.error
-            fitting = leaving if leaves or not is_inside else following if fits else too_fast
+            # Else the prediction alternates where a turn is near a limit.
             keeps = (
-                fitting is not following
-                and in_junction
+                in_junction
                 and is_inside
                 and course in known_object.followed
                 and abs(aside) <= max(wandering, STILL_CUTTING * now)
                 and course.can_follow(along, (now - noise) / HARSH)
             )
-            leaves = leaves and not keeps
+            leaves = abs(aside) > wandering and not keeps
+            fits = keeps or now <= noise or course.can_follow(along, soon)
+            fitting = leaving if leaves or not is_inside else following if fits else too_fast
             if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known_object, course, along, times) or (along_lane, speed)
@@ -201,16 +198,12 @@ class Predictor:
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             z = None if self._level else np.interp(along + way, course.along, course.heights)
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
-            if keeps:
-                kept.append(fitting[-1])
-            if keeps or fitting is following:
+            if fitting is following:
                 followed.append(course)
             if len(following) == MOST_HYPOTHESES:
                 break
         known_object.followed = followed
-        likely = following or too_fast or leaving[:MOST_HYPOTHESES]
-        likely += [hypothesis for hypothesis in kept if all(hypothesis is not other for other in likely)]
-        return likely or [_straight_on(known_object, travelled, speed)]
+        return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""

@@ -252,3 +252,5 @@ def test_turn_stays_predicted_until_it_is_over(speed: float, late: float) -> Non
         box = KnownBox(x - late, y, speed * math.cos(heading), speed * math.sin(heading), yaw=heading)
         prediction = predictor.predict(memory.update(detections(time, box), time))
         assert (prediction.y[:, -1] < -20.0).any(), time
+        # It has left the lane straight ahead by then, and does not drift out of the others.
+        assert time < 1.25 or (prediction.y[:, -1] < -20.0).all(), time
