@@ -31,7 +31,6 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     Proposal,
     Start,
     Wall,
-    at_edge,
     conflicts,
     crossing_walls,
     inside_way,
@@ -112,8 +111,6 @@ RELEASE = 0.75
 ALMOST_AT_REST = 1.5
 """Speed below which emergency braking goes on until the vehicle stands [m/s]: walking pace, from which it stops within
 a few decimeters, whereas it would creep on into the way of what it brakes for."""
-VIEWED = 10.0
-"""Distance ahead at which the oncoming lane is determined [m]."""
 CRUISE = Proposal(0, 1.0, "all", 4.0)
 """Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
 NEAR_PLACE = 1.0
@@ -146,21 +143,18 @@ class Decision(msgspec.Struct, frozen=True):
 class Decider:
     """Decisions of one vehicle; it keeps the current maneuver."""
 
-    def __init__(self, settings: BehaviorSettings, spec: ActorSpec, times: Array, view: float) -> None:
+    def __init__(self, settings: BehaviorSettings, spec: ActorSpec, body: Body, times: Array, view: float) -> None:
         self._settings = settings
         self._times = times
         self._roller = Roller(settings, times, spec.max_acceleration)
-        self._center = spec.offset[0]
-        self._half_length, self._half_width = spec.size[0] / 2.0, spec.size[1] / 2.0
-        self._front = self._center + self._half_length
-        self._body = Body(self._front, self._half_length - self._center, spec.wheelbase, self._half_width)
+        self._body = body
         self._emergency = min(settings.emergency_deceleration, spec.max_deceleration)
         self._current: LateralProfile | None = None
         self._switched = -math.inf
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._time_gap = TimeGap(settings)
-        self._oncoming = OncomingTraffic(view, times, self._body, settings)
+        self._oncoming = OncomingTraffic(view, times, body, settings)
         self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
         self._passes = False
@@ -189,7 +183,7 @@ class Decider:
         """Return the best proposal."""
         settings = self._settings
         scene = self._scene(situation, settings)
-        current = extended(situation, scene, settings, self._body, self._continued(situation))
+        current = extended(situation, scene, self._continued(situation))
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._to_route(situation))
@@ -205,8 +199,9 @@ class Decider:
         best = options.best(len(profiles))
         self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
         passes = self._current is not None and self._current.uses_oncoming
-        center = situation.s + self._center
-        self._oncoming.observe(scene, center, situation.wanted, situation.now, held_up=self._held_up or passes)
+        self._oncoming.observe(
+            scene, situation.center, situation.wanted, situation.now, held_up=self._held_up or passes
+        )
         if self._held_up:
             if not expects:
                 options = self._options(situation, scene, profiles, with_maneuvers=True)
@@ -240,7 +235,7 @@ class Decider:
         )
 
     def _ego(self, situation: Situation) -> tuple[float, float, float, float]:
-        return situation.s + self._center, situation.d, self._half_length, self._half_width
+        return situation.center, situation.d, self._body.half_length, self._body.half_width
 
     def _at_walking_pace(self, situation: Situation, profiles: list[LateralProfile]) -> Decision | None:
         """Return the decision to drive on at walking pace, with less clearance; None if that is not possible."""
@@ -317,15 +312,15 @@ class Decider:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
         more: list[LateralProfile] = []
         if with_maneuvers:
-            more = passing_profiles(situation, scene, self._settings, self._body, has_begun=self._passes)
+            more = passing_profiles(situation, scene, has_begun=self._passes)
         profiles = profiles + more
         waiting, refused = set(), set()
         options: list[Option] = []
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
-        here = (self._front, situation.s, situation.speed)
+        here = (self._body.front, situation.s, situation.speed)
         stops = situation.stops
         change = situation.change
-        end = None if change is None else change.wall(self._front, self._settings.lateral_acceleration)
+        end = None if change is None else change.wall(self._body.front, self._settings.lateral_acceleration)
         for number, profile in enumerate(profiles):
             holds: list[Wall] = []
             verdict = Verdict.GO
@@ -341,9 +336,9 @@ class Decider:
             if end is not None and not merges:
                 holds.append(end)
             seeks_gap = change is not None and situation.s >= change.begin and not merges
-            way = inside_way(scene, profile, self._half_width)
+            way = inside_way(scene, profile, self._body.half_width)
             for hold in holds:
-                way &= scene.rear < hold.s + self._front
+                way &= scene.rear < hold.s + self._body.front
             crossing = conflicts(scene, way, situation.s)
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
@@ -357,7 +352,7 @@ class Decider:
                 kind = proposal.precedence
                 if kind not in reactions:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = walls, leading(scene, way, crossing, situation.s + self._center, proposal)
+                    reactions[kind] = walls, leading(scene, way, crossing, situation.center, proposal)
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
                 if verdict is Verdict.FOLLOW:
                     time_gap = max(self._settings.time_gap, VIEW_TIME_GAP)
@@ -399,15 +394,15 @@ class Decider:
         time_gap: float | None = None,
     ) -> Motion:
         """Return the motion along a profile at the wanted speed."""
-        way = inside_way(scene, profile, self._half_width)
+        way = inside_way(scene, profile, self._body.half_width)
         crossing = conflicts(scene, way, situation.s)
-        leads = leading(scene, way, crossing, situation.s + self._center, CRUISE)
+        leads = leading(scene, way, crossing, situation.center, CRUISE)
         rolled = self._roll(situation, scene, [Option(CRUISE, profile, way, situation.stops, leads, time_gap)])
         return Motion(rolled.s[0], rolled.speed[0])
 
     def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:
         course = Course(situation.line.along, situation.limits, situation.wanted)
-        return self._roller.roll(options, course, situation.motion, (self._front, self._center), scene)
+        return self._roller.roll(options, course, situation.motion, (self._body.front, self._body.center), scene)
 
     def _verified(
         self, situation: Situation, scene: Surroundings, profile: LateralProfile
@@ -417,16 +412,16 @@ class Decider:
         A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
         """
         motion = self._motion(situation, scene, profile)
-        beside = situation.line.lanes_beside(situation.s + VIEWED)
+        beside = situation.lanes_ahead
         outlook = Outlook(situation.line, scene, beside)
         is_current = self._current is not None and self._current.name == profile.name
         has_begun = self._passes and is_current
         now = situation.now
         verdict = self._oncoming.verify(profile, motion, outlook, now, is_current=is_current, has_begun=has_begun)
         waits_at = self._oncoming.waiting_place(profile, situation.s)
-        if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene, self._body):
+        if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene):
             verdict = Verdict.WAIT
-        s = situation.s + self._center
+        s = situation.center
         viewpoint = (s, profile.offset_at(s))
         if verdict is Verdict.WAIT:
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
@@ -439,14 +434,15 @@ class Decider:
                 stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
                 waits_at = min(waits_at, situation.s + stop)
             waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
-            if waits and may_pass(situation, scene, self._body):
+            if waits and may_pass(situation, scene):
                 is_last_place = math.isinf(profile.waits_at)
                 is_free = self._oncoming.yields(outlook, viewpoint, now, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:
             if self._oncoming.yields(outlook, viewpoint, now, is_last_place=False):
                 return profile, Verdict.GO, waits_at
-            edge = at_edge(profile, situation.start, self._settings)
+            lateral = self._settings.lateral_acceleration
+            edge = towards(profile.name, profile.edge, situation.start, lateral, profile.side)
             # A motion to the edge that has begun is completed, instead of a new one in each tick.
             current = self._current if is_current else None
             profile = current if current is not None and abs(current.last - edge.last) < AT_OFFSET else edge
@@ -478,7 +474,7 @@ class Decider:
         if math.isfinite(options.evaluation.collision[best]):
             return True
         way = float(options.rolled.s[best, -1] - options.rolled.s[best, 0])
-        return way < SATISFIED * situation.free_progress(float(self._times[-1]), self._settings.acceleration)
+        return way < SATISFIED * situation.free_progress(float(self._times[-1]))
 
     def _kept(self, options: Options, best: int, now: float) -> int:
         """Return the best proposal; that of the current maneuver during its dwell time, unless it is risky.

@@ -20,6 +20,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     HASTY,
     ONCOMING_SPEED,
     SIMILAR_SPEED,
+    WALKING_PACE,
     Body,
     LateralProfile,
     Start,
@@ -36,7 +37,7 @@ from eidrive_scenario.driving.planning.behavior.surroundings import Present, Sur
 
 
 class Situation(msgspec.Struct, frozen=True):
-    """Position and speed of the vehicle on its line, wanted speed, and the known objects.
+    """Vehicle with its settings and body, its position and speed on its line, wanted speed, and the known objects.
 
     limits  speed limits (M,) at the points of the line [m/s];  s, d  of the reference point [m]
     steered  s and d of the front axle, which the controller keeps on the trajectory [m], and the slope of its motion
@@ -45,6 +46,8 @@ class Situation(msgspec.Struct, frozen=True):
     gives_way  returns whether the vehicle gives way to traffic on a passage of a junction; None: there are no junctions
     """
 
+    settings: BehaviorSettings
+    body: Body
     line: ReferenceLine
     limits: Array
     s: float
@@ -71,6 +74,26 @@ class Situation(msgspec.Struct, frozen=True):
     def motion(self) -> tuple[float, float]:
         """Distance along the line [m] and speed [m/s]."""
         return self.s, self.speed
+
+    @property
+    def center(self) -> float:
+        """Distance of the center of the vehicle along the line [m]."""
+        return self.s + self.body.center
+
+    @property
+    def front(self) -> float:
+        """Distance of its front along the line [m]."""
+        return self.s + self.body.front
+
+    @property
+    def rear(self) -> float:
+        """Distance of its rear along the line [m]."""
+        return self.s - self.body.rear
+
+    @property
+    def lanes_ahead(self) -> LanesBeside:
+        """Lanes beside the line shortly ahead of the vehicle."""
+        return self.line.lanes_beside(self.s + VIEWED)
 
     @property
     def stops(self) -> list[Wall]:
@@ -119,14 +142,14 @@ class Situation(msgspec.Struct, frozen=True):
         row = None if owner is None else self.objects[owner].row
         return () if row is None else (row,)
 
-    def free_progress(self, horizon: float, acceleration: float) -> float:
+    def free_progress(self, horizon: float) -> float:
         """Return the distance that the vehicle covers without objects [m], by limits, walls and acceleration."""
         speed, s, step = self.speed, self.s, 0.5
         limits, last, spacing, wanted = self.limits, len(self.limits) - 1, self.line.spacing, self.wanted
         end = math.inf if self.stop is None else self.stop.s
         for _ in range(round(horizon / step)):
             limit = float(limits[min(max(int(s / spacing), 0), last)])
-            speed = min(speed + acceleration * step, wanted, limit)
+            speed = min(speed + self.settings.acceleration * step, wanted, limit)
             s = min(s + speed * step, end)
         return s - self.s
 
@@ -137,6 +160,8 @@ class Situation(msgspec.Struct, frozen=True):
         return max(min(math.sqrt(self.speed**2 + gain), self.wanted, limit), self.speed)
 
 
+VIEWED = 10.0
+"""Distance ahead of the vehicle at which the lanes beside the line are determined [m]."""
 SLOWER = 2.0
 """Difference to the wanted speed from which on a slower vehicle is passed [m/s]."""
 PATIENCE = 3.0
@@ -207,30 +232,28 @@ class _Obstacle(NamedTuple):
         return max(hypothesis.speed for hypothesis in self.objects)
 
 
-def passing_profiles(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, *, has_begun: bool
-) -> list[LateralProfile]:
+def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bool) -> list[LateralProfile]:
     """Return maneuvers past what holds the vehicle up, or out of the way of an oncoming vehicle in its lane.
 
     The result is empty if the vehicle queues or nothing is free beside it.
 
     has_begun  whether the vehicle passes something already; what then appears behind that is no queue
     """
-    head_on = _head_on(situation, scene, body)
+    head_on = _head_on(situation, scene)
     if head_on is not None:
-        return _evasions(situation, scene, settings, body, head_on)
+        return _evasions(situation, scene, head_on)
     profiles = []
-    held_out = _behind_neighbor(situation, scene, settings, body)
+    held_out = _behind_neighbor(situation, scene)
     if held_out is not None:
         profiles.append(held_out)
-    blocker = _blocker(situation, scene, body)
-    if blocker is None or (not has_begun and _queues(situation, scene, blocker, body)):
+    blocker = _blocker(situation, scene)
+    if blocker is None or (not has_begun and _queues(situation, scene, blocker)):
         return profiles
-    obstacle = _obstacle(situation, scene, settings, blocker, body)
-    beside = situation.line.lanes_beside(situation.s + 10.0)
+    obstacle = _obstacle(situation, scene, blocker)
+    beside = situation.lanes_ahead
     faster, overtaking = beside.faster, beside.overtaking
-    if not _is_parked(situation, blocker, body):
-        profile = None if obstacle is None else _around(situation, settings, obstacle, body, overtaking)
+    if not _is_parked(situation, blocker):
+        profile = None if obstacle is None else _around(situation, obstacle, overtaking)
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
@@ -238,8 +261,8 @@ def passing_profiles(
     last = situation.end if change is None else change.begin
     returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
     may_change = not math.isnan(faster) and returns
-    if may_change and has_gap_now(scene, faster, situation.motion, body):
-        profiles.append(to_lane(faster, situation.start, settings.lateral_acceleration))
+    if may_change and has_gap_now(scene, faster, situation.motion, situation.body):
+        profiles.append(to_lane(faster, situation.start, situation.settings.lateral_acceleration))
     if obstacle is not None:
         # A moving vehicle is overtaken on one side only. With several lanes of its direction that is a change of lane:
         # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
@@ -250,14 +273,12 @@ def passing_profiles(
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
             may_cross = not solid and obstacle.end < situation.junction - BEFORE_JUNCTION
             sides = (overtaking,) if one_lane else ()
-        around = [_around(situation, settings, obstacle, body, side) for side in sides]
+        around = [_around(situation, obstacle, side) for side in sides]
         profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]
     return profiles
 
 
-def extended(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, profile: LateralProfile
-) -> LateralProfile:
+def extended(situation: Situation, scene: Surroundings, profile: LateralProfile) -> LateralProfile:
     """Return a profile past standing objects with its end behind those that have come into view behind them.
 
     It is the same if there are none, if they need more clearance to its side, or if the vehicle returns already.
@@ -265,73 +286,73 @@ def extended(
     side, end = profile.side, profile.places[-2] if len(profile.places) > 2 else -math.inf
     if profile.last != 0.0 or situation.steered[0] >= end:
         return profile
-    blocker = _blocker(situation, scene, body)
+    blocker = _blocker(situation, scene)
     if blocker is None or blocker.rear > end + TOGETHER:
         return profile
-    obstacle = _obstacle(situation, scene, settings, blocker, body)
+    obstacle = _obstacle(situation, scene, blocker)
     if obstacle is None or obstacle.end <= end or obstacle.fastest > ONCOMING_SPEED:
         return profile
     value = side * profile.values[-2]
     outer, every = _sides(obstacle, side)
-    if outer + _clearance(situation, settings, obstacle) > value - body.half_width or value + body.half_width > every:
+    half_width = situation.body.half_width
+    if outer + _clearance(situation, obstacle) > value - half_width or value + half_width > every:
         return profile
-    back = _length_at(situation, settings, obstacle.end, value, is_hasty=value > profile.border)
+    back = _length_at(situation, obstacle.end, value, is_hasty=value > profile.border)
     places = (*profile.places[:-2], obstacle.end, obstacle.end + back)
     return msgspec.structs.replace(profile, places=places)
 
 
-def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
+def _head_on(situation: Situation, scene: Surroundings) -> Present | None:
     """Return the nearest hypothesis that comes towards the vehicle in the lane of its route, or a cyclist or pedestrian
     whose distance the vehicle should keep there."""
-    center = situation.s + body.center
 
     def comes(hypothesis: Present) -> bool:
         if situation.kind_of(hypothesis.owner) in VULNERABLE:
-            return hypothesis.speed < -ONCOMING_SPEED and _is_in_way(hypothesis, body.half_width)
-        return hypothesis.speed < -WRONG_WAY and abs(hypothesis.d) - hypothesis.half_width < body.half_width
+            return hypothesis.speed < -ONCOMING_SPEED and _is_in_way(situation, hypothesis)
+        return hypothesis.speed < -WRONG_WAY and abs(hypothesis.d) - hypothesis.half_width < situation.body.half_width
 
     oncoming = [
         hypothesis
         for hypothesis in scene.present
-        if hypothesis.s > center and not hypothesis.crosses and comes(hypothesis) and scene.certain[hypothesis.row]
+        if hypothesis.s > situation.center
+        and not hypothesis.crosses
+        and comes(hypothesis)
+        and scene.certain[hypothesis.row]
     ]
     return min(oncoming, key=attrgetter("s"), default=None)
 
 
-def _evasions(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, head_on: Present
-) -> list[LateralProfile]:
+def _evasions(situation: Situation, scene: Surroundings, head_on: Present) -> list[LateralProfile]:
     """Return changes to the neighboring lanes that reach as far as an oncoming vehicle, and are free behind, and
     motions past an oncoming cyclist or pedestrian.
 
     The first lane is away from those of the opposite direction.
     """
-    places = (situation.s + 10.0, head_on.s)
-    here, there = (situation.line.lanes_beside(s) for s in places)
+    here, there = situation.lanes_ahead, situation.line.lanes_beside(head_on.s)
     evasions = []
     if situation.kind_of(head_on.owner) in VULNERABLE:
-        obstacle = _meeting(situation, head_on, body)
-        around = [_around(situation, settings, obstacle, body, side) for side in (here.overtaking, -here.overtaking)]
+        obstacle = _meeting(situation, head_on)
+        around = [_around(situation, obstacle, side) for side in (here.overtaking, -here.overtaking)]
         evasions += [profile for profile in around if profile is not None]
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
-        if not (math.isnan(offset) or math.isnan(beyond)) and has_gap_now(scene, offset, situation.motion, body):
-            evasions.append(to_lane(offset, situation.start, settings.lateral_acceleration))
+        if math.isnan(offset) or math.isnan(beyond):
+            continue
+        if has_gap_now(scene, offset, situation.motion, situation.body):
+            evasions.append(to_lane(offset, situation.start, situation.settings.lateral_acceleration))
     return evasions
 
 
-def _meeting(situation: Situation, head_on: Present, body: Body) -> _Obstacle:
+def _meeting(situation: Situation, head_on: Present) -> _Obstacle:
     """Return an oncoming object between the places at which the vehicle should be aside [m]."""
-    gap = max(head_on.rear - situation.s - body.front, 0.0)
+    gap = max(head_on.rear - situation.front, 0.0)
     way = gap * situation.speed / (situation.speed - head_on.speed)
-    begin, end = situation.s + EARLY * way, situation.s + way + 2.0 * head_on.half_length + body.wheelbase
-    end += body.rear + BEFORE_OBSTACLE
+    begin, end = situation.s + EARLY * way, situation.s + way + 2.0 * head_on.half_length
+    end += situation.body.wheelbase + situation.body.rear + BEFORE_OBSTACLE
     return _Obstacle.between(begin, end, [head_on], situation)
 
 
-def _behind_neighbor(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body
-) -> LateralProfile | None:
+def _behind_neighbor(situation: Situation, scene: Surroundings) -> LateralProfile | None:
     """Return the motion back to the route behind what stands between it and the vehicle; None if nothing does.
 
     The maneuver past an obstacle ends where its end was when the maneuver began, and the estimate may have changed.
@@ -340,92 +361,93 @@ def _behind_neighbor(
     if abs(d) < SWUNG:
         return None
     side = 1 if d > 0.0 else -1
-    rear, front = situation.s - body.rear, situation.s + body.front
     beside = [
         hypothesis
         for hypothesis in scene.present
-        if hypothesis.front > rear
-        and hypothesis.rear < front
+        if hypothesis.front > situation.rear
+        and hypothesis.rear < situation.front
         and side * hypothesis.d - hypothesis.half_width < side * d
-        and _is_in_way(hypothesis, body.half_width)
+        and _is_in_way(situation, hypothesis)
         and not hypothesis.crosses
         and abs(hypothesis.speed) < WAITING
     ]
     if not beside:
         return None
     last = max(beside, key=attrgetter("front"))
-    end = max(last.front + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
-    name = f"pass {situation.kind_of(last.owner)} on the {'left' if side > 0 else 'right'}"
-    border = _border(situation.line.lanes_beside(end), side, body)
-    back = _length_at(situation, settings, end, abs(d), is_hasty=abs(d) > border)
-    return LateralProfile(name, (s, end, end + back), (d, d, 0.0), slope, side, border)
+    end = max(last.front + situation.body.rear + situation.body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
+    border = _border(situation.line.lanes_beside(end), side, situation.body.half_width)
+    back = _length_at(situation, end, abs(d), is_hasty=abs(d) > border)
+    return LateralProfile(_name(situation, last, side), (s, end, end + back), (d, d, 0.0), slope, side, border)
 
 
-def _length_at(
-    situation: Situation, settings: BehaviorSettings, place: float, change: float, *, is_hasty: bool = False
-) -> float:
+def _name(situation: Situation, passed: Present, side: int) -> str:
+    """Return the name of the maneuver past an object."""
+    return f"pass {situation.kind_of(passed.owner)} on the {'left' if side > 0 else 'right'}"
+
+
+def _length_at(situation: Situation, place: float, change: float, *, is_hasty: bool = False) -> float:
     """Return the length of a lateral motion by `change` [m] at the speed that the vehicle has at a place.
 
     is_hasty  whether it leaves a lane of the opposite direction
     """
-    speed = max(situation.speed_at(place, settings.acceleration), 2.0)
-    return change_length(change, speed, settings.lateral_acceleration * (HASTY if is_hasty else 1.0))
+    speed = max(situation.speed_at(place, situation.settings.acceleration), WALKING_PACE)
+    return change_length(change, speed, situation.settings.lateral_acceleration * (HASTY if is_hasty else 1.0))
 
 
-def _border(lanes: LanesBeside, side: int, body: Body) -> float:
+def _border(lanes: LanesBeside, side: int, half_width: float) -> float:
     """Return the offset to a side beyond which the vehicle is in a lane of the opposite direction [m]."""
     own, every = lanes.room(side)
-    return own - body.half_width - INSIDE if every > own else math.inf
+    return own - half_width - INSIDE if every > own else math.inf
 
 
-def _is_in_way(hypothesis: Present, half_width: float) -> bool:
-    """Return whether a hypothesis is closer to the route than a vehicle on it should pass."""
-    return abs(hypothesis.d) - hypothesis.half_width < half_width + hypothesis.margin
+def _is_in_way(situation: Situation, hypothesis: Present) -> bool:
+    """Return whether a hypothesis is closer to the route than the vehicle on it should pass."""
+    return abs(hypothesis.d) - hypothesis.half_width < situation.body.half_width + hypothesis.margin
 
 
-def _blocker(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
+def _blocker(situation: Situation, scene: Surroundings) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
-    center, slower = situation.s + body.center, max(situation.wanted - SLOWER, STILL)
+    slower = max(situation.wanted - SLOWER, STILL)
     slower_ahead = [
         hypothesis
         for hypothesis in scene.present
-        if hypothesis.s > center
+        if hypothesis.s > situation.center
         and -0.5 < hypothesis.speed < slower
         and not hypothesis.crosses
-        and _is_in_way(hypothesis, body.half_width)
-        and _is_passable(situation, hypothesis, body)
+        and _is_in_way(situation, hypothesis)
+        and _is_passable(situation, hypothesis)
     ]
     return min(slower_ahead, key=attrgetter("s"), default=None)
 
 
-def _is_beside(situation: Situation, hypothesis: Present, body: Body) -> bool:
+def _is_beside(situation: Situation, hypothesis: Present) -> bool:
     """Return whether the vehicle is beside an object, which it is then passing, and behind which it cannot wait."""
-    return hypothesis.rear < situation.s + body.front and abs(situation.d - hypothesis.d) > hypothesis.half_width
+    return hypothesis.rear < situation.front and abs(situation.d - hypothesis.d) > hypothesis.half_width
 
 
-def _is_passable(situation: Situation, hypothesis: Present, body: Body) -> bool:
+def _is_passable(situation: Situation, hypothesis: Present) -> bool:
     """Return whether an object may be passed: standing for some time or moving, a pedestrian steadily."""
     known_object = situation.objects[hypothesis.owner]
     if known_object.still_since is None:
         return known_object.kind not in ON_FOOT or _is_steady(situation, hypothesis)
-    if known_object.kind in ON_FOOT and not _is_parked(situation, hypothesis, body):
+    if known_object.kind in ON_FOOT and not _is_parked(situation, hypothesis):
         return False
     return known_object.kind == "misc" or situation.now - known_object.still_since >= PATIENCE
 
 
-def may_pass(situation: Situation, scene: Surroundings, body: Body) -> bool:
+def may_pass(situation: Situation, scene: Surroundings) -> bool:
     """Return whether the vehicle may pass what holds it up now; behind a vehicle that has just stopped it waits."""
-    blocker = _blocker(situation, scene, body)
-    return blocker is None or _is_parked(situation, blocker, body)
+    blocker = _blocker(situation, scene)
+    return blocker is None or _is_parked(situation, blocker)
 
 
-def _is_parked(situation: Situation, hypothesis: Present, body: Body) -> bool:
+def _is_parked(situation: Situation, hypothesis: Present) -> bool:
     """Return whether an object does not seem to have stopped just now, behind which the vehicle would wait."""
     known_object = situation.objects[hypothesis.owner]
     if known_object.still_since is None or known_object.kind == "misc" or abs(hypothesis.d) > ASIDE:
         return True
     stands = situation.now - known_object.still_since
-    return situation.speed < WAITING or stands >= LONG or _is_beside(situation, hypothesis, body)
+    return situation.speed < WAITING or stands >= LONG or _is_beside(situation, hypothesis)
 
 
 def _is_steady(situation: Situation, hypothesis: Present) -> bool:
@@ -435,7 +457,7 @@ def _is_steady(situation: Situation, hypothesis: Present) -> bool:
     return has_moved and known_object.acceleration > -NOTICEABLE
 
 
-def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: Body) -> bool:
+def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool:
     """Return whether the blocker waits at a place where the vehicle stops as well, or behind another vehicle."""
     if situation.stop is not None and situation.stop.s < blocker.s + NEAR_STOP:
         return True
@@ -443,7 +465,7 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: B
     since, may_queue = known_object.still_since, known_object.kind != "misc" and known_object.kind not in ON_FOOT
     if not may_queue or since is None or situation.now - since >= QUEUE_PATIENCE:
         return False
-    if _is_beside(situation, blocker, body):
+    if _is_beside(situation, blocker):
         return False
     return any(
         -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP and abs(hypothesis.d - blocker.d) < 1.0
@@ -451,11 +473,9 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: B
     )
 
 
-def _obstacle(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, blocker: Present, body: Body
-) -> _Obstacle | None:
+def _obstacle(situation: Situation, scene: Surroundings, blocker: Present) -> _Obstacle | None:
     """Return the blocker with what stands close behind it; None if it is too fast or not steady enough to pass it."""
-    objects = _together(scene, blocker, body.half_width)
+    objects, body = _together(situation, scene, blocker), situation.body
     wanted = max(situation.wanted, 1.0)
     begin = min([hypothesis.rear for hypothesis in objects]) - (body.front - body.wheelbase) + SWUNG_OUT
     ends = [hypothesis.front for hypothesis in objects]
@@ -464,8 +484,8 @@ def _obstacle(
     if fastest > 0.5:
         if wanted - fastest < SLOWER or not all(_is_steady(situation, hypothesis) for hypothesis in objects):
             return None
-        gain = settings.acceleration * MEAN_SHARE
-        rear = situation.s - body.rear - BEFORE_OBSTACLE
+        gain = situation.settings.acceleration * MEAN_SHARE
+        rear = situation.rear - BEFORE_OBSTACLE
         ends = [
             end + own * time_to_gain(end - rear, situation.speed - own, wanted - own, gain)
             for end, own in zip(ends, speed, strict=True)
@@ -476,31 +496,29 @@ def _obstacle(
     return _Obstacle.between(begin, end, objects, situation)
 
 
-def _around(
-    situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle, body: Body, side: int
-) -> LateralProfile | None:
+def _around(situation: Situation, obstacle: _Obstacle, side: int) -> LateralProfile | None:
     """Return the motion past an obstacle on one side; None if that is too narrow."""
-    clearance = _clearance(situation, settings, obstacle)
+    clearance, half_width = _clearance(situation, obstacle), situation.body.half_width
     outer, every = _sides(obstacle, side)
-    room = every - outer - 2.0 * body.half_width
+    room = every - outer - 2.0 * half_width
     if room < (clearance + SPARE if _is_vulnerable(situation, obstacle) else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
     # As far beside the obstacle as it should be, else in the middle of the gap, else at the least clearance.
     beside = (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
     beside = clearance + SPARE if room >= clearance + SPARE else beside
-    value = max(outer + beside + body.half_width, 0.0)
-    border = min(_border(lanes, side, body) for lanes in obstacle.beside)
+    value = max(outer + beside + half_width, 0.0)
+    border = min(_border(lanes, side, half_width) for lanes in obstacle.beside)
     stands = all(situation.objects[hypothesis.owner].still_since is not None for hypothesis in obstacle.objects)
     profile = passing(
-        f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
+        _name(situation, obstacle.objects[0], side),
         side * value,
         (obstacle.begin, obstacle.end),
-        Start(*situation.steered, max(situation.speed, 2.0)),
-        settings.lateral_acceleration,
+        Start(*situation.steered, max(situation.speed, WALKING_PACE)),
+        situation.settings.lateral_acceleration,
         side,
         lengths=(
-            _length_at(situation, settings, obstacle.begin, side * value - situation.steered[1]),
-            _length_at(situation, settings, obstacle.end, value, is_hasty=value > border),
+            _length_at(situation, obstacle.begin, side * value - situation.steered[1]),
+            _length_at(situation, obstacle.end, value, is_hasty=value > border),
         ),
         stands=stands,
     )
@@ -514,8 +532,9 @@ def _is_vulnerable(situation: Situation, obstacle: _Obstacle) -> bool:
     return any(situation.kind_of(hypothesis.owner) in VULNERABLE for hypothesis in obstacle.objects)
 
 
-def _clearance(situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle) -> float:
+def _clearance(situation: Situation, obstacle: _Obstacle) -> float:
     """Return the clearance that an obstacle should have [m]."""
+    settings = situation.settings
     clearance = settings.pedestrian_margin if _is_vulnerable(situation, obstacle) else settings.lateral_margin
     stops = any(
         situation.kind_of(hypothesis.owner) == "bus" and hypothesis.speed < WAITING for hypothesis in obstacle.objects
@@ -529,7 +548,7 @@ def _sides(obstacle: _Obstacle, side: int) -> tuple[float, float]:
     return outer, min(lanes.room(side)[1] for lanes in obstacle.beside)
 
 
-def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:
+def _together(situation: Situation, scene: Surroundings, blocker: Present) -> list[Present]:
     """Return the blocker and the objects of similar speed in the way that follow it closely."""
     alike = [
         hypothesis
@@ -537,7 +556,7 @@ def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[
         if hypothesis.s >= blocker.s
         and not hypothesis.crosses
         and abs(hypothesis.speed - blocker.speed) < SIMILAR_SPEED
-        and _is_in_way(hypothesis, half_width)
+        and _is_in_way(situation, hypothesis)
     ]
     group = [blocker]
     for hypothesis in sorted(alike, key=attrgetter("s")):

@@ -12,10 +12,9 @@ from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.conflict_ways import UPSTREAM, ConflictWay
-from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE, time_to_gain
+from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE, Body, time_to_gain
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.road_objects import buildings, road_object_bodies
 
 REACTION = 0.5
@@ -147,18 +146,16 @@ class HiddenTraffic:
         self,
         settings: BehaviorSettings,
         fixed: Occluders,
-        spec: ActorSpec,
+        body: Body,
         view: Sequence[ViewSector],
         range: float,
     ) -> None:
         self._settings = settings
         self._fixed = fixed
-        center, half = spec.offset[0], spec.size[0] / 2.0
-        self._front, self._rear = center + half, half - center
-        self._sensor = max((sector.x for sector in view), default=center)
+        self._body = body
+        self._sensor = max((sector.x for sector in view), default=body.center)
         self._range = range
         self._traffic: dict[Hashable, PossibleTraffic] = {}
-        self._deceleration = settings.comfortable_deceleration
 
     def limits(
         self,
@@ -190,10 +187,10 @@ class HiddenTraffic:
             shown = self._shown(way, regions, occluders, ground, now)
             hidden = self._traffic.setdefault(way.key, PossibleTraffic()).first(way, shown, now)
             # Until the rear of the vehicle has left the zone.
-            time = time_to_gain(way.end + self._rear - s, speed, wanted, self._settings.acceleration)
+            time = time_to_gain(way.end + self._body.rear - s, speed, wanted, self._settings.acceleration)
             if hidden / way.speed > time:
                 continue
-            stop = way.hold - self._front - BEFORE_ZONE
+            stop = way.hold - self._body.front - BEFORE_ZONE
             limits = np.where(along > way.look - self._sensor, math.inf, self.safe_speed(stop - along))
             lowest = limits if lowest is None else np.minimum(lowest, limits)
             nearest = min(nearest, (way.start, way.kind))
@@ -204,7 +201,7 @@ class HiddenTraffic:
 
         v = -bt + √(b²t² + 2bd)
         """
-        b, t = self._deceleration, REACTION
+        b, t = self._settings.comfortable_deceleration, REACTION
         speed = -b * t + np.sqrt((b * t) ** 2 + 2.0 * b * np.maximum(distance, 0.0))
         return np.maximum(speed, CREEP)
 

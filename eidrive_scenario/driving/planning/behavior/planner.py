@@ -24,7 +24,7 @@ from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
 from eidrive_scenario.driving.planning.behavior.occlusion import HiddenTraffic, Occluders
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
-from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_limits
+from eidrive_scenario.driving.planning.behavior.proposals import Body, Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -71,6 +71,7 @@ class BehaviorPlanner(RoutePlanner):
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
         own = self.planner_settings
         self._times: Array = np.arange(0.0, own.horizon + 1e-9, STEP)
+        self._body = Body.of(spec)
         self._memory = ObjectMemory(own)
         self._rules = None if roads is None else JunctionRules(roads)
         self._predictor = Predictor(roads, self._times, self._rules)
@@ -105,7 +106,7 @@ class BehaviorPlanner(RoutePlanner):
 
     @cached_property
     def _decider(self) -> Decider:
-        return Decider(self.planner_settings, self.spec, self._times, self._range)
+        return Decider(self.planner_settings, self.spec, self._body, self._times, self._range)
 
     def observe_regions(self, regions: Sequence[PerceptionRegion]) -> None:
         self._regions = regions
@@ -195,7 +196,7 @@ class BehaviorPlanner(RoutePlanner):
             return self._limits, ""
         if self._hidden is None:
             fixed = Occluders.of_map(self.roads)
-            self._hidden = HiddenTraffic(self.planner_settings, fixed, self.spec, self.view or (), self._range)
+            self._hidden = HiddenTraffic(self.planner_settings, fixed, self._body, self.view or (), self._range)
         motion = (s, max(ego.speed, 0.0), wanted)
         position: tuple[float, float, float] = tuple(ego.position.tolist())
         ways = [way for way in self._ways if not way.has_light] if self._relies_on_lights(s) else self._ways
@@ -251,6 +252,8 @@ class BehaviorPlanner(RoutePlanner):
         low = line.index_at(s - MARGIN_AHEAD)
         high = line.index_at(s + max(ego.speed, wanted) * self.planner_settings.horizon + MARGIN_AHEAD) + 1
         situation = Situation(
+            settings=self.planner_settings,
+            body=self._body,
             line=line,
             limits=limits,
             s=s,

@@ -13,6 +13,7 @@ from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 from eidrive_scenario.driving.planning.path import approached
+from eidrive_scenario.world.actor import ActorSpec
 
 ROUTE = "route"
 """Name of the maneuver without a lateral deviation."""
@@ -31,29 +32,34 @@ TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
 """Share of the length of a lateral motion in which most of it must be possible."""
-WALKING = 2.0
-"""Walking pace, for which the lateral motion from the edge of the lane is made without space for another [m/s]."""
+WALKING_PACE = 2.0
+"""Least speed for which lateral motions are made [m/s]; in a traffic-calmed area German courts accept 4 to 7 km/h."""
 AT_OFFSET = 0.1
 """Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
 
 
 class Body(NamedTuple):
-    """Distances of the front and the rear end from the rear axle, wheelbase, and half width of the vehicle [m]."""
+    """Distance of the center ahead of the rear axle, half length, half width, and wheelbase of the vehicle [m]."""
 
-    front: float
-    rear: float
-    wheelbase: float
+    center: float
+    half_length: float
     half_width: float
+    wheelbase: float
+
+    @classmethod
+    def of(cls, spec: ActorSpec) -> Body:
+        """Return the body of an actor."""
+        return cls(spec.offset[0], spec.size[0] / 2.0, spec.size[1] / 2.0, spec.wheelbase)
 
     @property
-    def center(self) -> float:
-        """Distance of the center ahead of the rear axle [m]."""
-        return (self.front - self.rear) / 2.0
+    def front(self) -> float:
+        """Distance of the front end ahead of the rear axle [m]."""
+        return self.center + self.half_length
 
     @property
-    def half_length(self) -> float:
-        """Half of the length [m]."""
-        return (self.front + self.rear) / 2.0
+    def rear(self) -> float:
+        """Distance of the rear end behind the rear axle [m]."""
+        return self.half_length - self.center
 
 
 class LateralProfile(msgspec.Struct, frozen=True):
@@ -100,6 +106,11 @@ class LateralProfile(msgspec.Struct, frozen=True):
         """Return the derivative of the offset."""
         before, after = self.offset(np.array([s - 0.05, s + 0.05])).tolist()
         return float(after - before) / 0.1
+
+    @property
+    def edge(self) -> float:
+        """Offset at which the vehicle is at the edge of its lane, from where it sees past what it overtakes [m]."""
+        return self.side * (self.border - AT_OFFSET)
 
     @property
     def last(self) -> float:
@@ -203,12 +214,6 @@ def passing(
     return LateralProfile(name, tuple(places), (*values, value, value, 0.0), slope, side)
 
 
-def at_edge(profile: LateralProfile, start: Start, settings: BehaviorSettings) -> LateralProfile:
-    """Return the motion to the edge of the lane, from where the vehicle sees past what a profile overtakes."""
-    edge = profile.side * (profile.border - AT_OFFSET)
-    return towards(profile.name, edge, start, settings.lateral_acceleration, profile.side)
-
-
 def with_view(
     profile: LateralProfile, start: Start, settings: BehaviorSettings, viewpoint: float, onward_speed: float
 ) -> LateralProfile | None:
@@ -221,14 +226,14 @@ def with_view(
     onward_speed  speed beside the obstacle if the vehicle does not wait [m/s]
     """
     s, offset, slope, speed = start
-    edge = profile.side * (profile.border - AT_OFFSET)
+    edge = profile.edge
     begin, end, back = profile.places[-3:]
     value = profile.values[-2]
     acceleration = settings.lateral_acceleration
-    length = change_length(edge - offset, max(speed, WALKING), acceleration)
+    length = change_length(edge - offset, max(speed, WALKING_PACE), acceleration)
     lengths = (
         change_length(value - edge, onward_speed, HASTY * acceleration),
-        change_length(value - edge, WALKING, acceleration),
+        change_length(value - edge, WALKING_PACE, acceleration),
     )
     starts = [begin - onward for onward in lengths]
     onward = next((start for start in starts if s + length <= start), None)

@@ -12,12 +12,11 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.maneuvers import LEAST_CLEARANCE, Situation
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
+from eidrive_scenario.driving.planning.behavior.proposals import WALKING_PACE
 from eidrive_scenario.driving.planning.behavior.scoring import Options
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
-PACE = 2.0
-"""Walking pace [m/s]; in a traffic-calmed area German courts accept 4 to 7 km/h."""
 WAIT = 5.0
 """Time for which the vehicle has stood before it passes at walking pace [s]."""
 LESS_UNCERTAIN = 0.5
@@ -53,7 +52,7 @@ class WalkingPace:
         elif math.isinf(self._stands_since):
             self._stands_since = situation.now
         self._is_active = self._is_active or situation.now - self._stands_since >= WAIT
-        if self._is_active and float(options.rolled.speed[best, self._soon]) > PACE:
+        if self._is_active and float(options.rolled.speed[best, self._soon]) > WALKING_PACE:
             self._is_active = self._drives = False
         return self._is_active and (self._drives or situation.now - self._tried >= RETRY - TIME_TOLERANCE)
 
@@ -68,7 +67,7 @@ class WalkingPace:
         """Return the situation with walking pace as the wanted speed, and with vehicles and obstacles that stay near
         one place standing at their mean place."""
         objects = [_at_mean_place(known_object, situation.now) for known_object in situation.objects]
-        wanted = min(situation.wanted, PACE)
+        wanted = min(situation.wanted, WALKING_PACE)
         return msgspec.structs.replace(
             situation, wanted=wanted, objects=objects, prediction=_standing(situation.prediction, objects)
         )

@@ -17,6 +17,7 @@ from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
 from eidrive_scenario.driving.planning.behavior.maneuvers import Situation
 from eidrive_scenario.driving.planning.behavior.occlusion import CREEP, HiddenTraffic, Occluders, PossibleTraffic
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
+from eidrive_scenario.driving.planning.behavior.proposals import Body
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.path import PlannedPath
@@ -36,7 +37,7 @@ def lane(length: float = 40.0, *, speed: float = 10.0, start: float = 20.0) -> C
 
 
 def hidden_traffic(**settings: float) -> HiddenTraffic:
-    return HiddenTraffic(BehaviorSettings.model_validate(settings), NOTHING, CAR, (), 200.0)
+    return HiddenTraffic(BehaviorSettings.model_validate(settings), NOTHING, Body.of(CAR), (), 200.0)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +184,7 @@ def test_house_hides_the_far_end_of_a_lane() -> None:
     way = lane(speed=30.0, start=95.0)._replace(points=points, distance=distance)
     region = PerceptionRegion("Ego", 0.0, (msgspec.structs.replace(EVERYWHERE, range=400.0),))
     for fixed, is_hidden in ((NOTHING, False), (house, True)):
-        traffic = HiddenTraffic(BehaviorSettings(), fixed, CAR, (), 400.0)
+        traffic = HiddenTraffic(BehaviorSettings(), fixed, Body.of(CAR), (), 400.0)
         found = traffic.limits(
             [way], np.arange(0.0, 110.0), (0.0, 8.0, 8.0), (0.0, 0.0, 0.0), [region], Detections(0.0), 0.0
         )
@@ -196,6 +197,8 @@ def test_reason_is_what_limits_the_speed() -> None:
     curve = np.sqrt(3.0**2 + 2.0 * 2.0 * np.maximum(50.0 - line.along, 0.0))
     caution = np.where(line.along < 30.0, np.sqrt(5.0**2 + 2.0 * 2.0 * (30.0 - np.minimum(line.along, 30.0))), math.inf)
     situation = Situation(
+        settings=BehaviorSettings(),
+        body=Body.of(CAR),
         line=line,
         limits=np.minimum(curve, caution),
         s=0.0,

@@ -23,7 +23,7 @@ from eidrive_scenario.driving.planning.path import PlannedPath
 
 BESIDE = LanesBeside(oncoming=3.5, oncoming_limit=15.0)
 TIMES = np.arange(0.0, 12.01, 0.25)
-BODY = Body(3.8, 1.0, 2.85, 0.9)
+BODY = Body(1.4, 2.4, 0.9, 2.85)
 SETTINGS = BehaviorSettings()
 PASSING = LateralProfile("pass", (0.0, 20.0, 50.0, 70.0), (0.0, 3.0, 3.0, 0.0), side=1, border=0.75)
 LINE = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [400.0, 0.0]]), ends=False), None)

@@ -40,7 +40,7 @@ def crossing_car(place: float, arrival: float, *, yields: bool) -> Surroundings:
 def risk(arrival: float, *, yields: bool) -> float:
     """Return the risk of a car with 10 m/s that passes the place of crossing after 3 s."""
     rolled = Rollout((SPEED * TIMES)[None], np.full((1, len(TIMES)), SPEED), np.full((1, 4), -1))
-    route, body = LateralProfile("route", (0.0,), (0.0,)), Body(3.8, 1.0, 2.85, 0.9)
+    route, body = LateralProfile("route", (0.0,), (0.0,)), Body(1.4, 2.4, 0.9, 2.85)
     scene = crossing_car(3.0 * SPEED, arrival, yields=yields)
     way = inside_way(scene, route, body.half_width)
     options = [Option(Proposal(0, 1.0, "all", 4.0), route, way, [], way)]
