@@ -40,7 +40,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Course, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Roller, Rollout, SpeedLimits
 from eidrive_scenario.driving.planning.behavior.scoring import AT_REST, URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
@@ -51,34 +51,40 @@ from eidrive_scenario.world.actor import ActorSpec
 def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, tuple[int, ...]]:
     """Return the reason of a proposal, and the rows of its objects."""
     chosen = options.options[best]
-    proposal, profile = chosen.proposal, chosen.profile
     owners = situation.prediction.objects
-    if proposal.is_emergency:
+    if chosen.proposal.is_emergency:
         threat = _threat(options, best)
         if threat is None:
             return "emergency braking", ()
         owner = owners[threat]
         return f"emergency braking: collision course with {situation.kind_of(owner)}", situation.rows_of(owner)
-    maneuver = "" if profile.name == ROUTE else f"{profile.name}; "
+    reason, hypothesis = _motion_reason(situation, options, best)
+    maneuver = "" if chosen.profile.name == ROUTE else f"{chosen.profile.name}; "
+    return f"{maneuver}{reason}", () if hypothesis is None else situation.rows_of(owners[hypothesis])
+
+
+def _motion_reason(situation: Situation, options: Options, best: int) -> tuple[str, int | None]:
+    """Return what determines the motion of a proposal along its profile, and the hypothesis behind that, if any."""
+    chosen, owners = options.options[best], situation.prediction.objects
     causes = options.rolled.cause[best].tolist()
     for cause in causes:
-        if cause >= 0:
-            verb = "stop for" if situation.approaches(owners[cause]) else "follow"
-            return f"{maneuver}{verb} {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
+        hypothesis = options.hypothesis_behind(cause, best)
         if cause <= WALL:
-            wall = chosen.walls[WALL - cause]
-            held = None if wall.owner is None else owners[wall.owner]
-            return f"{maneuver}{wall.reason}", situation.rows_of(held)
-    if proposal.share < 1.0 and owners:
-        return f"{maneuver}slow down for traffic ahead", ()
-    if proposal.share < 1.0:
-        return f"{maneuver}{chosen.walls[0].reason if chosen.walls else 'curve or end of route ahead'}", ()
-    if LIMIT in causes and causes[0] != FREE:
-        if situation.is_lowered_at(float(options.rolled.s[best, causes.index(LIMIT) + 1])):
-            lower = f"caution before a hidden {situation.hidden}" if situation.hidden else "lower speed limit ahead"
-            return f"{maneuver}{lower}", ()
-        return f"{maneuver}curve or end of route ahead", ()
-    return f"{maneuver}keep speed", ()
+            return chosen.walls[WALL - cause].reason, hypothesis
+        if hypothesis is not None:
+            owner = owners[hypothesis]
+            verb = "stop for" if situation.approaches(owner) else "follow"
+            return f"{verb} {situation.describe(owner)}", hypothesis
+    is_slower = chosen.proposal.share < 1.0
+    if is_slower and owners:
+        return "slow down for traffic ahead", None
+    if is_slower and chosen.walls:
+        return chosen.walls[0].reason, None
+    if not is_slower and causes[0] == FREE:
+        return "keep speed", None
+    if not is_slower and situation.is_lowered_at(float(options.rolled.s[best, 1])):
+        return f"caution before a hidden {situation.hidden}" if situation.hidden else "lower speed limit ahead", None
+    return "curve or end of route ahead", None
 
 
 def _threat(options: Options, emergency: int) -> int | None:
@@ -86,16 +92,8 @@ def _threat(options: Options, emergency: int) -> int | None:
     collides, else the one for which it brakes."""
     others = (index for index, option in enumerate(options.options) if not option.proposal.is_emergency)
     other = next(others, emergency)
-    threat = int(options.evaluation.cause[other])
-    if threat >= 0:
-        return threat
-    for cause in options.rolled.cause[other].tolist():
-        if cause >= 0:
-            return int(cause)
-        if cause <= WALL:
-            wall = options.options[other].walls[WALL - int(cause)]
-            return wall.owner
-    return None
+    causes = [int(options.evaluation.cause[other]), *options.rolled.cause[other].tolist()]
+    return options.hypothesis_behind(next((cause for cause in causes if cause not in (FREE, LIMIT)), FREE), other)
 
 
 OFF_PROFILE = 0.8
@@ -207,12 +205,11 @@ class Decider:
                 options = self._options(situation, scene, profiles, with_maneuvers=True)
             best = options.best()
         best = self._with_brake(options, self._kept(options, best, situation.now))
-        threat = -1
         if not bool(scene.certain.all()):
             is_hard = self._acceleration(options, best) < -settings.comfortable_deceleration - HARDER
             threat = options.uncertain_threat(best, scene.certain, is_hard=is_hard)
-        if threat >= 0:
-            return self._without_hard_braking(situation, scene, options, threat)
+            if threat is not None:
+                return self._without_hard_braking(situation, scene, options, threat)
         is_waiting = options.options[best].proposal.profile in options.waiting
         if not is_waiting and self._walking_pace.is_due(situation, options, best):
             slow = self._at_walking_pace(situation, profiles)
@@ -310,11 +307,9 @@ class Decider:
         with_maneuvers: bool = False,
     ) -> Options:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
-        more: list[LateralProfile] = []
         if with_maneuvers:
-            more = passing_profiles(situation, scene, has_begun=self._passes)
-        profiles = profiles + more
-        waiting, refused = set(), set()
+            profiles = profiles + passing_profiles(situation, scene, has_begun=self._passes)
+        waiting, refused = set[int](), set[int]()
         options: list[Option] = []
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
         here = (self._body.front, situation.s, situation.speed)
@@ -379,21 +374,20 @@ class Decider:
             self._settings,
             wanted=situation.wanted,
             kept=self._kept_names(situation),
-            waiting=frozenset(waiting),
-            refused=frozenset(refused),
+            waiting=waiting,
+            refused=refused,
             late=late,
         )
-        horizon = float(self._times[-1])
-        return Options(options, rolled, evaluation, horizon, frozenset(waiting), frozenset(refused))
+        return Options(options, rolled, evaluation, float(self._times[-1]), waiting, refused)
 
     def _motion(
         self,
         situation: Situation,
         scene: Surroundings,
         profile: LateralProfile,
-        time_gap: float | None = None,
+        time_gap: float,
     ) -> Motion:
-        """Return the motion along a profile at the wanted speed."""
+        """Return the motion along a profile at the wanted speed, with a time gap behind leaders [s]."""
         way = inside_way(scene, profile, self._body.half_width)
         crossing = conflicts(scene, way, situation.s)
         leads = leading(scene, way, crossing, situation.center, CRUISE)
@@ -401,8 +395,8 @@ class Decider:
         return Motion(rolled.s[0], rolled.speed[0])
 
     def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:
-        course = Course(situation.line.along, situation.limits, situation.wanted)
-        return self._roller.roll(options, course, situation.motion, (self._body.front, self._body.center), scene)
+        limits = SpeedLimits(situation.line.along, situation.limits, situation.wanted)
+        return self._roller.roll(options, limits, situation.motion, (self._body.front, self._body.center), scene)
 
     def _verified(
         self, situation: Situation, scene: Surroundings, profile: LateralProfile
@@ -411,13 +405,12 @@ class Decider:
 
         A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
         """
-        motion = self._motion(situation, scene, profile)
+        motion = self._motion(situation, scene, profile, self._settings.time_gap)
         beside = situation.lanes_ahead
-        outlook = Outlook(situation.line, scene, beside)
+        outlook = Outlook(situation.line, scene, beside, situation.now)
         is_current = self._current is not None and self._current.name == profile.name
         has_begun = self._passes and is_current
-        now = situation.now
-        verdict = self._oncoming.verify(profile, motion, outlook, now, is_current=is_current, has_begun=has_begun)
+        verdict = self._oncoming.verify(profile, motion, outlook, is_current=is_current, has_begun=has_begun)
         waits_at = self._oncoming.waiting_place(profile, situation.s)
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene):
             verdict = Verdict.WAIT
@@ -436,10 +429,10 @@ class Decider:
             waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene):
                 is_last_place = math.isinf(profile.waits_at)
-                is_free = self._oncoming.yields(outlook, viewpoint, now, is_last_place=is_last_place)
+                is_free = self._oncoming.yields(outlook, viewpoint, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:
-            if self._oncoming.yields(outlook, viewpoint, now, is_last_place=False):
+            if self._oncoming.yields(outlook, viewpoint, is_last_place=False):
                 return profile, Verdict.GO, waits_at
             lateral = self._settings.lateral_acceleration
             edge = towards(profile.name, profile.edge, situation.start, lateral, profile.side)
@@ -471,10 +464,9 @@ class Decider:
 
     def _is_held_up(self, situation: Situation, options: Options, best: int) -> bool:
         """Return whether the best proposal makes too little progress because of objects."""
-        if math.isfinite(options.evaluation.collision[best]):
+        if options.collides(best):
             return True
-        way = float(options.rolled.s[best, -1] - options.rolled.s[best, 0])
-        return way < SATISFIED * situation.free_progress(float(self._times[-1]))
+        return options.progress(best) < SATISFIED * situation.free_progress(options.horizon)
 
     def _kept(self, options: Options, best: int, now: float) -> int:
         """Return the best proposal; that of the current maneuver during its dwell time, unless it is risky.
@@ -483,20 +475,18 @@ class Decider:
         """
         if self._current is None:
             return best
-        name, wanted = self._current.name, options.name_of(best)
+        name, wanted = self._current.name, options.options[best].profile.name
         if wanted == name:
             self._challenger = (name, math.inf)
             return best
         if self._challenger[0] != wanted or math.isinf(self._challenger[1]):
             self._challenger = (wanted, now)
         is_due = now - self._switched >= DWELL and now - self._challenger[1] >= PERSISTENT - TIME_TOLERANCE
-        if is_due:
-            return best
-        if all(option.profile.name != name for option in options.options):
+        if is_due or all(option.profile.name != name for option in options.options):
             return best
         kept = options.best(name=name)
-        is_risky = math.isfinite(options.evaluation.collision[kept])
-        return best if is_risky or options.options[kept].proposal.profile in options.refused else kept
+        is_refused = options.options[kept].proposal.profile in options.refused
+        return best if is_refused or options.collides(kept) else kept
 
     def _decision(self, situation: Situation, options: Options, best: int) -> Decision:
         proposal, profile = options.options[best].proposal, options.options[best].profile

@@ -150,14 +150,14 @@ class TimeGap:
     def __init__(self, settings: BehaviorSettings) -> None:
         self._usual = settings.time_gap
         self._period = settings.period
-        self.value: float | None = None
-        """Time gap [s]; None: that of the settings."""
+        self.value = settings.time_gap
+        """Time gap [s]."""
 
     def update(self, scene: Surroundings, position: tuple[float, float], body: Body, *, merges: bool) -> None:
         """Set the time gap of one decision; `position` are s and d of the vehicle [m]."""
         if merges:
             self.value = min(MERGING_TIME_GAP, self._usual)
-        if self.value is None:
+        if self.value == self._usual:
             return
         s, d = position
         lane = [
@@ -172,4 +172,4 @@ class TimeGap:
             self.value = min(LEAST_TIME_GAP, self._usual)
         self.value += (self._usual - self.value) * self._period / RELAXATION
         if self._usual - self.value < NEARLY:
-            self.value = None
+            self.value = self._usual

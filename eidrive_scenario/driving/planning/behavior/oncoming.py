@@ -95,11 +95,12 @@ class Motion(NamedTuple):
 
 
 class Outlook(NamedTuple):
-    """View of a vehicle: its line, the objects, and the lanes beside the line."""
+    """View of a vehicle at a time `now` [s]: its line, the objects, and the lanes beside the line."""
 
     line: ReferenceLine
     scene: Surroundings
     beside: LanesBeside
+    now: float
 
 
 class OncomingTraffic:
@@ -190,10 +191,9 @@ class OncomingTraffic:
 
         viewpoint  distance along the line and offset of the vehicle [m];  step  index of the time
         """
-        line, scene, beside = outlook
+        line, scene, oncoming = outlook.line, outlook.scene, outlook.beside.oncoming
         s, d = viewpoint
         places = s + self._ahead
-        oncoming = beside.oncoming
         # Traffic behind an oncoming vehicle is not faster than that, and an object in the lane slows traffic down: they
         # hide none that counts.
         beside_lane = np.abs(scene.d[:, step] - oncoming) - scene.half_width[:, step] >= NARROW
@@ -216,19 +216,17 @@ class OncomingTraffic:
         profile: LateralProfile,
         motion: Motion,
         outlook: Outlook,
-        now: float,
         *,
         is_current: bool,
         has_begun: bool = False,
     ) -> Verdict:
         """Return whether the vehicle may follow a profile that uses the oncoming lane.
 
-        now         current time [s]
         is_current  whether it follows the profile already; then it needs no reserve
         has_begun   whether it does so to pass, instead of waiting on it
         """
-        _, scene, beside = outlook
-        if math.isnan(beside.oncoming):
+        scene = outlook.scene
+        if math.isnan(outlook.beside.oncoming):
             return Verdict.GO
         body, side, times, border = self._body, profile.side, self._times, profile.border
         offsets = side * np.maximum(side * profile.offset(motion.s + body.wheelbase), side * profile.offset(motion.s))
@@ -262,27 +260,27 @@ class OncomingTraffic:
         viewpoints = motion.s + body.center
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
-        free = self._free(outlook, here, until, end, now)
-        if self._suffices(free, here[0], until, end, beside, now):
+        free = self._free(outlook, here, until, end)
+        if self._suffices(free, here[0], until, end, outlook):
             return Verdict.GO
         step = max(last, 0)
         there = (float(viewpoints[step]), float(beside_line[step]))
         hidden = self.first_hidden(outlook, there, step)
-        if not self._suffices(hidden, there[0], until - float(times[step]), end, beside, now):
+        if not self._suffices(hidden, there[0], until - float(times[step]), end, outlook):
             return refused
         # Until then the vehicle may have to return to its lane for traffic that comes into view on its way out.
         free_to, since, observer = free, 0.0, here[0]
         for number in range(first, step + 1 if step > first else first):
             time, s = float(times[number]), float(viewpoints[number])
             returned = time + float(duration[number]) - since
-            if not self._suffices(free_to, observer, returned, s + body.half_length, beside, now):
+            if not self._suffices(free_to, observer, returned, s + body.half_length, outlook):
                 return refused
             hidden = self.first_hidden(outlook, (s, float(beside_line[number])), number)
-            free_to = max(hidden, free_to - self.hidden_speed(beside, now) * (time - since))
+            free_to = max(hidden, free_to - self.hidden_speed(outlook.beside, outlook.now) * (time - since))
             since, observer = time, s
         return Verdict.GO
 
-    def yields(self, outlook: Outlook, viewpoint: tuple[float, float], now: float, *, is_last_place: bool) -> bool:
+    def yields(self, outlook: Outlook, viewpoint: tuple[float, float], *, is_last_place: bool) -> bool:
         """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
         stop before it.
 
@@ -290,23 +288,22 @@ class OncomingTraffic:
         """
         hidden = self.first_hidden(outlook, viewpoint)
         front = viewpoint[0] + self._body.half_length
-        has_waited_long = self._is_patient(now, LONG)
+        has_waited_long = self._is_patient(outlook.now, LONG)
         way = approach(self._usual, math.inf)
         if has_waited_long:
             way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
-        is_patient = has_waited_long or (is_last_place and self._is_patient(now))
-        waits_in_vain = is_last_place and self._is_patient(now, LONGEST)
+        is_patient = has_waited_long or (is_last_place and self._is_patient(outlook.now))
+        waits_in_vain = is_last_place and self._is_patient(outlook.now, LONGEST)
         self._others_yield = waits_in_vain or (is_patient and hidden - way >= front)
         return self._others_yield
 
-    def _suffices(
-        self, hidden: float, viewpoint: float, duration: float, end: float, beside: LanesBeside, now: float
-    ) -> bool:
+    def _suffices(self, hidden: float, viewpoint: float, duration: float, end: float, outlook: Outlook) -> bool:
         """Return whether traffic from a hidden place does not come to `end` in a time [s]."""
-        if self._is_over(hidden, viewpoint, duration, end, now):
+        if self._is_over(hidden, viewpoint, duration, end, outlook.now):
             return hidden >= end
-        speed = self.hidden_speed(beside, now)
-        return hidden - (speed * duration if self._is_patient(now) else approach(speed, duration)) >= end
+        speed = self.hidden_speed(outlook.beside, outlook.now)
+        way = speed * duration if self._is_patient(outlook.now) else approach(speed, duration)
+        return hidden - way >= end
 
     def _is_over(self, hidden: float, viewpoint: float, duration: float, end: float, now: float) -> bool:
         """Return whether no more traffic is expected from beyond the range of the sensors at `viewpoint`, where nothing
@@ -321,12 +318,13 @@ class OncomingTraffic:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""
         return hidden >= viewpoint + float(self._ahead[-1]) - SAMPLE
 
-    def _free(self, outlook: Outlook, viewpoint: tuple[float, float], duration: float, end: float, now: float) -> float:
+    def _free(self, outlook: Outlook, viewpoint: tuple[float, float], duration: float, end: float) -> float:
         """Return the place up to which the oncoming lane is free of unseen traffic [m].
 
         What was in view stays free until traffic can have come there. Where none is expected from beyond the range of
         the sensors, none is expected until some comes into view.
         """
+        now = outlook.now
         still_free = self._free_to - self.hidden_speed(outlook.beside, now) * (now - self._free_at)
         hidden = self.first_hidden(outlook, viewpoint)
         if self._is_over(hidden, viewpoint[0], duration, end, now) and hidden >= end:

@@ -299,6 +299,7 @@ class Option(msgspec.Struct, frozen=True):
     way    where the hypotheses are in the way (N, K) of a vehicle that follows the profile
     walls  places before which it waits
     leads  where the hypotheses lead it (N, K); options may share an array
+    time_gap  behind leaders [s]
     """
 
     proposal: Proposal
@@ -306,8 +307,7 @@ class Option(msgspec.Struct, frozen=True):
     way: Bools
     walls: Sequence[Wall]
     leads: Bools
-    time_gap: float | None = None
-    """Time gap behind leaders [s]; None: that of the settings."""
+    time_gap: float
 
 
 class Conflict(msgspec.Struct, frozen=True):

@@ -27,16 +27,15 @@ WallsOverTime = list[list[tuple[int, float]]]
 """Causes and places of the walls at each time [m]."""
 
 
-class Course(msgspec.Struct, frozen=True):
-    """Limits of the motion along the line: speed limits (M,) [m/s] at distances along it (M,) [m]."""
+class SpeedLimits(msgspec.Struct, frozen=True):
+    """Speed limits (M,) [m/s] at distances along the line (M,) [m], and the wanted speed [m/s]."""
 
     along: Array
-    limits: Array
+    values: Array
     wanted: float
-    """Wanted speed [m/s]."""
 
 
-class Limits:
+class LimitsAhead:
     """Speed limits within reach of a vehicle, interpolated between the points of the line."""
 
     def __init__(self, along: Array, limits: Array) -> None:
@@ -46,12 +45,12 @@ class Limits:
         self._slopes: list[float] = [0.0, *(np.diff(limits) / np.diff(along)).tolist(), 0.0]
 
     @classmethod
-    def ahead(cls, course: Course, s: float, reach: float) -> Limits | None:
+    def of(cls, limits: SpeedLimits, s: float, reach: float) -> LimitsAhead | None:
         """Return the limits from s to s + reach [m]; None if none is below the wanted speed."""
-        first = max(int(course.along.searchsorted(s, side="right")) - 1, 0)
-        last = int(course.along.searchsorted(s + reach)) + 1
-        limits = course.limits[first:last]
-        return cls(course.along[first:last], limits) if float(limits.min()) < course.wanted else None
+        first = max(int(limits.along.searchsorted(s, side="right")) - 1, 0)
+        last = int(limits.along.searchsorted(s + reach)) + 1
+        part = limits.values[first:last]
+        return cls(limits.along[first:last], part) if float(part.min()) < limits.wanted else None
 
     def at(self, s: float) -> float:
         """Return the limit at a distance along the line [m/s]."""
@@ -72,7 +71,7 @@ class Bounds:
     wanted  wanted speed [m/s];  gain  twice the deceleration before a wall [m/s²]
     """
 
-    def __init__(self, wanted: float, limits: Limits | None, walls: WallsOverTime, gain: float) -> None:
+    def __init__(self, wanted: float, limits: LimitsAhead | None, walls: WallsOverTime, gain: float) -> None:
         self.wanted = wanted
         self.are_free = wanted <= 0.0 or (limits is None and not walls)
         """Whether the wanted speed is the only bound."""
@@ -153,7 +152,7 @@ class Roller:
     def roll(
         self,
         options: Sequence[Option],
-        course: Course,
+        limits: SpeedLimits,
         start: tuple[float, float],
         body: tuple[float, float],
         scene: Surroundings,
@@ -163,18 +162,17 @@ class Roller:
         start  distance along the line [m] and speed [m/s]
         body   distances of the front and the center of the vehicle from the reference point [m]
         """
-        reach = (max(course.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
-        limits = Limits.ahead(course, start[0], reach)
+        reach = (max(limits.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
+        ahead = LimitsAhead.of(limits, start[0], reach)
         leaders = _Leaders(scene, body)
         motion_of: dict[object, _Motion] = {}
         stops: dict[object, WallsOverTime] = {}
         motions = []
         for option in options:
             proposal = option.proposal
-            number, ahead = leaders.of(option.leads)
+            number, leading = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
-            time_gap = self._driver.time_gap if option.time_gap is None else option.time_gap
-            passes = limits is None and not option.profile.overtakes and option.profile.uses_oncoming
+            passes = ahead is None and not option.profile.overtakes and option.profile.uses_oncoming
             driver = self._brisk_driver if passes else self._driver
             key = (
                 driver.acceleration,
@@ -183,13 +181,13 @@ class Roller:
                 proposal.is_emergency,
                 number,
                 ends,
-                time_gap,
+                option.time_gap,
             )
             if key not in motion_of:
                 if ends not in stops:
                     stops[ends] = walls_over_time(option.walls, self._times)
-                bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
-                motion_of[key] = self._motion(proposal, driver, bounds, start, ahead, time_gap)
+                bounds = Bounds(proposal.share * limits.wanted, ahead, stops[ends], 2.0 * self._braking)
+                motion_of[key] = self._motion(proposal, driver, bounds, start, leading, option.time_gap)
             motions.append(motion_of[key])
         s, speed, cause = zip(*motions, strict=True)
         return Rollout(np.array(s), np.array(speed), np.array(cause))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from itertools import groupby
 
 import msgspec
@@ -87,8 +87,8 @@ def evaluate(
     *,
     wanted: float,
     kept: frozenset[str],
-    waiting: frozenset[int] = frozenset(),
-    refused: frozenset[int] = frozenset(),
+    waiting: Set[int] = frozenset(),
+    refused: Set[int] = frozenset(),
     late: Array | None = None,
 ) -> Evaluation:
     """Return the evaluation of all options, which are in the order of their profiles.
@@ -270,9 +270,9 @@ class Options(msgspec.Struct, frozen=True):
     evaluation: Evaluation
     horizon: float
     """Time for which the options are rolled out [s]."""
-    waiting: frozenset[int] = frozenset()
+    waiting: Set[int] = frozenset()
     """Profiles that end before an oncoming lane, for a view into it."""
-    refused: frozenset[int] = frozenset()
+    refused: Set[int] = frozenset()
     """Profiles that use an oncoming lane that is not free."""
 
     @property
@@ -285,9 +285,19 @@ class Options(msgspec.Struct, frozen=True):
         """Indices of emergency braking on the current course, by deceleration."""
         return [index for index, option in enumerate(self.options) if option.proposal.is_emergency]
 
-    def name_of(self, index: int) -> str:
-        """Return the maneuver of an option."""
-        return self.options[index].profile.name
+    def collides(self, index: int) -> bool:
+        """Return whether an option collides within the horizon."""
+        return math.isfinite(self.evaluation.collision[index])
+
+    def progress(self, index: int) -> float:
+        """Return the distance that an option covers within the horizon [m]."""
+        return float(self.rolled.s[index, -1] - self.rolled.s[index, 0])
+
+    def hypothesis_behind(self, cause: int, index: int) -> int | None:
+        """Return the hypothesis that is a cause of the motion of an option, itself or by a wall; None without one."""
+        if cause <= WALL:
+            return self.options[index].walls[WALL - cause].owner
+        return cause if cause >= 0 else None
 
     def best(self, profiles: int | None = None, name: str | None = None) -> int:
         """Return the index of the option with the highest score, among those along the first `profiles` or of one
@@ -306,20 +316,15 @@ class Options(msgspec.Struct, frozen=True):
         is_urgent = collision < URGENT or risk > 1.0 - FARTHER * URGENT / self.horizon
         return brake if is_urgent and with_brake > score[best] else best
 
-    def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int:
-        """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard; -1 without one.
+    def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int | None:
+        """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard, if there is one.
 
         certain  (N,) whether the existence of each hypothesis is certain
         is_hard  whether the proposal brakes hard; a collision soon counts as well
         """
         if not (is_hard or float(self.evaluation.collision[best]) < URGENT):
-            return -1
+            return None
         causes = [self.evaluation.cause[best], self.evaluation.cause[self.gentle], *self.rolled.cause[best]]
-        for cause in causes:
-            hypothesis = int(cause)
-            if hypothesis <= WALL:
-                owner = self.options[best].walls[WALL - hypothesis].owner
-                hypothesis = -1 if owner is None else owner
-            if hypothesis >= 0 and not certain[hypothesis]:
-                return hypothesis
-        return -1
+        hypotheses = (self.hypothesis_behind(int(cause), best) for cause in causes)
+        existing = (hypothesis for hypothesis in hypotheses if hypothesis is not None)
+        return next((hypothesis for hypothesis in existing if not certain[hypothesis]), None)

@@ -58,8 +58,7 @@ class WalkingPace:
 
     def moves_safely(self, situation: Situation, options: Options, best: int) -> bool:
         """Return whether a proposal moves the vehicle without a collision; else it waits for the next attempt."""
-        way = float(options.rolled.s[best, -1] - options.rolled.s[best, 0])
-        self._drives = way > MOVES and not math.isfinite(options.evaluation.collision[best])
+        self._drives = options.progress(best) > MOVES and not options.collides(best)
         self._tried = situation.now
         return self._drives
 

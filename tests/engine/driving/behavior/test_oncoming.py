@@ -73,18 +73,18 @@ def verdict(
     """
     motion = Motion(s + 10.0 * TIMES, np.full(len(TIMES), 10.0))
     there = scene(*(objects or ((40.0, 0.0, 0.0),)))
-    outlook = Outlook(LINE, there, BESIDE)
-    return traffic(view).verify(PASSING, motion, outlook, now, is_current=current, has_begun=begun)
+    outlook = Outlook(LINE, there, BESIDE, now)
+    return traffic(view).verify(PASSING, motion, outlook, is_current=current, has_begun=begun)
 
 
 def test_free_view_ends_at_its_range() -> None:
-    assert traffic(100.0).first_hidden(Outlook(LINE, scene(), BESIDE), (0.0, 0.0)) == pytest.approx(100.0, abs=4.0)
+    assert traffic(100.0).first_hidden(Outlook(LINE, scene(), BESIDE, 0.0), (0.0, 0.0)) == pytest.approx(100.0, abs=4.0)
 
 
 @pytest.mark.parametrize("gap", [10.0, 20.0])
 def test_truck_ahead_hides_the_lane_beyond_the_line_of_sight(gap: float) -> None:
     # The line of sight over the rear left corner, at (gap, 1.0), reaches the center of the next lane at 3.5 gap.
-    hidden = traffic(100.0).first_hidden(Outlook(LINE, scene((gap + 2.5, 0.0, 0.0)), BESIDE), (0.0, 0.0))
+    hidden = traffic(100.0).first_hidden(Outlook(LINE, scene((gap + 2.5, 0.0, 0.0)), BESIDE, 0.0), (0.0, 0.0))
     assert hidden == pytest.approx(3.5 * gap, abs=2.0)
 
 
@@ -93,7 +93,7 @@ def test_crest_hides_the_lane_beyond_it() -> None:
     falls by (1.5 - 2) / 40, and is 1 m above the road beyond where (100 + x): 5 - 0.05 x + 1 = 5 + 0.0125 x."""
     line = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [400.0, 0.0]]), ends=False), None)
     line.__dict__["heights"] = 0.05 * (100.0 - np.abs(line.along - 100.0))
-    hidden = traffic(200.0).first_hidden(Outlook(line, scene(), BESIDE), (60.0, 0.0))
+    hidden = traffic(200.0).first_hidden(Outlook(line, scene(), BESIDE, 0.0), (60.0, 0.0))
     assert hidden == pytest.approx(100.0 + 1.0 / 0.0625, abs=2.0)
 
 
@@ -184,8 +184,8 @@ def test_vehicle_past_the_point_of_no_return_goes_on() -> None:
 
 def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
     motion = Motion(10.0 * TIMES, np.full(len(TIMES), 10.0))
-    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), LanesBeside())
-    assert traffic(10.0).verify(PASSING, motion, outlook, 0.0, is_current=False) is Verdict.GO
+    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), LanesBeside(), 0.0)
+    assert traffic(10.0).verify(PASSING, motion, outlook, is_current=False) is Verdict.GO
 
 
 def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
@@ -208,6 +208,6 @@ def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
 def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bool) -> None:
     """A truck 2.4 m ahead hides the lane near it; traffic at 10 m/s needs 10 + 100 / 12 m to stop."""
     waiting = traffic(100.0)
-    outlook = Outlook(LINE, scene((6.3 + 2.5, 0.0, 0.0)), BESIDE)
+    there = scene((6.3 + 2.5, 0.0, 0.0))
     for now, expected in ((13.0, False), (23.9, False), (24.0, is_last_place)):
-        assert waiting.yields(outlook, (1.4, 0.0), now, is_last_place=is_last_place) is expected
+        assert waiting.yields(Outlook(LINE, there, BESIDE, now), (1.4, 0.0), is_last_place=is_last_place) is expected

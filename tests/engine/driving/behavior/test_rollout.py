@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Option, Proposal, Wall, speed_limits
-from eidrive_scenario.driving.planning.behavior.rollout import Course, Limits, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import LimitsAhead, Roller, Rollout, SpeedLimits
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -33,10 +33,10 @@ def leader(gap: float, speed: float) -> Surroundings:
 def roll(
     proposal: Proposal, speed: float, scene: Surroundings, walls: list[Wall] | None = None, wanted: float = 15.0
 ) -> Rollout:
-    course = Course(ALONG, np.full(len(ALONG), 50.0), wanted)
+    limits = SpeedLimits(ALONG, np.full(len(ALONG), 50.0), wanted)
     leads = np.ones((len(scene), len(TIMES)), dtype=bool)
-    option = Option(proposal, LateralProfile("route", (0.0,), (0.0,)), leads, walls or [], leads)
-    return Roller(SETTINGS, TIMES, 4.5).roll([option], course, (0.0, speed), (FRONT, CENTER), scene)
+    option = Option(proposal, LateralProfile("route", (0.0,), (0.0,)), leads, walls or [], leads, SETTINGS.time_gap)
+    return Roller(SETTINGS, TIMES, 4.5).roll([option], limits, (0.0, speed), (FRONT, CENTER), scene)
 
 
 FREE = Proposal(0, 1.0, "all", SETTINGS.hard_deceleration)
@@ -91,11 +91,11 @@ def test_first_step_follows_the_leader_that_demands_the_hardest_braking(order: t
 
 def test_limits_are_interpolated_and_only_those_within_reach_count() -> None:
     along, values = np.array([0.0, 10.0, 30.0, 90.0]), np.array([20.0, 8.0, 12.0, 3.0])
-    limits = Limits.ahead(Course(along, values, 15.0), 5.0, 40.0)
+    limits = LimitsAhead.of(SpeedLimits(along, values, 15.0), 5.0, 40.0)
     places = [-1.0, 0.0, 4.0, 10.0, 25.0, 45.0, 90.0, 95.0]
     assert limits is not None
     assert [limits.at(s) for s in places] == pytest.approx(np.interp(places, along, values).tolist())
-    assert Limits.ahead(Course(along, values, 7.0), 5.0, 20.0) is None
+    assert LimitsAhead.of(SpeedLimits(along, values, 7.0), 5.0, 20.0) is None
 
 
 def test_free_vehicle_accelerates_to_the_wanted_speed() -> None:
@@ -134,10 +134,10 @@ def test_vehicle_accelerates_harder_past_standing_objects_in_the_oncoming_lane(
     settings, 2.4 m/s², the limit of comfort of nuPlan, or what the vehicle can: a car, a fire engine, a cyclist."""
     passing = LateralProfile("pass", (0.0, 20.0, 60.0, 80.0), (0.0, 3.0, 3.0, 0.0), side=1, border=0.8)
     route = LateralProfile("route", (0.0,), (0.0,))
-    course = Course(ALONG, np.full(len(ALONG), 50.0), 15.0)
+    limits = SpeedLimits(ALONG, np.full(len(ALONG), 50.0), 15.0)
     nobody = np.zeros((1, len(TIMES)), dtype=bool)
     roller = Roller(SETTINGS, TIMES, max_acceleration)
     for profile, expected in ((passing, past), (route, usual)):
-        option = Option(FREE, profile, nobody, [], nobody)
-        rolled = roller.roll([option], course, (0.0, 0.0), (FRONT, CENTER), leader(900.0, 15.0))
+        option = Option(FREE, profile, nobody, [], nobody, SETTINGS.time_gap)
+        rolled = roller.roll([option], limits, (0.0, 0.0), (FRONT, CENTER), leader(900.0, 15.0))
         assert rolled.speed[0, 8] == pytest.approx(2.0 * expected, rel=0.02)
