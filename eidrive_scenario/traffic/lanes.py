@@ -38,8 +38,7 @@ class TrafficLanes:
         section = tables.lane_section
         self.road = tables.section_road[section]
         self.length = tables.section_length[section]
-        self.row_of = dict(tables.lane_keys())
-        self.keys = list(self.row_of)
+        self.keys, self.row_of = tables.lane_keys, tables.row_of
         self.direction = np.array([roads.driving_direction(key.road, key.lane) for key in self.keys], dtype=np.int64)
         start = tables.section_start[section]
         self._origin = np.where(self.direction > 0, start, start + self.length)
@@ -71,7 +70,7 @@ class TrafficLanes:
                 other
                 for way, edge in ways
                 if edge["kind"] == "successor"
-                and (drivable[lane], self.walkable[lane]) == (drivable[other := self.row_of[way]], self.walkable[other])
+                and (drivable[lane], self.walkable[lane]) == (drivable[other := self.row_of(way)], self.walkable[other])
             ]
             self.following.append(successors)
             if successors:
@@ -86,7 +85,7 @@ class TrafficLanes:
                 continue
             for section in road.sections:
                 numbers = [number for number in section.lanes if number]
-                neighbors = [self.row_of[LaneKey(road.id, section.index, number)] for number in numbers]
+                neighbors = [self.row_of(LaneKey(road.id, section.index, number)) for number in numbers]
                 for left, right in pairwise(neighbors):
                     same = self.direction[left] == self.direction[right]
                     if not (same and self.tables.lane_drivable[left] and self.tables.lane_drivable[right]):

@@ -60,7 +60,7 @@ class StopLines:
         if road is None:
             return []
         section = road.section_at(place.s).index
-        signal_lanes = [lanes.row_of[LaneKey(road.id, section, number)] for number in lanes.roads.signal_lanes(place)]
+        signal_lanes = [lanes.row_of(LaneKey(road.id, section, number)) for number in lanes.roads.signal_lanes(place)]
         if road.junction_id is not None:
             return [(lane, 0.0) for lane in signal_lanes]
         return [(lane, float(lanes.progress(np.array(lane), np.array(place.s)))) for lane in signal_lanes]

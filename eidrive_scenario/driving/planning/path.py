@@ -210,7 +210,7 @@ def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
         return location
     height = None if roads.is_level else np.array([z])
     lanes, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
-    keys = [key for key, _ in roads.tables.lane_keys()]
+    keys = roads.tables.lane_keys
     candidates = [
         roads.location(keys[lane].road, keys[lane].lane, s)
         for lane, s in zip(lanes.tolist(), along.tolist(), strict=True)

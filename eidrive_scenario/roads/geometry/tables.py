@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -111,8 +111,17 @@ class RoadTables:
         return self._rows[key]
 
     @cached_property
+    def lane_keys(self) -> list[LaneKey]:
+        """All lanes, by their running numbers."""
+        keys = []
+        for section, lane in zip(self.lane_section.tolist(), self.lane_id.tolist(), strict=True):
+            road = int(self.section_road[section])
+            keys.append(LaneKey(self.ids[road], section - int(self.first_section[road]), lane))
+        return keys
+
+    @cached_property
     def _rows(self) -> dict[LaneKey, int]:
-        return dict(self.lane_keys())
+        return {key: row for row, key in enumerate(self.lane_keys)}
 
     def check(self, road: Integers, s: Array) -> None:
         """Raise PositionError for the first position beyond the ends of its road."""
@@ -198,12 +207,6 @@ class RoadTables:
         road = self.section_road[self.lane_section[row]]
         curvature, speed = self.curves.bend(road, s)
         return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
-
-    def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
-        """Yield all lanes with their running numbers."""
-        for row, (section, lane) in enumerate(zip(self.lane_section.tolist(), self.lane_id.tolist(), strict=True)):
-            road = int(self.section_road[section])
-            yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
         """Return t of the center lines of lanes and its derivative, as `poses.lane_t` and `Road.lane_offset_in`."""

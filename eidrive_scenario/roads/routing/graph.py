@@ -85,7 +85,7 @@ class LaneWays:
 
 def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
     """Return the lanes of a road network and the edges between them."""
-    rows = {key: row for key, row in tables.lane_keys() if key.lane}
+    rows = {key: row for row, key in enumerate(tables.lane_keys) if key.lane}
     directions = {key: tables.by_id[key.road].directions[key.lane] for key in rows}
     nodes = _measure(rows, tables, directions)
     successors: dict[LaneKey, dict[LaneKey, dict[str, Any]]] = {key: {} for key in nodes}

@@ -39,7 +39,7 @@ def test_overlapped_lanes_of_points_on_a_crossing(library: Path, name: str) -> N
             points.append((pose.x, pose.y))
     x, y = np.array(points).T
     row, s, point = network.overlapped_lanes(x, y)
-    keys = dict(zip(range(len(network.tables.lane_id)), (key for key, _ in network.tables.lane_keys()), strict=True))
+    keys = network.tables.lane_keys
     several = 0
     for n in range(len(points)):
         mine = {(keys[int(r)].road, keys[int(r)].lane) for r in row[point == n]}

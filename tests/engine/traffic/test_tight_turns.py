@@ -36,7 +36,7 @@ def test_tight_turn_conflicts_with_the_lane_beside_its_exit(radius: float, confl
     """
     lanes = turn_beside_a_lane(radius)
     crossings = Crossings(lanes)
-    straight, turn = (lanes.row_of[LaneKey(road, 0, -1)] for road in ("1", "2"))
+    straight, turn = (lanes.row_of(LaneKey(road, 0, -1)) for road in ("1", "2"))
     assert (turn in crossings.meeting(straight)) is conflict
     assert (straight in crossings.meeting(turn)) is conflict
 
@@ -49,6 +49,6 @@ def test_bus_sweeps_over_the_lane_beside_the_exit_of_its_turn(category: str, rad
     outside of the path of the axle at a radius of 12 m and 1.5 m at 60 m; the lane beside begins at 1.75 m.
     """
     lanes = turn_beside_a_lane(radius)
-    straight, turn = (lanes.row_of[LaneKey(road, 0, -1)] for road in ("1", "2"))
+    straight, turn = (lanes.row_of(LaneKey(road, 0, -1)) for road in ("1", "2"))
     spec, _ = library_bodies(category)[0]
     assert (straight in Sweeps(lanes).of(spec, [turn])) is swept

@@ -54,9 +54,8 @@ class JunctionRules:
     def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads
         self._lines = stop_lines(roads, with_give_way=True)
-        keys = [key for key, _ in roads.tables.lane_keys()]
-        self._road = [key.road for key in keys]
-        self._junction = [roads.road(key.road).junction_id for key in keys]
+        self._road = [key.road for key in roads.tables.lane_keys]
+        self._junction = [roads.road(road).junction_id for road in self._road]
         self._priorities: Mapping[str, frozenset[tuple[str, str]]] = {
             junction.id: frozenset(junction.priorities) for junction in roads.junctions.values() if junction.priorities
         }
@@ -294,13 +293,12 @@ class LaneCourses:
         self._roads = roads
         self._rules = rules
         self._courses: dict[int, tuple[Course, ...]] = {}
-        self._keys = [key for key, _ in roads.tables.lane_keys()]
 
     def ahead(self, lane: int) -> tuple[Course, ...]:
         """Return the likely courses from the start of a lane (running number), in its driving direction."""
         courses = self._courses.get(lane)
         if courses is None:
-            chains = self._chains([self._keys[lane]], 0.0)[:MOST]
+            chains = self._chains([self._roads.tables.lane_keys[lane]], 0.0)[:MOST]
             courses = tuple(course for chain in chains if (course := self.course_of(chain)) is not None)
             self._courses[lane] = courses
         return courses

@@ -69,7 +69,7 @@ def check(plan: Plan, count: int) -> None:
 def test_plans_are_finite_and_their_objects_exist(seed: int) -> None:
     rng = np.random.default_rng(seed)
     roads = RoadNetwork.load(ROADS[seed % len(ROADS)])
-    lanes = [key for key, row in roads.tables.lane_keys() if roads.tables.lane_drivable[row]]
+    lanes = [key for row, key in enumerate(roads.tables.lane_keys) if roads.tables.lane_drivable[row]]
     for _ in range(2):
         key = lanes[int(rng.integers(len(lanes)))]
         section = roads.road(key.road).sections[key.section]
