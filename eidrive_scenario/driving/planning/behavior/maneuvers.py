@@ -39,7 +39,8 @@ from eidrive_scenario.driving.planning.behavior.surroundings import Present, Sur
 class Situation(msgspec.Struct, frozen=True):
     """Vehicle with its settings and body, its position and speed on its line, wanted speed, and the known objects.
 
-    limits  speed limits (M,) at the points of the line [m/s];  s, d  of the reference point [m]
+    limits  speed limits (M,) at the points of the line [m/s];  curve_limits  those by curves and the end of the route
+    s, d    of the reference point [m]
     steered  s and d of the front axle, which the controller keeps on the trajectory [m], and the slope of its motion
     window  range of the points that matter
     stop    place at which a signal requires a stop, or None
@@ -50,6 +51,7 @@ class Situation(msgspec.Struct, frozen=True):
     body: Body
     line: ReferenceLine
     limits: Array
+    curve_limits: Array
     s: float
     d: float
     steered: tuple[float, float, float]
@@ -63,8 +65,6 @@ class Situation(msgspec.Struct, frozen=True):
     gives_way: Callable[[Passage], bool] | None = None
     hidden: str = ""
     """Kind of the nearest way ahead that no sensor shows and that limits the speed; empty without one."""
-    road_limits: Array | None = None
-    """Speed limits (M,) by curves and the end of the route only [m/s]; None if `limits` has no others."""
     change: LaneChange | None = None
     """Next lane change that the route requires."""
     junction: float = math.inf
@@ -132,10 +132,8 @@ class Situation(msgspec.Struct, frozen=True):
     def is_lowered_at(self, s: float) -> bool:
         """Return whether hidden ways or speed limits of the road limit the speed at a distance along the line more than
         curves and the end of the route."""
-        if self.road_limits is None:
-            return False
-        limit, by_road = (float(np.interp(s, self.line.along, limits)) for limits in (self.limits, self.road_limits))
-        return limit < by_road
+        limit, by_curves = (np.interp(s, self.line.along, limits) for limits in (self.limits, self.curve_limits))
+        return bool(limit < by_curves)
 
     def rows_of(self, owner: int | None) -> tuple[int, ...]:
         """Return the row of an object among the fused objects; none if it is lost."""
@@ -412,7 +410,7 @@ def _blocker(situation: Situation, scene: Surroundings) -> Present | None:
         hypothesis
         for hypothesis in scene.present
         if hypothesis.s > situation.center
-        and -0.5 < hypothesis.speed < slower
+        and -ONCOMING_SPEED < hypothesis.speed < slower
         and not hypothesis.crosses
         and _is_in_way(situation, hypothesis)
         and _is_passable(situation, hypothesis)
@@ -481,7 +479,7 @@ def _obstacle(situation: Situation, scene: Surroundings, blocker: Present) -> _O
     ends = [hypothesis.front for hypothesis in objects]
     speed = [max(hypothesis.speed, 0.0) for hypothesis in objects]
     fastest, slowest = max(speed), min(speed)
-    if fastest > 0.5:
+    if fastest > ONCOMING_SPEED:
         if wanted - fastest < SLOWER or not all(_is_steady(situation, hypothesis) for hypothesis in objects):
             return None
         gain = situation.settings.acceleration * MEAN_SHARE

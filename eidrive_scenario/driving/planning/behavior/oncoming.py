@@ -141,7 +141,8 @@ class OncomingTraffic:
         is_oncoming &= scene.front[:, 0] > center
         if is_oncoming.any():
             self._last = now
-            self._free_to = -math.inf if math.isinf(self._free_to) else self._free_to
+            if self._free_to == math.inf:
+                self._free_to = -math.inf
             self._fastest = max(self._fastest, -float(scene.speed[is_oncoming, 0].min()))
             arrival = now + float(((scene.front[is_oncoming, 0] - center) / -scene.speed[is_oncoming, 0]).min())
             headway = arrival - self._arrival

@@ -29,7 +29,7 @@ from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.path import PlannedPath
-from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.planning.route_planner import HORIZON, RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.roads import RoadNetwork
@@ -39,8 +39,6 @@ from eidrive_scenario.world.actor import ActorSpec
 
 STEP = 0.25
 """Time step of rollouts [s]."""
-POINTS = 60
-"""Number of points of a plan."""
 CREEPING = 0.35
 """Speed of a plan for a vehicle that starts from standstill [m/s]; the controller holds its brake below 0.3."""
 STEEPEST = 0.5
@@ -256,6 +254,7 @@ class BehaviorPlanner(RoutePlanner):
             body=self._body,
             line=line,
             limits=limits,
+            curve_limits=self._curve_limits,
             s=s,
             d=d,
             steered=self._front_axle(ego, line),
@@ -268,7 +267,6 @@ class BehaviorPlanner(RoutePlanner):
             now=now,
             gives_way=self._gives_way(s),
             hidden=hidden,
-            road_limits=self._curve_limits if hidden or self._limited[1] else None,
             change=self._change(line, s),
             junction=next((passage.start for passage in self._passages if passage.end > s), math.inf),
         )
@@ -320,5 +318,5 @@ def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[i
 def _planned_part(line: ReferenceLine, s: float) -> slice:
     """Return the points of the line that a plan covers from the place of the vehicle on, at least two."""
     first = line.index_at(s)
-    last = min(first + POINTS, len(line.points))
+    last = min(first + HORIZON, len(line.points))
     return slice(min(first, last - 2), last)

@@ -19,6 +19,7 @@ from eidrive_scenario.driving.planning.behavior.right_of_way import (
     Passage,
 )
 from eidrive_scenario.driving.planning.path import ALIGNED
+from eidrive_scenario.driving.planning.signal_stops import COMFORTABLE
 from eidrive_scenario.roads import RoadNetwork
 
 STANDING = 0.3
@@ -32,7 +33,7 @@ CUTTING, STILL_CUTTING = 0.15, 0.3
 """Angle between the motion of a vehicle and its lane in a junction up to which it cuts the curve, and that up to which
 one that has been predicted to follow the lane still does [rad]; choices."""
 LANE_WIDTH = 3.5
-"""Lateral distance after which a lane change is predicted to end [m]."""
+"""Width of a lane [m], after which a lane change is predicted to end."""
 NOTICEABLE, GREATEST = 0.8, 4.0
 """Accelerations below which an object keeps its speed, and maximum acceleration that is considered [m/s²]."""
 PERSISTENCE = 1.5
@@ -40,9 +41,8 @@ PERSISTENCE = 1.5
 REACTION = 1.0
 """Time for which a vehicle that accelerates is expected to do so before it can brake for a curve [s]; a usual reaction
 time."""
-STOPPING, FIRM = 2.0, 3.05
-"""Deceleration with which a vehicle is predicted to stop at a sign, and the one from which on it is predicted to pass
-[m/s²]; 3.05 is that of the ITE for stops."""
+STOPPING = 2.0
+"""Deceleration with which a vehicle is predicted to stop at a sign [m/s²]; one that needs COMFORTABLE for it passes."""
 AT_SIGN = 1.0
 """Distance of the front from a sign within which the vehicle has stopped there or passes it [m]."""
 HARSH = math.sqrt(7.0 / FASTEST_TURN)
@@ -271,6 +271,6 @@ def _held_by_sign(known_object: KnownObject, course: Course, along: float, times
     """Return the motion of a vehicle to the next stop sign; None without one, or if it does not stop there any more."""
     front = along + known_object.length / 2.0
     left = next((stop - front for stop in course.stops if stop > front - AT_SIGN), math.inf)
-    if left < AT_SIGN or known_object.acceleration > NOTICEABLE or known_object.speed**2 > 2.0 * FIRM * left:
+    if left < AT_SIGN or known_object.acceleration > NOTICEABLE or known_object.speed**2 > 2.0 * COMFORTABLE * left:
         return None
     return stopping_motion(known_object.speed, left, times) if math.isfinite(left) else None

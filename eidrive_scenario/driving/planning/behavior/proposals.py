@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.prediction import LANE_WIDTH
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 from eidrive_scenario.driving.planning.path import approached
@@ -26,8 +27,6 @@ HASTY = 2.0
 away from its aim: 4 m/s² by default, below nuPlan's limit of comfort, 4.89 m/s²."""
 SHORTEST = 11.0
 """Minimum length of a lateral motion by a lane [m]; a car steers about that tightly at walking speed."""
-USUAL_WIDTH = 3.5
-"""Width of a lane [m]."""
 TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
@@ -148,7 +147,7 @@ def lateral_duration(change: Array, lateral_acceleration: float) -> Array:
 
 def least_length(change: Array) -> Array:
     """Return the minimum lengths of lateral motions by distances `change` [m]."""
-    return np.asarray(SHORTEST * np.sqrt(np.minimum(change / USUAL_WIDTH, 1.0)))
+    return np.asarray(SHORTEST * np.sqrt(np.minimum(change / LANE_WIDTH, 1.0)))
 
 
 class Start(NamedTuple):

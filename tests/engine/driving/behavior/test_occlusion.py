@@ -201,6 +201,7 @@ def test_reason_is_what_limits_the_speed() -> None:
         body=Body.of(CAR),
         line=line,
         limits=np.minimum(curve, caution),
+        curve_limits=curve,
         s=0.0,
         d=0.0,
         steered=(0.0, 0.0, 0.0),
@@ -212,11 +213,10 @@ def test_reason_is_what_limits_the_speed() -> None:
         stop=None,
         now=0.0,
         hidden="lane",
-        road_limits=curve,
     )
     # At 20 m the curve allows √(9 + 4 · 30) = 11.4 m/s, the lane √(25 + 4 · 10) = 8.1 m/s.
     assert [situation.is_lowered_at(s) for s in (0.0, 20.0, 31.0, 60.0)] == [True, True, False, False]
-    assert not msgspec.structs.replace(situation, road_limits=None).is_lowered_at(20.0)
+    assert not msgspec.structs.replace(situation, limits=curve).is_lowered_at(20.0)
 
 
 @cache
