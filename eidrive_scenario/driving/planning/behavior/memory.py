@@ -303,9 +303,10 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         kind = detections.classes[row]
         x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
         observation = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
-        observation.mean_speed, observation.ellipse = observation.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
-        observation.first_seen, observation.mean_place = now, (x, y)
+        observation.first_seen, observation.mean_place, observation.mean_speed = now, (x, y), observation.speed
         observation.z = z - height / 2.0
+        if variance > 0.0:
+            observation.ellipse = ellipse
         objects.append(observation)
     return objects
 

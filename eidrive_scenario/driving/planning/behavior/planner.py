@@ -138,14 +138,13 @@ class BehaviorPlanner(RoutePlanner):
             aside = self._changed_by(before, x, y)
             if not aside:
                 return before
-            self._route_lanes = self._route_lanes[1:]
-            line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
+            line, self._route_lanes = before, self._route_lanes[1:]
         else:
             line, goal = ReferenceLine(path, self.roads, z), self._goal
             is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
             self._route_lanes = route_lanes(line) if is_route else []
-            if self._route_lanes:
-                line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
+        if self._route_lanes:
+            line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
         self._line = line
         self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
         if self._conflict_ways is not None:
@@ -238,17 +237,17 @@ class BehaviorPlanner(RoutePlanner):
         known_objects = self._memory.update(objects, now, self._in_view(ego))
         lanes = self._predictor.lanes(known_objects)
         self._predictor.follow_lanes(known_objects, lanes)
-        reach = MARGIN_AHEAD + 2.0 * max(ego.speed, wanted) * self.planner_settings.horizon
+        way = max(ego.speed, wanted) * self.planner_settings.horizon
         indexes = [
             index
             for index, known_object in enumerate(known_objects)
-            if math.hypot(known_object.x - x, known_object.y - y) < reach
+            if math.hypot(known_object.x - x, known_object.y - y) < MARGIN_AHEAD + 2.0 * way
         ]
         near = [known_objects[index] for index in indexes]
         stop = self._stop(line.path, ego, x, y, now)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
         low = line.index_at(s - MARGIN_AHEAD)
-        high = line.index_at(s + max(ego.speed, wanted) * self.planner_settings.horizon + MARGIN_AHEAD) + 1
+        high = line.index_at(s + way + MARGIN_AHEAD) + 1
         situation = Situation(
             settings=self.planner_settings,
             body=self._body,

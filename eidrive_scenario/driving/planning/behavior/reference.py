@@ -208,7 +208,8 @@ class ReferenceLine:
         first = next((n + 1 for n in range(own - 1, -1, -1) if not _is_usable(lanes[n])), 0)
         last = next((n for n in range(own + 1, len(lanes)) if not _is_usable(lanes[n])), len(lanes))
         centers = tuple([lane.center for lane in lanes[first:last] if 2.0 * lane.half_width >= NARROWEST])
-        return LanesOfDirection(centers, there.key, lanes[own].center)
+        key = LaneKey(there.location.road, there.section.index, there.location.lane)
+        return LanesOfDirection(centers, key, lanes[own].center)
 
     def _section_at(self, index: int) -> _Section | None:
         """Return the lanes at a point of the line; None outside of roads."""
@@ -235,14 +236,13 @@ class ReferenceLine:
             center = (lane_t(road, section, lane, location.s)[0] - location.t) * sense
             half = lane.width.value(location.s - section.s) / 2.0
             lanes.append(_Lane(number, center, half, lane.drivable, roads.driving_direction(road.id, number) == sense))
-        key = LaneKey(road.id, section.index, location.lane)
-        return _Section(location, key, lanes, order.index(location.lane), road.rule == "LHT")
+        return _Section(location, section, lanes, order.index(location.lane), road.rule == "LHT")
 
     def _lanes_at(self, index: int) -> LanesBeside:
         there = self._section_at(index)
         if there is None or self._roads is None:
             return LanesBeside()
-        location, _, lanes, own, keeps_left = there
+        location, section, lanes, own, keeps_left = there
         if keeps_left:
             mirrored = [lane._replace(center=-lane.center) for lane in reversed(lanes)]
             beside = _beside(mirrored, len(lanes) - 1 - own).mirrored()
@@ -252,9 +252,8 @@ class ReferenceLine:
             return beside
         opposite = min(lanes, key=lambda lane: abs(lane.center - beside.oncoming))
         limit = self._roads.speed_limit(location.road, location.s, opposite.number)
-        section = self._roads.road(location.road).section_at(location.s)
-        beside = beside._replace(has_solid_line=_has_solid_line(section, location.s, location.lane))
-        return beside if limit is None else beside._replace(oncoming_limit=limit)
+        is_solid = _has_solid_line(section, location.s, location.lane)
+        return beside._replace(oncoming_limit=math.nan if limit is None else limit, has_solid_line=is_solid)
 
 
 def _has_solid_line(section: LaneSection, s: float, lane: int) -> bool:
@@ -281,7 +280,7 @@ class _Section(NamedTuple):
     """Lanes at a point of the line from left to right, the index of that at the point, and the side of the traffic."""
 
     location: LaneLocation
-    key: LaneKey
+    section: LaneSection
     lanes: list[_Lane]
     own: int
     keeps_left: bool

@@ -92,38 +92,17 @@ class JunctionRules:
             # The connecting road that covers most points of the stay.
             counts = Counter(road for index, name, road in covered if name == junction and first <= index <= last)
             road = max(counts, key=lambda road: (counts[road], road), default=None)
-            passages.append(self._passage(junction, first, last, along, heading, signs, road))
+            start, end, before = float(along[first]), float(along[last]), float(heading[max(first - 1, 0)])
+            turn = float(wrap_angle(float(heading[min(last, len(heading) - 1)]) - before))
+            kinds = {line.kind for place, line in signs if start - BEFORE_ENTRY <= place <= start + BEYOND_ENTRY}
+            gives_way, has_light = bool(kinds - {"light"}), "light" in kinds
+            passages.append(Passage(junction, start, end, before, turn, gives_way, has_light, road))
         return tuple(passages)
 
     def _lines_near(self, points: Array) -> list[StopLine]:
         """Return the stop lines in the extent of a way (M, 2)."""
         (left, bottom), (right, top) = points.min(axis=0) - NEAR, points.max(axis=0) + NEAR
         return [line for line in self._lines if left <= line.x <= right and bottom <= line.y <= top]
-
-    def _passage(
-        self,
-        junction: str,
-        first: int,
-        last: int,
-        along: Array,
-        heading: Array,
-        signs: list[tuple[float, StopLine]],
-        road: str | None,
-    ) -> Passage:
-        start, end = float(along[first]), float(along[last])
-        here = [line for distance, line in signs if start - BEFORE_ENTRY <= distance <= start + BEYOND_ENTRY]
-        before = float(heading[max(first - 1, 0)])
-        turn = float(wrap_angle(float(heading[min(last, len(heading) - 1)]) - before))
-        return Passage(
-            junction,
-            start,
-            end,
-            before,
-            turn,
-            any(line.kind != "light" for line in here),
-            any(line.kind == "light" for line in here),
-            road,
-        )
 
     def gives_way(self, own: Passage, other: Passage) -> bool:
         """Return whether traffic on one passage gives way to traffic on another one of the same junction.
