@@ -75,6 +75,8 @@ class BehaviorPlanner(RoutePlanner):
         self._predictor = Predictor(roads, self._times, self._rules)
         self._passages: tuple[Passage, ...] = ()
         self._line: ReferenceLine | None = None
+        self._index = 0
+        """Point of the line at the vehicle in the last plan."""
         self._route_lanes: list[RouteLane] = []
         """Lanes of a path that changes lanes, from the current one on."""
         self._conflict_ways: ConflictWays | None = None
@@ -115,6 +117,7 @@ class BehaviorPlanner(RoutePlanner):
         line = self._line_of(path, ego)
         self._limit(line, follows_signs=self._follows_speed_limits(goal))
         position = self._project(line, x, y)
+        self._index = line.index_at(position[0])
         wanted = self._target_speed(ego, goal)
         if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
             self._decided = now
@@ -151,7 +154,8 @@ class BehaviorPlanner(RoutePlanner):
             self._ways = self._conflict_ways.along(line, self._passages)
         shift = None
         if before is not None:
-            (s, d), (s_before, d_before) = (each.project_point(x, y, 0, len(each.points)) for each in (line, before))
+            # Near the last place: laps of a closed path lie on each other.
+            (s, d), (s_before, d_before) = self._project(line, x, y), before.project_near(x, y, self._index)
             shift = s - s_before if abs(d - d_before + aside) < SAME_LINE else None
         self._decision = None
         self._decider.line_changed(shift, aside)
@@ -212,8 +216,7 @@ class BehaviorPlanner(RoutePlanner):
         return self._lights_work
 
     def _project(self, line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
-        low = max(self._progress - 3, 0)
-        return line.project_point(x, y, low, low + 12)
+        return line.project_near(x, y, self._progress)
 
     def _front_axle(self, ego: EgoState, line: ReferenceLine) -> tuple[float, float, float]:
         """Return the place of the front axle on the line and the slope of its motion."""

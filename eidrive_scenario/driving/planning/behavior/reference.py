@@ -177,9 +177,10 @@ class ReferenceLine:
         d = dy * tx - dx * ty
         return s.reshape(x.shape), d.reshape(x.shape), heading.reshape(x.shape)
 
-    def project_point(self, x: float, y: float, low: int, high: int) -> tuple[float, float]:
-        """Return s and d of one point, nearest among the points from `low` to `high`."""
-        gaps = [(x - px) ** 2 + (y - py) ** 2 for px, py in self.points[low:high].tolist()]
+    def project_near(self, x: float, y: float, index: int) -> tuple[float, float]:
+        """Return s and d of one place, nearest among the points from 3 before one of them on."""
+        low = max(index - 3, 0)
+        gaps = [(x - px) ** 2 + (y - py) ** 2 for px, py in self.points[low : low + 12].tolist()]
         index = low + gaps.index(min(gaps))
         (px, py), (tx, ty) = self.points[index].tolist(), self.tangent[index].tolist()
         dx, dy = x - px, y - py

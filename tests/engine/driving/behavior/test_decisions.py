@@ -12,6 +12,7 @@ from signal_street import CAR
 
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.control.pid_controller import PidController
+from eidrive_scenario.driving.planning.behavior.decision import Decider
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
@@ -225,6 +226,25 @@ def test_vehicle_brakes_as_planned_between_two_points_of_the_path(roads: RoadNet
     assert plan.acceleration == pytest.approx(-4.0)
     rolling = 0.012 * 9.81
     assert PidController(CAR, 0.05).control(state, plan).brake == pytest.approx((4.0 - rolling) / CAR.max_deceleration)
+
+
+def test_places_move_by_the_way_driven_when_laps_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new line begins 5 m behind the vehicle; the one before began at the vehicle, or 5 m behind it."""
+    angles, radius, speed = np.linspace(0.0, 2.0 * math.pi, 181), 30.0, 10.0
+    lap = np.column_stack([radius * np.sin(angles), radius * (1.0 - np.cos(angles)), 0.0 * angles])
+    goal = Goal(path=lap, lap=lap)
+    planner, shifts, now = behavior(None), list[tuple[float, float | None]](), 0.0
+    monkeypatch.setattr(Decider, "line_changed", lambda _, shift, aside: shifts.append((now, shift)))
+    while len(shifts) < 3:
+        yaw = speed * now / radius
+        x, y = radius * math.sin(yaw), radius * (1.0 - math.cos(yaw))
+        ego = EgoState(now, np.array([x, y, 0.0]), yaw, 0.0, 0.0, speed, 0.0, 0.0)
+        planner.plan(ego, detections(now), goal, now)
+        now += 0.25
+    (_, first), (second_time, second), (third_time, third) = shifts
+    assert first is None
+    assert second == pytest.approx(5.0 - speed * second_time, abs=2.0)
+    assert third == pytest.approx(-speed * (third_time - second_time), abs=2.0)
 
 
 @pytest.mark.parametrize("start", [50.0, 58.0])
