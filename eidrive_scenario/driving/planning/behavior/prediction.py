@@ -168,9 +168,10 @@ class Predictor:
         for course in courses:
             along, left, heading = course.project(known_object.x, known_object.y)
             turn = float(wrap_angle(direction - heading))
-            along_lane = travelled
+            along_lane, lane_speed = travelled, speed
             if not known_object.has_course:
-                along_lane, turn = travelled * max(math.cos(turn), 0.0), 0.0
+                share, turn = max(math.cos(turn), 0.0), 0.0
+                along_lane, lane_speed = travelled * share, speed * share
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
             aside = now * math.sin(turn)
@@ -193,7 +194,7 @@ class Predictor:
             fitting = leaving if leaves or not is_inside else following if fits else too_fast
             if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
-            way, speeds = _held_by_sign(known_object, course, along, times) or (along_lane, speed)
+            way, speeds = _held_by_sign(known_object, course, along, times) or (along_lane, lane_speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             z = None if self._level else np.interp(along + way, course.along, course.heights)

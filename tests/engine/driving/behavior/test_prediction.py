@@ -144,6 +144,7 @@ def test_slow_vehicle_of_unknown_direction_moves_equally_far_along_each_course()
     (courses,) = predictor.lanes(objects)
     found = predictor.predict(objects, [courses[:1] * 3])
     np.testing.assert_allclose(found.x, np.tile(200.0 + 2.0 * 0.5 * TIMES, (3, 1)))
+    np.testing.assert_allclose(found.speed, 1.0)
 
 
 def test_vehicle_stops_at_its_stop_sign_if_it_can() -> None:
