@@ -227,19 +227,16 @@ class Decider:
             situation.line,
             situation.window,
             settings,
-            self._ego(situation),
+            situation.extent,
             situation.gives_way,
         )
-
-    def _ego(self, situation: Situation) -> tuple[float, float, float, float]:
-        return situation.center, situation.d, self._body.half_length, self._body.half_width
 
     def _at_walking_pace(self, situation: Situation, profiles: list[LateralProfile]) -> Decision | None:
         """Return the decision to drive on at walking pace, with less clearance; None if that is not possible."""
         pace = self._walking_pace
         slow = pace.situation(situation)
         seen, exact = (self._scene(slow, settings) for settings in (pace.settings, pace.exact))
-        scene = pace.scene(slow.objects, seen, exact, self._ego(slow))
+        scene = pace.scene(slow.objects, seen, exact, slow.extent)
         options = self._options(slow, scene, profiles, with_maneuvers=self._settings.lane_changes)
         best = options.best()
         if not pace.moves_safely(situation, options, best):
@@ -347,7 +344,7 @@ class Decider:
                 kind = proposal.precedence
                 if kind not in reactions:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = walls, leading(scene, way, crossing, situation.center, proposal)
+                    reactions[kind] = walls, leading(scene, way, crossing, situation.center, kind)
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
                 if verdict is Verdict.FOLLOW:
                     time_gap = max(self._settings.time_gap, VIEW_TIME_GAP)
@@ -390,7 +387,7 @@ class Decider:
         """Return the motion along a profile at the wanted speed, with a time gap behind leaders [s]."""
         way = inside_way(scene, profile, self._body.half_width)
         crossing = conflicts(scene, way, situation.s)
-        leads = leading(scene, way, crossing, situation.center, CRUISE)
+        leads = leading(scene, way, crossing, situation.center, CRUISE.precedence)
         rolled = self._roll(situation, scene, [Option(CRUISE, profile, way, situation.stops, leads, time_gap)])
         return Motion(rolled.s[0], rolled.speed[0])
 

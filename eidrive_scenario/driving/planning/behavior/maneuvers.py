@@ -91,6 +91,11 @@ class Situation(msgspec.Struct, frozen=True):
         return self.s - self.body.rear
 
     @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Distance of its center along the line and offset, half length and half width [m]."""
+        return self.center, self.d, self.body.half_length, self.body.half_width
+
+    @property
     def lanes_ahead(self) -> LanesBeside:
         """Lanes beside the line shortly ahead of the vehicle."""
         return self.line.lanes_beside(self.s + VIEWED)

@@ -336,8 +336,8 @@ def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float) 
     return np.asarray(gap < half_width + scene.margin[:, None] * 0.5)
 
 
-def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:
-    """Return the objects that are outside the way (N, K) now and inside it later, ahead of `front` [m]."""
+def conflicts(scene: Surroundings, way: Bools, here: float) -> list[Conflict]:
+    """Return the objects that cross the way (N, K) or enter it later, ahead of the vehicle `here` [m]."""
     entering = []
     meets: Bools = np.logical_or.reduce(way & scene.crosses, axis=1) | (np.logical_or.reduce(way, axis=1) & ~way[:, 0])
     for hypothesis in (meets & ~scene.behind).nonzero()[0].tolist():
@@ -346,7 +346,7 @@ def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:
         crosses = bool(scene.crosses[hypothesis, steps].any())
         run = int(np.argmin(np.append(way[hypothesis, first:], False))) + first - 1
         occupied = slice(first, run + 1)
-        if float(scene.front[hypothesis, occupied].max()) < front:
+        if float(scene.front[hypothesis, occupied].max()) < here:
             continue
         s = float(scene.rear[hypothesis, occupied].min())
         entering.append(Conflict(hypothesis, first, run, s, crosses))
@@ -380,7 +380,7 @@ def proposals_for(
     *,
     emergency: float,
     is_current: bool,
-    seeks_gap: bool = False,
+    seeks_gap: bool,
 ) -> list[Proposal]:
     """Return the proposals along one profile.
 
@@ -421,13 +421,13 @@ def time_to_gain(gap: float, speed: float, top: float, acceleration: float) -> f
     return time + (gap - gained) / top
 
 
-def leading(scene: Surroundings, way: Bools, conflicts: list[Conflict], center: float, proposal: Proposal) -> Bools:
+def leading(scene: Surroundings, way: Bools, conflicts: list[Conflict], center: float, precedence: Precedence) -> Bools:
     """Return where hypotheses lead the vehicle (N, K): in its way and not crossing.
 
     An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
     """
     leads = way & scene.may_lead
-    if proposal.precedence == "all":
+    if precedence == "all":
         for conflict in conflicts:
             hypothesis = conflict.hypothesis
             is_oncoming = float(scene.speed[hypothesis, conflict.first]) < -ONCOMING_SPEED

@@ -59,7 +59,8 @@ class JunctionRules:
         self._priorities: Mapping[str, frozenset[tuple[str, str]]] = {
             junction.id: frozenset(junction.priorities) for junction in roads.junctions.values() if junction.priorities
         }
-        self._keeps_right = all(road.rule == "RHT" for road in roads.roads.values())
+        self._right = 1.0 if all(road.rule == "RHT" for road in roads.roads.values()) else -1.0
+        """Sign of angles, which are exchanged with traffic on the left."""
 
     def stops_along(self, points: Array, heights: Array | None = None) -> tuple[float, ...]:
         """Return the distances along a way (M, 2) at which stop signs hold its traffic [m].
@@ -110,16 +111,14 @@ class JunctionRules:
         The order of precedence: lights, signs, priorities of the map, priority to the right, oncoming traffic before
         left turns. In countries with traffic on the left the sides are exchanged.
         """
-        side = 1.0 if self._keeps_right else -1.0
-        relation = side * float(wrap_angle(other.heading - own.heading))
-        own_turn, other_turn = side * own.turn, side * other.turn
+        relation = self._right * float(wrap_angle(other.heading - own.heading))
         if own.gives_way != other.gives_way and not own.has_light:
             return own.gives_way
         by_map = None if own.has_light else self._yields_by_map(own, other)
         if by_map is not None:
             return by_map
         if abs(relation) >= OPPOSITE:
-            return own_turn > TURNING and other_turn <= TURNING
+            return self._turns_across(own, other)
         if own.has_light or abs(relation) <= ALIKE:
             return False
         return relation > 0.0
@@ -130,7 +129,6 @@ class JunctionRules:
         Lights are not considered. Traffic that a sign, a priority of the map or its left turn holds gives way; priority
         to the right is not relied upon, as it holds back only drivers who see the vehicle.
         """
-        side = 1.0 if self._keeps_right else -1.0
         relation = abs(float(wrap_angle(other.heading - own.heading)))
         if relation <= ALIKE or (other.gives_way and not own.gives_way):
             return False
@@ -138,8 +136,12 @@ class JunctionRules:
         if by_map is not None:
             return by_map
         if relation >= OPPOSITE:
-            return side * own.turn > TURNING and side * other.turn <= TURNING
+            return self._turns_across(own, other)
         return True
+
+    def _turns_across(self, own: Passage, other: Passage) -> bool:
+        """Return whether only the first one of two oncoming passages turns across the other one."""
+        return self._right * own.turn > TURNING >= self._right * other.turn
 
     def _yields_by_map(self, own: Passage, other: Passage) -> bool | None:
         """Return whether a priority of the map holds `own` for `other`; None if the map has none for both."""

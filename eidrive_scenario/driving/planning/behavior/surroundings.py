@@ -94,20 +94,8 @@ class Surroundings(msgspec.Struct, frozen=True, dict=True):
 
     def rows(self, rows: Integers) -> Surroundings:
         """Return some of the hypotheses."""
-        return Surroundings(
-            self.s[rows],
-            self.d[rows],
-            self.half_length[rows],
-            self.half_width[rows],
-            self.speed[rows],
-            self.margin[rows],
-            tuple([self.owner[row] for row in rows.tolist()]),
-            self.certain[rows],
-            self.passing_gap[rows],
-            self.crosses[rows],
-            self.behind[rows],
-            self.yields[rows],
-        )
+        arrays = {name: getattr(self, name)[rows] for name in self.__struct_fields__ if name != "owner"}
+        return Surroundings(owner=tuple([self.owner[row] for row in rows.tolist()]), **arrays)
 
 
 def later(scene: Surroundings, steps: Integers, beyond: Array) -> Surroundings:
