@@ -377,13 +377,7 @@ class Decider:
         )
         return Options(options, rolled, evaluation, float(self._times[-1]), waiting, refused)
 
-    def _motion(
-        self,
-        situation: Situation,
-        scene: Surroundings,
-        profile: LateralProfile,
-        time_gap: float,
-    ) -> Motion:
+    def _motion(self, situation: Situation, scene: Surroundings, profile: LateralProfile, time_gap: float) -> Motion:
         """Return the motion along a profile at the wanted speed, with a time gap behind leaders [s]."""
         way = inside_way(scene, profile, self._body.half_width)
         crossing = conflicts(scene, way, situation.s)

@@ -308,6 +308,7 @@ def extended(situation: Situation, scene: Surroundings, profile: LateralProfile)
 def _head_on(situation: Situation, scene: Surroundings) -> Present | None:
     """Return the nearest hypothesis that comes towards the vehicle in the lane of its route, or a cyclist or pedestrian
     whose distance the vehicle should keep there."""
+    center = situation.center
 
     def comes(hypothesis: Present) -> bool:
         if situation.kind_of(hypothesis.owner) in VULNERABLE:
@@ -317,10 +318,7 @@ def _head_on(situation: Situation, scene: Surroundings) -> Present | None:
     oncoming = [
         hypothesis
         for hypothesis in scene.present
-        if hypothesis.s > situation.center
-        and not hypothesis.crosses
-        and comes(hypothesis)
-        and scene.certain[hypothesis.row]
+        if hypothesis.s > center and not hypothesis.crosses and comes(hypothesis) and scene.certain[hypothesis.row]
     ]
     return min(oncoming, key=attrgetter("s"), default=None)
 
@@ -364,11 +362,12 @@ def _behind_neighbor(situation: Situation, scene: Surroundings) -> LateralProfil
     if abs(d) < SWUNG:
         return None
     side = 1 if d > 0.0 else -1
+    rear, front = situation.rear, situation.front
     beside = [
         hypothesis
         for hypothesis in scene.present
-        if hypothesis.front > situation.rear
-        and hypothesis.rear < situation.front
+        if hypothesis.front > rear
+        and hypothesis.rear < front
         and side * hypothesis.d - hypothesis.half_width < side * d
         and _is_in_way(situation, hypothesis)
         and not hypothesis.crosses
@@ -410,11 +409,11 @@ def _is_in_way(situation: Situation, hypothesis: Present) -> bool:
 
 def _blocker(situation: Situation, scene: Surroundings) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
-    slower = max(situation.wanted - SLOWER, STILL)
+    center, slower = situation.center, max(situation.wanted - SLOWER, STILL)
     slower_ahead = [
         hypothesis
         for hypothesis in scene.present
-        if hypothesis.s > situation.center
+        if hypothesis.s > center
         and -ONCOMING_SPEED < hypothesis.speed < slower
         and not hypothesis.crosses
         and _is_in_way(situation, hypothesis)

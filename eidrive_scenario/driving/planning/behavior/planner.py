@@ -126,9 +126,10 @@ class BehaviorPlanner(RoutePlanner):
             self._reasons = objects.boxes[list(rows), :2]
         else:
             rows = nearest_rows(objects, self._reasons)
-        plan = _trajectory(line, self._decision, position[0], rows)
+        part = _planned_part(line, self._index)
+        plan = _trajectory(line, part, self._decision, position[0], rows)
         if goal is not None and goal.acceleration and self._decision.is_free:
-            limits = self._limits[_planned_part(line, position[0])]
+            limits = self._limits[part]
             if float(limits[0]) >= wanted:
                 return replace(plan, speeds=np.minimum(limits, wanted), acceleration=goal.acceleration)
         return plan
@@ -299,12 +300,11 @@ class BehaviorPlanner(RoutePlanner):
         return in_view
 
 
-def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[int, ...]) -> Plan:
-    """Return the plan of a decision from the place of the vehicle on.
+def _trajectory(line: ReferenceLine, part: slice, decision: Decision, s: float, rows: tuple[int, ...]) -> Plan:
+    """Return the plan of a decision along a part of the line, from the place of the vehicle on.
 
     rows  fused objects that are the reason
     """
-    part = _planned_part(line, s)
     along = line.along[part]
     offset = decision.profile.offset(along)
     points = line.points[part] + offset[:, None] * line.normal[part]
@@ -317,8 +317,7 @@ def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[i
     return Plan(points, speeds, decision.reason, decision.acceleration, decision.braking, rows)
 
 
-def _planned_part(line: ReferenceLine, s: float) -> slice:
-    """Return the points of the line that a plan covers from the place of the vehicle on, at least two."""
-    first = line.index_at(s)
+def _planned_part(line: ReferenceLine, first: int) -> slice:
+    """Return the points of the line that a plan covers from the one at the vehicle on, at least two."""
     last = min(first + HORIZON, len(line.points))
     return slice(min(first, last - 2), last)
