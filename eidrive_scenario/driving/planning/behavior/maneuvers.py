@@ -140,9 +140,9 @@ class Situation(msgspec.Struct, frozen=True):
         limit, by_curves = (np.interp(s, self.line.along, limits) for limits in (self.limits, self.curve_limits))
         return bool(limit < by_curves)
 
-    def rows_of(self, owner: int | None) -> tuple[int, ...]:
+    def rows_of(self, owner: int) -> tuple[int, ...]:
         """Return the row of an object among the fused objects; none if it is lost."""
-        row = None if owner is None else self.objects[owner].row
+        row = self.objects[owner].row
         return () if row is None else (row,)
 
     def free_progress(self, horizon: float) -> float:
