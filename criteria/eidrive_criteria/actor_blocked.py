@@ -8,7 +8,6 @@ from typing import Annotated
 from pydantic import Field
 
 from eidrive_criteria.folds import Extreme, conclude_extreme
-from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -33,7 +32,7 @@ class ActorBlocked(Criterion):
         self._settings = settings
         self.subjects = (settings.of,)
         self._since: float | None = None
-        self._longest = Extreme(settings.at_most, largest=True, tolerance=TIME_TOLERANCE)
+        self._longest = Extreme(settings.at_most, largest=True)
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from eidrive_criteria.folds import exceeds
 from eidrive_criteria.linked import Link, LinkCriterion, LinkSettings
 from eidrive_scenario.api.criteria import Frame, ReceptionLog, Verdict
 from eidrive_scenario.api.v2x import LinkEvent, ReceivedMessage
@@ -84,8 +85,8 @@ class AgeOfInformation(LinkCriterion):
         else:
             newest = f"the newest message from {oldest[1][0]} to {oldest[1][1]} was {value:.3f} s old"
             reason = f"{newest} {PHRASES[settings.measure]}"
-        exceeds = value is not None and settings.at_most is not None and value > settings.at_most
-        return self.conclude(not self.missing and not exceeds, reason, value=value, limit=settings.at_most)
+        passed = not self.missing and not (value is not None and exceeds(value, settings.at_most))
+        return self.conclude(passed, reason, value=value, limit=settings.at_most)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the largest age of each measure [s]; empty without a message."""

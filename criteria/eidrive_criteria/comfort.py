@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from eidrive_criteria.folds import exceeds
 from eidrive_scenario.api.common import Array
 from eidrive_scenario.api.criteria import Continuity, Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
@@ -129,7 +130,7 @@ class Comfort(Criterion):
         else:
             quantity = worst.quantity.replace("_", " ")
             reason = f"{quantity} of {of} was {worst.value:.2f}, {worst.ratio:.2f} of its limit, at {worst.time:.2f} s"
-        passed = bool(self._parts) and (worst is None or worst.ratio <= 1.0)
+        passed = bool(self._parts) and (worst is None or not exceeds(worst.ratio, 1.0))
         return self.conclude(
             passed,
             reason,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.folds import Deadline
+from eidrive_criteria.folds import Deadline, falls_below
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -60,7 +60,7 @@ class DrivenDistance(Criterion):
 
     def verdict(self) -> Verdict:
         of, limit, was_present = self._settings.of, self._settings.at_least, self._was_present
-        passed = was_present and self._distance >= limit
+        passed = was_present and not falls_below(self._distance, limit)
         return self.conclude(
             passed,
             f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, Self, TypeVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api.common import TIME_TOLERANCE, RoadNetwork, WorldView
+from eidrive_scenario.api.common import EPSILON, TIME_TOLERANCE, RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import (
     Continuity,
     Criterion,
@@ -24,6 +24,16 @@ from eidrive_scenario.api.criteria import (
 )
 
 TwoActors = TypeVar("TwoActors", bound=CriterionSettings)
+
+
+def exceeds(value: float, limit: float | None) -> bool:
+    """Return whether a value exceeds a limit, None for no limit, by more than the rounding error of its calculation."""
+    return limit is not None and value > limit + EPSILON
+
+
+def falls_below(value: float, limit: float | None) -> bool:
+    """Return whether a value is below a limit, None for no limit, by more than the rounding error."""
+    return limit is not None and value < limit - EPSILON
 
 
 class Deadline:
@@ -60,11 +70,11 @@ class BoundedSettings(CriterionSettings):
 
     def is_below(self, value: float) -> bool:
         """Return whether a value is below the lower limit."""
-        return self.at_least is not None and value < self.at_least
+        return falls_below(value, self.at_least)
 
     def is_above(self, value: float) -> bool:
         """Return whether a value is above the upper limit."""
-        return self.at_most is not None and value > self.at_most
+        return exceeds(value, self.at_most)
 
     def limit_of(self, value: float | None) -> float | None:
         """Return the limit that a verdict states: the violated one, else the lower one if there is one."""
@@ -84,9 +94,9 @@ def require_two_actors(settings: TwoActors) -> TwoActors:
 class Extreme:
     """Largest or smallest value with its time [s], and the time of the first value beyond the limit."""
 
-    def __init__(self, limit: float | None, *, largest: bool, tolerance: float = 0.0) -> None:
+    def __init__(self, limit: float | None, *, largest: bool) -> None:
         self.limit = limit
-        self._largest, self._tolerance = largest, tolerance
+        self._largest = largest
         self.value: float | None = None
         """The extreme; None before the first value."""
         self.when = math.nan
@@ -95,10 +105,10 @@ class Extreme:
 
     def add(self, value: float, time: float) -> bool:
         """Add a value, and return whether it is the new extreme."""
-        sign = 1.0 if self._largest else -1.0
-        if self.violated is None and self.limit is not None and sign * (value - self.limit) > self._tolerance:
+        violates = exceeds if self._largest else falls_below
+        if self.violated is None and violates(value, self.limit):
             self.violated = time
-        if self.value is not None and sign * (value - self.value) <= 0.0:
+        if self.value is not None and (value <= self.value if self._largest else value >= self.value):
             return False
         self.value, self.when = value, time
         return True
@@ -130,8 +140,8 @@ class Sample:
     def add(self, numbers: Sequence[float], time: float) -> None:
         """Add numbers of a time [s]."""
         self._numbers.extend(numbers)
-        if self._measure == "max" and self._violated is None and self._limit is not None:
-            self._violated = time if any(number > self._limit for number in numbers) else None
+        if self._measure == "max" and self._violated is None:
+            self._violated = time if any(exceeds(number, self._limit) for number in numbers) else None
 
     def values(self) -> dict[Measure, float]:
         """Return the value of each measure; empty without a number."""
@@ -148,10 +158,8 @@ class Sample:
     def conclude(self, criterion: Criterion, reason: str, *, measured: bool) -> Verdict:
         """Return the verdict on the sample: failed by a violation, or unless it was `measured`."""
         value, limit = self.value, self._limit
-        exceeds = value is not None and limit is not None and value > limit
-        return criterion.conclude(
-            measured and not exceeds, reason, value=value, limit=limit, first_violation=self._violated
-        )
+        passed = measured and not (value is not None and exceeds(value, limit))
+        return criterion.conclude(passed, reason, value=value, limit=limit, first_violation=self._violated)
 
 
 class FollowedCriterion(Criterion):
@@ -226,7 +234,7 @@ class SummedCriterion(FollowedCriterion):
             return
         self._first = time if self._first is None else self._first
         self._sum += added
-        if self._violated is None and (self._sum > self.at_most or self.at_most == 0.0):
+        if self._violated is None and (exceeds(self._sum, self.at_most) or self.at_most == 0.0):
             self._violated = time
 
     def verdict(self) -> Verdict:

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import Extreme, conclude_extreme, require_two_actors
+from eidrive_criteria.folds import Extreme, conclude_extreme, falls_below, require_two_actors
 from eidrive_scenario.api.common import RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import (
     Criterion,
@@ -70,7 +70,7 @@ class PairCriterion(Criterion):
         value = self.measure(view, of, to)
         if value < self.smallest:
             self.smallest, self.when = value, view.time
-        if self._violated is None and self.limit is not None and value < self.limit:
+        if self._violated is None and falls_below(value, self.limit):
             self._violated = view.time
 
     def verdict(self) -> Verdict:

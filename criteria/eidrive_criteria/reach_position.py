@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.folds import Deadline
+from eidrive_criteria.folds import Deadline, exceeds
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -53,7 +53,7 @@ class ReachPosition(Criterion):
         x, y, _ = view.position[row].tolist()
         distance = math.hypot(x - settings.x, y - settings.y)
         self._nearest = min(self._nearest, distance)
-        if self._reached is None and distance <= settings.within:
+        if self._reached is None and not exceeds(distance, settings.within):
             self._reached = view.time
 
     def verdict(self) -> Verdict:

@@ -7,9 +7,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import require_two_actors
+from eidrive_criteria.folds import exceeds, require_two_actors
 from eidrive_criteria.pairs import SurroundedCriterion
-from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -74,7 +73,7 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
             return
         waited = view.time - self._since
         self._longest = waited if self._longest is None else max(self._longest, waited)
-        if self._violated is None and settings.at_most is not None and waited > settings.at_most + TIME_TOLERANCE:
+        if self._violated is None and exceeds(waited, settings.at_most):
             self._violated = view.time
         if relation is None:
             # Without a relation a vehicle that had fallen back is out of range; a near one is on another way.
