@@ -7,16 +7,16 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from eidrive_criteria.folds import falls_below
 from eidrive_criteria.pairs import PairCriterion, PairSettings
-from eidrive_scenario.api.common import WorldView, overlap
-from eidrive_scenario.api.criteria import Continuity, Frame
+from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.criteria import Continuity, Frame, half_projection, separating_axes
 
 HORIZON = 10.0
 """Maximum post-encroachment time that is measured [s]."""
-STEPS = 20
-"""Bisections of a time step; the times are exact to 1e-6 of it."""
 
 Body = Sequence[float]
+Point = tuple[float, float]
 
 
 class PostEncroachmentTimeSettings(PairSettings):
@@ -24,38 +24,38 @@ class PostEncroachmentTimeSettings(PairSettings):
 
 
 @dataclass(frozen=True)
-class Trace:
-    """Body of an actor in a frame; `moved` is False if it was absent or elsewhere in the frame before."""
+class Motion:
+    """Motion of a body from one frame to the next; both are one frame after an absence or a teleport."""
 
-    time: float
-    body: Body
-    moved: bool
+    begin: float
+    end: float
+    first: Body
+    last: Body
+
+    @property
+    def middle(self) -> Body:
+        """Body at half the time, with the mean heading."""
+        turn = math.remainder(self.last[6] - self.first[6], math.tau)
+        ends = zip(self.first[:6], self.last[:6], strict=True)
+        return (*((first + last) / 2.0 for first, last in ends), self.first[6] + turn / 2.0)
 
 
 class Trail:
-    """Bodies of one actor in the last HORIZON seconds, oldest first."""
+    """Motions of one actor in the last HORIZON seconds, oldest first."""
 
     def __init__(self) -> None:
-        self.past: deque[Trace] = deque()
+        self.past: deque[Motion] = deque()
         self._continuity = Continuity()
 
     def add(self, view: WorldView, row: int | None) -> None:
-        """Add the body of this frame, if the actor is present; delete the bodies before the horizon."""
+        """Add the motion up to this frame, if the actor is present; delete the motions before the horizon."""
         step = self._continuity.step(view, row)
         if row is not None:
-            self.past.append(Trace(view.time, view.plain_boxes[row], step is not None))
-        while self.past and self.past[0].time < view.time - HORIZON:
+            body, time = view.plain_boxes[row], view.time
+            before = (time, body) if step is None else (self.past[-1].end, self.past[-1].last)
+            self.past.append(Motion(before[0], time, before[1], body))
+        while self.past and self.past[0].end < view.time - HORIZON:
             self.past.popleft()
-
-    def last_over(self, body: Body) -> int | None:
-        """Return the index of the latest recorded body that overlaps `body`; None if there is none."""
-        reach = math.hypot(body[3], body[4])
-        for index in range(len(self.past) - 1, -1, -1):
-            other = self.past[index].body
-            near = (reach + math.hypot(other[3], other[4])) / 2.0
-            if abs(other[0] - body[0]) <= near and abs(other[1] - body[1]) <= near and overlap(other, body):
-                return index
-        return None
 
 
 class PostEncroachmentTime(PairCriterion):
@@ -84,13 +84,14 @@ class PostEncroachmentTime(PairCriterion):
         value = self.measure(view, 0, 0)
         if value < self.smallest:
             self.smallest, self.when = value, view.time
-        if self._violated is None and self.limit is not None and value < self.limit:
+        if self._violated is None and falls_below(value, self.limit):
             self._violated = view.time
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
         """Return the smaller time of both orders with an arrival in this frame; infinite if there is none."""
         first, second = self._trails[self.of], self._trails[self.to]
-        return min(time_between(first, second, view.time), time_between(second, first, view.time))
+        of_first = time_between(first, second, view.time, self.smallest)
+        return min(of_first, time_between(second, first, view.time, min(self.smallest, of_first)))
 
     def describe_smallest(self) -> str:
         if not math.isfinite(self.smallest):
@@ -105,38 +106,64 @@ class PostEncroachmentTime(PairCriterion):
         return {pair: self.smallest} if math.isfinite(self.smallest) else {}
 
 
-def time_between(leaving: Trail, arriving: Trail, now: float) -> float:
+def time_between(leaving: Trail, arriving: Trail, now: float, below: float = math.inf) -> float:
     """Return the time from the departure of one actor from where the other one arrives now; infinite if there is none.
 
     Between frames the bodies move at constant velocity. An actor that disappears departs with its last frame.
+
+    below  time from which on the result is infinite [s]
     """
-    if not arriving.past or arriving.past[-1].time != now:
+    smallest = min(below, HORIZON)
+    if not arriving.past or arriving.past[-1].end != now:
         return math.inf
-    present = arriving.past[-1]
-    index = leaving.last_over(present.body)
-    if index is None:
+    arrival = arriving.past[-1]
+    for departure in reversed(leaving.past):
+        if arrival.begin - departure.end >= smallest:
+            break
+        smallest = min(smallest, _shortest(departure, arrival))
+    return smallest if smallest < min(below, HORIZON) else math.inf
+
+
+def _shortest(departure: Motion, arrival: Motion) -> float:
+    """Return the shortest time from an instant of one motion to a later one of the other at which the bodies overlap.
+
+    Two bodies with constant headings overlap if the projections of their distance on all separating axes are within
+    the sum of their extents. The pairs of instants, as shares of both motions, then form a convex polygon, and the time
+    between them is linear: it is the least at a corner.
+    """
+    near = (math.hypot(*departure.last[3:5]) + math.hypot(*arrival.last[3:5])) / 2.0
+    gap, moved, came = (
+        [b - a for a, b in zip(start[:3], stop[:3], strict=True)]
+        for start, stop in (
+            (departure.first, arrival.first),
+            (departure.first, departure.last),
+            (arrival.first, arrival.last),
+        )
+    )
+    if any(abs(gap[axis]) > near + abs(moved[axis]) + abs(came[axis]) for axis in (0, 1)):
         return math.inf
-    inside = leaving.past[index]
-    if inside.time == now:
-        return 0.0
-    departure, last = inside.time, inside.body
-    if index + 1 < len(leaving.past) and leaving.past[index + 1].moved:
-        departure, last = _change(inside, leaving.past[index + 1], present.body)
-    arrival = now
-    if present.moved and not overlap(arriving.past[-2].body, last):
-        arrival, _ = _change(present, arriving.past[-2], last)
-    return arrival - departure
+    a, b = departure.middle, arrival.middle
+    delay = arrival.begin - departure.begin, departure.begin - departure.end, arrival.end - arrival.begin
+    polygon = _clipped(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), *delay)
+    for axis in separating_axes(a, b):
+        reach = half_projection(a, *axis) + half_projection(b, *axis)
+        apart, away, nearer = (sum(p * q for p, q in zip(axis, vector, strict=True)) for vector in (gap, moved, came))
+        polygon = _clipped(polygon, reach - apart, away, -nearer)
+        polygon = _clipped(polygon, reach + apart, -away, nearer)
+    return min((max(delay[0] + u * delay[1] + v * delay[2], 0.0) for u, v in polygon), default=math.inf)
 
 
-def _change(inside: Trace, outside: Trace, area: Body) -> tuple[float, Body]:
-    """Return the last time and body between two frames, from the first one on, at which the body overlaps a place."""
-    low, high = 0.0, 1.0
-    for _ in range(STEPS):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if overlap(_between(inside.body, outside.body, middle), area) else (low, middle)
-    return inside.time + low * (outside.time - inside.time), _between(inside.body, outside.body, low)
-
-
-def _between(a: Body, b: Body, share: float) -> Body:
-    turn = math.remainder(b[6] - a[6], math.tau)
-    return (*(p + share * (q - p) for p, q in zip(a[:6], b[:6], strict=True)), a[6] + share * turn)
+def _clipped(polygon: Sequence[Point], constant: float, by_u: float, by_v: float) -> Sequence[Point]:
+    """Return the part of a convex polygon in which `constant + by_u * u + by_v * v` is at least 0."""
+    values = [constant + by_u * u + by_v * v for u, v in polygon]
+    if min(values, default=0.0) >= 0.0:
+        return polygon
+    kept: list[Point] = []
+    for index, (u, v) in enumerate(polygon):
+        before, value = values[index - 1], values[index]
+        if (before < 0.0) != (value < 0.0):
+            share, (x, y) = before / (before - value), polygon[index - 1]
+            kept.append((x + share * (u - x), y + share * (v - y)))
+        if value >= 0.0:
+            kept.append((u, v))
+    return kept

@@ -92,6 +92,32 @@ def test_following_car_arrives_where_the_first_one_was(frame: Any, car: Any) -> 
     assert judge(frames).value == pytest.approx(2.0, abs=1e-4)
 
 
+@pytest.mark.parametrize("dt", [0.05, 0.1])
+def test_oblique_body_counts_by_its_nearest_places(frame: Any, car: Any, dt: float) -> None:
+    """A square on its corner leaves the path at 4 m/s, the ego arrives at 2 m/s.
+
+    Its half diagonal is h. Its widest part, at x = -h, leaves the path of the ego, y < 1 m, at y = 1 m, and the front
+    of the ego arrives there h / 2 s before x = 0.
+    """
+    half = math.sqrt(0.5)
+    frames = []
+    for tick in range(round(6.0 / dt) + 1):
+        time = tick * dt
+        cars = {"Ego": car(-12.03 + 2.0 * time, 0.0, 0.0, 2.0), "Other": car(0.0, -1.0 + 4.0 * time, math.pi / 4, 2.8)}
+        frames.append(frame(time, cars, sizes={"Ego": (4.0, 2.0, 1.5), "Other": (1.0, 1.0, 1.5)}))
+    assert judge(frames).value == pytest.approx((10.03 - half) / 2.0 - 2.0 / 4.0, abs=1e-6)
+
+
+def test_fast_body_covers_the_way_between_frames(frame: Any, car: Any) -> None:
+    """At 30 m/s and a step of 0.1 s, a body of 2 m skips 1 m, where a pedestrian arrives 0.4 m beside its center."""
+    frames = []
+    for tick in range(40):
+        time = tick * 0.1
+        cars = {"Ego": car(-30.0 + 30.0 * time, 0.0, 0.0, 30.0), "Other": car(1.5, -4.0 + 1.5 * time, 0.0, 1.5)}
+        frames.append(frame(time, cars, sizes={"Ego": (2.0, 0.8, 1.5), "Other": (0.5, 0.5, 1.8)}))
+    assert judge(frames).value == pytest.approx((4.0 - 0.4 - 0.25) / 1.5 - (30.0 + 1.5 + 0.25 + 1.0) / 30.0, abs=1e-6)
+
+
 def test_absent_actor_fails(frame: Any, car: Any) -> None:
     verdict = judge([frame(0.0, {"Ego": car(0)})])
     assert (verdict.passed, verdict.value) == (False, None)
