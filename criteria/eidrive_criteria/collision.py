@@ -32,7 +32,9 @@ class CollisionSettings(CriterionSettings):
     only_at_fault: bool = False
 
     @model_validator(mode="after")
-    def _not_itself(self) -> Self:
+    def _others_only(self) -> Self:
+        if self.others == ():
+            raise ValueError("'with' lists no actor (expected actors, or no 'with' for contact with any body)")
         if self.others is not None and self.of in ((self.others,) if isinstance(self.others, str) else self.others):
             raise ValueError(f"'with' contains the actor itself (got {self.of!r}; expected another actor)")
         return self

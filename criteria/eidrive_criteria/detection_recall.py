@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from pydantic import Field
+
 from eidrive_criteria.perceived import Group, PerceivedSettings, RecalledCriterion, RecalledSettings
 
 
 class DetectionRecallSettings(RecalledSettings, PerceivedSettings):
     """Settings: `{of: Ego, objects: helper_only, range: 50, at_least: 0.8}`; limits are shares from 0 to 1."""
+
+    at_least: Annotated[float, Field(ge=0, le=1)] | None = None
+    at_most: Annotated[float, Field(ge=0, le=1)] | None = None
 
 
 class DetectionRecall(RecalledCriterion):

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from eidrive_criteria.folds import Deadline, require_two_actors
 from eidrive_criteria.perceived import PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.common import TIME_TOLERANCE
-from eidrive_scenario.api.criteria import Frame, Verdict, actor_never_present
+from eidrive_scenario.api.criteria import Frame, Verdict
 
 
 class FirstDetectionSettings(PerceivedSettings):
@@ -31,19 +31,15 @@ class FirstDetection(PerceivedCriterion):
     unit = "s"
 
     def __init__(self, settings: FirstDetectionSettings) -> None:
-        super().__init__(settings)
+        super().__init__(settings, settings.to)
         self._settings = settings
-        self.subjects = (settings.of, settings.to)
-        self._other_was_present = False
         self._first: float | None = None
         self._deadline = Deadline(settings.by)
         self._distance = math.nan
         """Distance between the centers of both actors at the first detection [m]."""
 
     def observe(self, frame: Frame) -> None:
-        view, settings = frame.view, self._settings
-        self._other_was_present = self._other_was_present or settings.to in view.rows
-        self._deadline.observe(view.time)
+        self._deadline.observe(frame.view.time)
         super().observe(frame)
 
     def evaluate(self, frame: Frame) -> None:
@@ -59,15 +55,13 @@ class FirstDetection(PerceivedCriterion):
         in_time = settings.by is None or (self._first is not None and self._first <= settings.by + TIME_TOLERANCE)
         if not self.perceives:
             reason = self.no_perception()
-        elif not self._other_was_present:
-            reason = actor_never_present([settings.to])
         elif self._first is None:
             reason = f"{self.of} never knew {settings.to} ({settings.source} objects)"
         else:
             when = f"{self._first:.2f} s, at a distance of {self._distance:.1f} m"
             reason = f"{self.of} first knew {settings.to} at {when} ({settings.source} objects)"
         return self.conclude(
-            self.perceives and self._other_was_present and in_time,
+            self.perceives and in_time,
             reason,
             value=self._first,
             limit=settings.by,

@@ -49,26 +49,30 @@ class PerceivedSettings(MatchedSettings):
 class PerceivedCriterion(Criterion):
     """Criterion on the actors that a station knows. An actor without a driving stack is a failure."""
 
-    def __init__(self, settings: MatchedSettings) -> None:
+    def __init__(self, settings: MatchedSettings, to: str | None = None) -> None:
         super().__init__(settings)
         self._match = settings
         self.of = settings.of
-        self.subjects: tuple[str, ...] = (settings.of,)
-        self._was_present = self.perceives = False
-        """Whether the station was present, and whether it had a driving stack."""
+        self.subjects = (settings.of,) if to is None else (settings.of, to)
+        self._missing = set(self.subjects)
+        self._has_stack = False
 
     @abstractmethod
     def evaluate(self, frame: Frame) -> None:
         """Process one frame with the step of the station."""
 
     def observe(self, frame: Frame) -> None:
-        if self.of not in frame.view.rows:
+        if self._missing:
+            self._missing.difference_update(frame.view.names)
+        if self.of not in frame.view.rows or self.of not in frame.steps:
             return
-        self._was_present = True
-        if self.of not in frame.steps:
-            return
-        self.perceives = True
+        self._has_stack = True
         self.evaluate(frame)
+
+    @property
+    def perceives(self) -> bool:
+        """Whether the station had a driving stack, and all required actors were present."""
+        return self._has_stack and not self._missing
 
     def known_actors(self, frame: Frame, source: Source) -> Mapping[str, float]:
         """Return the actors that the station knows from a source, with the distance of their object [m]."""
@@ -76,10 +80,10 @@ class PerceivedCriterion(Criterion):
         return known_actors(frame, self.of, source, within=given.within, min_confidence=given.min_confidence)
 
     def no_perception(self) -> str:
-        """Return the reason of the verdict on a station that was never present or has no driving stack."""
-        if self._was_present:
-            return f"{self.of} has no driving stack, so it detects nothing"
-        return actor_never_present([self.of])
+        """Return the reason of the verdict if a required actor was never present, or there is no driving stack."""
+        if self._missing:
+            return actor_never_present(self._missing)
+        return f"{self.of} has no driving stack, so it detects nothing"
 
 
 Group = Literal["all", "visible", "helper_only", "hidden"]

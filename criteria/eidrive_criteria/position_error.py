@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import PHRASES, Measure, Sample
+from eidrive_criteria.folds import PHRASES, Measure, Sample, require_two_actors
 from eidrive_criteria.perceived import PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.criteria import Frame, Verdict
 
@@ -23,6 +23,8 @@ class PositionErrorSettings(PerceivedSettings):
     measure: Measure = "mean"
     at_most: Annotated[float, Field(ge=0)] | None = None
 
+    _two_actors = model_validator(mode="after")(require_two_actors)
+
 
 class PositionError(PerceivedCriterion):
     """Criterion that fails if the horizontal distance between the objects of a station and their actors is too large.
@@ -35,10 +37,8 @@ class PositionError(PerceivedCriterion):
     unit = "m"
 
     def __init__(self, settings: PositionErrorSettings) -> None:
-        super().__init__(settings)
+        super().__init__(settings, settings.to)
         self._settings = settings
-        if settings.to is not None:
-            self.subjects = (settings.of, settings.to)
         self._errors = Sample(settings.measure, settings.at_most)
 
     def evaluate(self, frame: Frame) -> None:

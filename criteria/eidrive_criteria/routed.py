@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from eidrive_criteria.folds import FollowedCriterion
 from eidrive_scenario.api.common import RoadNetwork
@@ -30,6 +30,12 @@ class RouteSettings(CriterionSettings):
 
     of: str
     route: Annotated[tuple[Point, ...], Field(min_length=2, max_length=1000)] | None = None
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if self.route is not None and len(set(self.route)) == 1:
+            raise ValueError(f"'route' has no length (got {self.route[0]} only; expected different points)")
+        return self
 
 
 class RouteCriterion(FollowedCriterion):

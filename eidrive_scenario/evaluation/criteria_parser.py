@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from typing import Any
 
@@ -258,7 +258,11 @@ def _declare(
         hint = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
         message = f"criterion {kind!r}: settings are not a mapping (got {settings!r})"
         raise SettingError(Diagnostic(message, hint, source, line))
-    parsed = parse_settings(settings_type, settings, source=source, line=line, lines=lines, origins=origins)
+    try:
+        parsed = parse_settings(settings_type, settings, source=source, line=line, lines=lines, origins=origins)
+    except SettingError as error:
+        named = [replace(each, message=f"criterion {kind!r}: {each.message}") for each in error.diagnostics]
+        raise SettingError(named) from error
     return CriterionDeclaration(kind, criterion_type, parsed)
 
 

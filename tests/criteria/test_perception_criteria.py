@@ -166,6 +166,8 @@ def test_missing_actors_fail(frame: Any, car: Any, perceived: Any) -> None:
     alone = [perceived(frame(0.0, {"Ego": car(0)}), "Ego")]
     verdict = first(alone)
     assert (verdict.passed, verdict.reason) == (False, "A was never present, so nothing was measured")
+    verdict = error(alone, to="A")
+    assert (verdict.passed, verdict.reason) == (False, "A was never present, so nothing was measured")
     for verdict in (recall([]), gain([]), error([]), first([]), braking([])):
         assert (verdict.passed, verdict.value) == (False, None)
         assert "never present" in verdict.reason

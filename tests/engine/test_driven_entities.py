@@ -195,7 +195,7 @@ def test_setting_of_wrong_type_raises(setting: str, value: Any, message: str) ->
     ("criterion", "message"),
     [
         ("{colision: {of: Ego}}", "RunSettings.criteria: unknown criterion 'colision'; did you mean 'collision'?"),
-        ("{collision: {oof: Ego}}", "RunSettings.criteria: unknown setting 'oof'; did you mean 'of'?"),
+        ("{collision: {oof: Ego}}", "RunSettings.criteria: criterion 'collision': unknown setting 'oof'; did you mean"),
         ("{collision: Ego}", "RunSettings.criteria: criterion 'collision': settings are not a mapping (got 'Ego')"),
         (
             "collision",

@@ -177,7 +177,7 @@ def test_run_of_invalid_file_reports_line(eidrive: Eidrive, passing_by: Path, tm
     broken.write_text(passing_by.read_text(encoding="utf-8").replace("of: Ego, to", "ofe: Ego, to"), encoding="utf-8")
     result = eidrive("run", broken)
     assert result.exit_code == 2, result.output
-    assert f"{broken}:47: unknown setting 'ofe'; did you mean 'of'?" in result.stderr
+    assert f"{broken}:47: criterion 'min_distance': unknown setting 'ofe'; did you mean 'of'?" in result.stderr
 
 
 @pytest.mark.process

@@ -104,9 +104,9 @@ def test_parse_criteria_reports_every_error_with_its_line() -> None:
     text = "\n  colision: {of: Ego}\n  min_distance:\n    of: Ego\n    too: Incoming\n  time_limit: {within: 0}\n"
     assert diagnostics(text) == [
         "a.xosc:11: unknown criterion 'colision'; did you mean 'collision'?",
-        "a.xosc:12: setting 'to' is missing; add it",
-        "a.xosc:14: unknown setting 'too'; did you mean 'to'?",
-        "a.xosc:15: setting 'within' is 0; input should be greater than 0",
+        "a.xosc:12: criterion 'min_distance': setting 'to' is missing; add it",
+        "a.xosc:14: criterion 'min_distance': unknown setting 'too'; did you mean 'to'?",
+        "a.xosc:15: criterion 'time_limit': setting 'within' is 0; input should be greater than 0",
     ]
 
 
@@ -152,12 +152,16 @@ def test_criterion_of_unknown_monitor_is_reported() -> None:
             "collision: {of: Ego, with: [Incoming, Ego]}",
             "'with' contains the actor itself (got 'Ego'; expected another actor)",
         ),
+        ("collision: {of: Ego, with: []}", "'with' lists no actor (expected actors, or no 'with' for contact with any"),
+        ("in_route: {of: Ego, route: [[3, 4], [3, 4]]}", "'route' has no length (got (3.0, 4.0) only; expected diff"),
+        ("detection_recall: {of: Ego, at_least: 80}", "setting 'at_least' is 80; input should be less than or equal"),
+        ("position_error: {of: Ego, to: Ego}", "'of' and 'to' are equal (got 'Ego'; expected two actors)"),
         ("max_speed: {of: Ego, at_most: 3, name: ''}", "setting 'name' is ''; string should have at least 1 character"),
     ],
 )
 def test_contradictory_settings_are_reported(text: str, message: str) -> None:
     (diagnostic,) = diagnostics(text)
-    assert diagnostic.startswith("a.xosc:10: ")
+    assert diagnostic.startswith(f"a.xosc:10: criterion {text.split(':')[0]!r}: ")
     assert message in diagnostic
 
 
