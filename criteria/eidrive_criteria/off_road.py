@@ -21,7 +21,7 @@ class OffRoad(SummedCriterion):
     state = "left the road"
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        location = self.lanes.center(view, row)
+        location = self.lanes.under_center(view, row)
         if location is not None:
             lane = self.lanes.lane(location)
             if lane.drivable or lane.type in ALLOWED:

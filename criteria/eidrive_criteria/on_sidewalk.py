@@ -23,7 +23,7 @@ class OnSidewalk(SummedCriterion):
     state = "was on a sidewalk"
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        location = self.lanes.center(view, row)
+        location = self.lanes.under_center(view, row)
         if location is not None and self.lanes.lane(location).drivable:
             return None
         x, y, *_ = view.plain_boxes[row]

@@ -37,7 +37,7 @@ class WrongLane(SummedCriterion):
 
 def drives_against_lane(lanes: LaneTracker, view: WorldView, row: int) -> bool:
     """Return whether an actor is in a lane of the opposite direction, outside junctions and lanes for both."""
-    location = lanes.center(view, row)
+    location = lanes.under_center(view, row)
     if location is None or lanes.roads.road(location.road).junction_id is not None:
         return False
     lane = lanes.lane(location)

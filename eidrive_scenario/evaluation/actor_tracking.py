@@ -51,6 +51,8 @@ class Continuity:
 AGAINST = math.cos(math.radians(120.0))
 """Cosine of the angle between the heading of an actor and the direction of a lane beyond which the lane is an opposite
 one; 120° as in ScenarioRunner's criterion of wrong lanes."""
+GAP = 0.5
+"""Maximum distance beyond the end of a road within which a center is on it [m]: roads of maps may have gaps."""
 Point = tuple[float, float, float]
 
 SIDEWALKS = frozenset({"sidewalk", "walking"})
@@ -65,11 +67,19 @@ class LaneTracker:
         self._hint: LaneLocation | None = None
 
     def center(self, view: WorldView, row: int) -> LaneLocation | None:
-        """Return the lane under the center of an actor; None off all lanes."""
+        """Return the lane at the center of an actor, also beyond the end of its road; None beside all lanes."""
         x, y, *_ = view.plain_boxes[row]
         location = self.roads.locate_at(x, y, self._hint, view.states[row].z)
         self._hint = location
         return location if location is not None and self.roads.on_road(location) else None
+
+    def under_center(self, view: WorldView, row: int) -> LaneLocation | None:
+        """Return the lane under the center of an actor; None beside all lanes and beyond the end of the road."""
+        location = self.center(view, row)
+        if location is None:
+            return None
+        (x, y, *_), pose = view.plain_boxes[row], self.roads.pose(location)
+        return location if math.hypot(pose.x - x, pose.y - y) <= GAP else None
 
     def forget(self) -> None:
         """Forget the previous lane, after a teleport."""

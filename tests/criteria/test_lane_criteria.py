@@ -50,6 +50,15 @@ def test_off_road_time(frame: Any, car: Any, roads: RoadNetwork, ys: tuple[float
     assert judge(OffRoad(OffRoadSettings(of="Ego", at_most=1.0)), frames, roads).passed
 
 
+def test_center_beyond_the_end_of_the_road_is_on_no_lane(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    """The road ends at x = -80 m, the center is at -84.5, -82, -79.5 and -77 m in the lane of the oncoming traffic."""
+    frames = along(frame, car, 3.5, 3.5, 3.5, 3.5, x=-84.5)
+    verdict = judge(OffRoad(OffRoadSettings(of="Ego")), frames, roads)
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 0.5, 0.0)
+    assert judge(WrongLane(WrongLaneSettings(of="Ego")), frames, roads).value == pytest.approx(5.0)
+    assert judge(KeepLane(KeepLaneSettings(of="Ego")), frames, roads).value == 0.0
+
+
 @pytest.mark.parametrize(
     ("ys", "value"),
     [
