@@ -157,7 +157,11 @@ class PairedVerdicts:
             return 1.0
         fewer = min(self.only_first, self.only_second)
         exact = float(binomtest(fewer, discordant).pvalue)
-        return max(0.0, exact - float(binom.pmf(fewer, discordant, 0.5))) if mid else exact
+        if not mid:
+            return exact
+        # Equal counts are the limit of both tails, whose sum is 1 and not 1 + point
+        point = float(binom.pmf(fewer, discordant, 0.5))
+        return exact - (point if self.only_first != self.only_second else point / 2.0)
 
     def interval(self, confidence: float = 0.95) -> tuple[float, float]:
         """Return the score interval of the difference of the success rates (Tango, Statistics in Medicine 17, 1998).
