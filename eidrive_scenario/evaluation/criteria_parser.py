@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from typing import Any
@@ -199,7 +200,8 @@ def declare_criteria(
         here = lines.get("", line)
         try:
             origins = parameter_hints(settings, scope)
-            settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
+            with _errors_of(kind):
+                settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
             declaration = _declare(kind, settings, source, here, lines, origins)
             criterion = declaration.build()
             _check_context(criterion, context, source, here)
@@ -244,6 +246,16 @@ def _criterion_settings(
         yield kind, settings, lines[path]
 
 
+@contextmanager
+def _errors_of(kind: str) -> Iterator[None]:
+    """Name a criterion in the errors of its settings."""
+    try:
+        yield
+    except SettingError as error:
+        diagnostics = [replace(each, message=f"criterion {kind!r}: {each.message}") for each in error.diagnostics]
+        raise SettingError(diagnostics) from error
+
+
 def _declare(
     kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int], origins: Mapping[str, str]
 ) -> CriterionDeclaration:
@@ -258,11 +270,8 @@ def _declare(
         hint = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
         message = f"criterion {kind!r}: settings are not a mapping (got {settings!r})"
         raise SettingError(Diagnostic(message, hint, source, line))
-    try:
+    with _errors_of(kind):
         parsed = parse_settings(settings_type, settings, source=source, line=line, lines=lines, origins=origins)
-    except SettingError as error:
-        named = [replace(each, message=f"criterion {kind!r}: {each.message}") for each in error.diagnostics]
-        raise SettingError(named) from error
     return CriterionDeclaration(kind, criterion_type, parsed)
 
 

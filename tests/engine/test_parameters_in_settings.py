@@ -197,7 +197,10 @@ def test_undeclared_parameter_is_reported_by_check_with_its_line(make: Make) -> 
     gap = next(number for number, line in enumerate(lines, 1) if "$Gab" in line)
     printed = CliRunner().invoke(app, ["check", str(path)]).stdout
     assert f"{path}:{delay}: setting 'delay.seconds': unknown parameter $Latncy; did you mean 'Latency'?" in printed
-    assert f"{path}:{gap}: setting 'at_least': unknown parameter $Gab; did you mean 'Gap'?" in printed
+    assert (
+        f"{path}:{gap}: criterion 'min_distance': setting 'at_least': unknown parameter $Gab; did you mean 'Gap'?"
+        in printed
+    )
 
 
 def test_variation_takes_bounds_from_parameters_that_are_not_drawn(make: Make) -> None:
