@@ -25,19 +25,18 @@ class PostEncroachmentTimeSettings(PairSettings):
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of a body from one frame to the next; both are one frame after an absence or a teleport."""
+    """Motion of a body from one frame to the next; both are one frame after an absence or a teleport.
+
+    middle  body at half the time, with the mean heading
+    reach   radius of the circle around its center that contains all bodies of the motion [m]
+    """
 
     begin: float
     end: float
     first: Body
     last: Body
-
-    @property
-    def middle(self) -> Body:
-        """Body at half the time, with the mean heading."""
-        turn = math.remainder(self.last[6] - self.first[6], math.tau)
-        ends = zip(self.first[:6], self.last[:6], strict=True)
-        return (*((first + last) / 2.0 for first, last in ends), self.first[6] + turn / 2.0)
+    middle: Body
+    reach: float
 
 
 class Trail:
@@ -51,9 +50,12 @@ class Trail:
         """Add the motion up to this frame, if the actor is present; delete the motions before the horizon."""
         step = self._continuity.step(view, row)
         if row is not None:
-            body, time = view.plain_boxes[row], view.time
-            before = (time, body) if step is None else (self.past[-1].end, self.past[-1].last)
-            self.past.append(Motion(before[0], time, before[1], body))
+            last, end = view.plain_boxes[row], view.time
+            begin, first = (end, last) if step is None else (self.past[-1].end, self.past[-1].last)
+            turn = math.remainder(last[6] - first[6], math.tau)
+            middle = *((a + b) / 2.0 for a, b in zip(first[:6], last[:6], strict=True)), first[6] + turn / 2.0
+            reach = (math.hypot(last[3], last[4]) + math.dist(first[:2], last[:2])) / 2.0
+            self.past.append(Motion(begin, end, first, last, middle, reach))
         while self.past and self.past[0].end < view.time - HORIZON:
             self.past.popleft()
 
@@ -120,7 +122,9 @@ def time_between(leaving: Trail, arriving: Trail, now: float, below: float = mat
     for departure in reversed(leaving.past):
         if arrival.begin - departure.end >= smallest:
             break
-        smallest = min(smallest, _shortest(departure, arrival))
+        reach = departure.reach + arrival.reach
+        if abs(departure.middle[0] - arrival.middle[0]) <= reach >= abs(departure.middle[1] - arrival.middle[1]):
+            smallest = min(smallest, _shortest(departure, arrival))
     return smallest if smallest < min(below, HORIZON) else math.inf
 
 
@@ -131,7 +135,6 @@ def _shortest(departure: Motion, arrival: Motion) -> float:
     the sum of their extents. The pairs of instants, as shares of both motions, then form a convex polygon, and the time
     between them is linear: it is the least at a corner.
     """
-    near = (math.hypot(*departure.last[3:5]) + math.hypot(*arrival.last[3:5])) / 2.0
     gap, moved, came = (
         [b - a for a, b in zip(start[:3], stop[:3], strict=True)]
         for start, stop in (
@@ -140,8 +143,6 @@ def _shortest(departure: Motion, arrival: Motion) -> float:
             (arrival.first, arrival.last),
         )
     )
-    if any(abs(gap[axis]) > near + abs(moved[axis]) + abs(came[axis]) for axis in (0, 1)):
-        return math.inf
     a, b = departure.middle, arrival.middle
     delay = arrival.begin - departure.begin, departure.begin - departure.end, arrival.end - arrival.begin
     polygon = _clipped(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), *delay)
