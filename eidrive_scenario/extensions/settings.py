@@ -56,13 +56,14 @@ def parse_settings(
             for detail in details
         ]
         raise SettingError(diagnostics) from error
-    immense = next(_immense(settings), None)
-    if immense is not None:
-        path = _typed_path(immense[0], data)
-        message = f"setting {quoted(path)} is {quoted(immense[1])}"
-        hint = f"give a number within {MAX_NUMBER:g}"
-        diagnostic = Diagnostic(message, hint, source, _line_of(immense[0], lines or {}, line))
-        raise SettingError(_with_origins(diagnostic, ".".join(_keys_of(immense[0], data)), origins))
+    for loc, number in _numbers(settings):
+        given = _given(loc, data)
+        is_immense = not abs(number) <= MAX_NUMBER and not (isinstance(number, float) and math.isinf(number))
+        if is_immense or isinstance(given, bool):
+            message = f"setting {quoted(_typed_path(loc, data))} is {quoted(number if is_immense else given)}"
+            hint = f"give a number within {MAX_NUMBER:g}" if is_immense else "give a number"
+            diagnostic = Diagnostic(message, hint, source, _line_of(loc, lines or {}, line))
+            raise SettingError(_with_origins(diagnostic, ".".join(_keys_of(loc, data)), origins))
     return settings
 
 
@@ -143,19 +144,29 @@ def _keys_of(loc: tuple[int | str, ...], data: Any) -> Iterator[str]:
             yield str(part)
 
 
-def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:
-    """Yield the numbers beyond MAX_NUMBER in settings, with their key paths."""
+def _given(loc: tuple[int | str, ...], data: Any) -> Any:
+    """Return what the user gave at a path; None for a default value."""
+    for part in loc:
+        try:
+            data = data[part]
+        except (LookupError, TypeError):
+            return None
+    return data
+
+
+def _numbers(value: object, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:
+    """Yield the numbers in settings, with their key paths."""
     if isinstance(value, BaseModel):
         value = value.__dict__
     if isinstance(value, int | float):
-        if not abs(value) <= MAX_NUMBER and not (isinstance(value, float) and math.isinf(value)):
+        if not isinstance(value, bool):
             yield path, value
     elif isinstance(value, Mapping):
         for key, inner in value.items():
-            yield from _immense(inner, (*path, key if isinstance(key, int) else str(key)))
+            yield from _numbers(inner, (*path, key if isinstance(key, int) else str(key)))
     elif isinstance(value, list | tuple):
         for index, inner in enumerate(value):
-            yield from _immense(inner, (*path, index))
+            yield from _numbers(inner, (*path, index))
 
 
 _COLLECTIONS = {

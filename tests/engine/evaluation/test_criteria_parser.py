@@ -155,6 +155,7 @@ def test_criterion_of_unknown_monitor_is_reported() -> None:
         ("collision: {of: Ego, with: []}", "'with' lists no actor (expected actors, or no 'with' for contact with any"),
         ("in_route: {of: Ego, route: [[3, 4], [3, 4]]}", "'route' has no length (got (3.0, 4.0) only; expected diff"),
         ("detection_recall: {of: Ego, at_least: 80}", "setting 'at_least' is 80; input should be less than or equal"),
+        ("min_distance: {of: Ego, to: Incoming, at_least: true}", "setting 'at_least' is True; give a number"),
         ("position_error: {of: Ego, to: Ego}", "'of' and 'to' are equal (got 'Ego'; expected two actors)"),
         ("max_speed: {of: Ego, at_most: 3, name: ''}", "setting 'name' is ''; string should have at least 1 character"),
     ],
