@@ -441,8 +441,10 @@ class RoadNetwork:
         return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Return the bounding rectangle of all lane centers: minimum x and y, maximum x and y [m]."""
+        """Return the bounding rectangle of all lane centers: minimum x and y, maximum x and y [m]; 0 without lanes."""
         points: Array = self._locator.sample_points
+        if not len(points):
+            return 0.0, 0.0, 0.0, 0.0
         low, high = points.min(axis=0), points.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 

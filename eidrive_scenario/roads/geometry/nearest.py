@@ -54,6 +54,8 @@ class NearestPoints:
 
         None is near a position that is not finite.
         """
+        if not len(self.points):
+            return np.full(len(to), np.inf), np.zeros(len(to), dtype=np.int64)
         if self._pays_tree(len(to)):
             distance, index = self._by_tree(to, 1, within)
             return distance[:, 0], index[:, 0]

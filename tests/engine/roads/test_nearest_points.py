@@ -7,9 +7,17 @@ import sys
 
 import numpy as np
 import pytest
+from opendrive_xml import map_xml, road_xml, section_xml
 from scipy.spatial import cKDTree
 
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.geometry.nearest import FEW, NearestPoints
+
+
+def test_map_without_lanes_has_no_lane_near_a_point() -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml("1", lanes=section_xml())))
+    assert roads.locate_at(5.0, 0.0) is None
+    assert roads.bounds() == (0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("size", [1, 40, FEW, FEW + 1])
