@@ -29,7 +29,7 @@ class TrafficLanes:
     beside_left, beside_right  neighbor of the same direction with any marking
     following                  successors with the same kind of users, in the order of the map
     onward, backward           first successor and first predecessor, -1 if there is none
-    ends_at                    progress at which a lane ends or merges while an adjacent lane continues, else inf
+    ends_at                    progress at which a lane ends, merges or narrows beside another lane, else inf
     """
 
     def __init__(self, roads: RoadNetwork) -> None:
@@ -109,21 +109,23 @@ class TrafficLanes:
         return rule not in ("increase", "none"), rule not in ("decrease", "none")
 
     def _find_ends(self) -> None:
-        """Store the ends of lanes beside continuing lanes: lanes without a successor, and lanes that narrow to merge
-        into the successor of a wider one. Cars leave them before they are too narrow.
+        """Store the ends of lanes beside others: where they become too narrow, where they merge into the successor of a
+        wider lane, and where only the other lane has a successor. Cars leave them before.
         """
         width = self.width(np.arange(len(self.keys)), self.length)
         for lane in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction):
             way = self.onward[lane]
             beside = [int(other) for other in (self.beside_left[lane], self.beside_right[lane]) if other >= 0]
-            if any(
+            progress = np.linspace(0.0, self.length[lane], max(math.ceil(self.length[lane] / SAMPLE), 1) + 1)
+            wide = self.width(np.full(len(progress), lane), progress) >= NARROWEST
+            narrows = progress[np.logical_or.accumulate(wide) & ~wide]
+            if beside and narrows.size:
+                self.ends_at[lane] = narrows[0]
+            elif any(
                 (way < 0 <= self.onward[other]) or (0 <= way == self.onward[other] and width[lane] < width[other])
                 for other in beside
             ):
-                progress = np.linspace(0.0, self.length[lane], max(math.ceil(self.length[lane] / SAMPLE), 1) + 1)
-                narrow = np.flatnonzero(self.width(np.full(len(progress), lane), progress) < NARROWEST)
-                first = narrow[narrow > 0]
-                self.ends_at[lane] = progress[first[0]] if first.size else self.length[lane]
+                self.ends_at[lane] = self.length[lane]
 
     def s(self, lane: Integers, progress: Array) -> Array:
         """Return s of the road at a progress along lanes."""

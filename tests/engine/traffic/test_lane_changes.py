@@ -223,6 +223,16 @@ def ending_lane(link: str) -> RoadNetwork:
     )
 
 
+def test_lane_that_narrows_beside_another_ends_there() -> None:
+    """Parking bays as a lane: it opens from 100 m on, is 3 m wide from 130 to 200 m, and 2.2 m at 208 m of 0.1 m/m."""
+    widths = ((0, 0.0, 0.0), (100, 0.0, 0.1), (130, 3.0, 0.0), (200, 3.0, -0.1), (230, 0.0, 0.0))
+    width = "".join(f'<width sOffset="{s}" a="{a}" b="{b}" c="0" d="0"/>' for s, a, b in widths)
+    bays = f'<lane id="-2" type="driving"><link/>{width}</lane>'
+    lanes = section_xml(right=lane_xml(-1) + bays)
+    fleet = Fleet(RoadNetwork.parse(map_xml(road_xml("1", length=300.0, lanes=lanes))))
+    assert fleet.lanes.ends_at[np.isfinite(fleet.lanes.ends_at)] == pytest.approx([210.0])
+
+
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("link", ["", lane_links_xml(after=-1)])
 def test_cars_leave_lane_that_ends_or_merges(link: str) -> None:
