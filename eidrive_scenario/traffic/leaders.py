@@ -53,22 +53,27 @@ class Occupants:
 
 @dataclass(frozen=True)
 class Leaders:
-    """Gap from the front bumper to the rear of the leader (N,) [m], inf without a leader; speeds of the leaders (N,)
-    [m/s].
+    """Leaders of cars (N,).
+
+    gap    from the front bumper to the rear of the leader [m], inf without a leader
+    speed  of the leader [m/s]
+    owner  index of the leader in the fleet, negative for others
     """
 
     gap: Array
     speed: Array
+    owner: Integers
 
     @classmethod
     def none(cls, count: int) -> Leaders:
         """Return leaders of cars without a leader."""
-        return cls(np.full(count, np.inf), np.zeros(count))
+        return cls(np.full(count, np.inf), np.zeros(count), np.full(count, FIXED))
 
     def or_nearer(self, other: Leaders) -> Leaders:
         """Return the nearer leader of two for each car."""
         nearer = other.gap < self.gap
-        return Leaders(np.where(nearer, other.gap, self.gap), np.where(nearer, other.speed, self.speed))
+        columns = ((getattr(other, field.name), getattr(self, field.name)) for field in fields(self))
+        return Leaders(*(np.where(nearer, theirs, own) for theirs, own in columns))
 
 
 @dataclass(frozen=True)
@@ -98,9 +103,9 @@ def find_leaders(
     own       (N,) indices of the cars in the fleet, by default 0, 1, 2, …
     """
     count, depth = plans.shape
-    gap, speed = np.full(count, np.inf), np.zeros(count)
+    leaders = Leaders.none(count)
     if not len(occupants.lane) or not count:
-        return Leaders(gap, speed)
+        return leaders
     order, positions = occupants.order
     me = np.arange(count) if own is None else own
     open_, offset = np.arange(count), -progress
@@ -117,11 +122,11 @@ def find_leaders(
         occupant = order[np.minimum(at, len(order) - 1)]
         hit = (at < len(order)) & (occupants.lane[occupant] == lane) & (occupants.owner[occupant] != me[open_])
         hits = occupant[hit]
-        gap[open_[hit]] = offset[hit] + occupants.rear[hits] - front[open_[hit]]
-        speed[open_[hit]] = occupants.speed[hits]
+        leaders.gap[open_[hit]] = offset[hit] + occupants.rear[hits] - front[open_[hit]]
+        leaders.speed[open_[hit]], leaders.owner[open_[hit]] = occupants.speed[hits], occupants.owner[hits]
         offset = offset + lanes.length[lane]
         open_, offset = open_[~hit], offset[~hit]
-    return Leaders(gap, speed)
+    return leaders
 
 
 def find_followers(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
@@ -97,7 +99,8 @@ class Occupancy:
             stronger = other_braking > braking
             binding = still[stronger]
             leaders.gap[binding], leaders.speed[binding] = other.gap[stronger], other.speed[stronger]
-        return Leaders(leaders.gap * self._lanes.stretch(cars.lane, cars.progress), leaders.speed)
+            leaders.owner[binding] = other.owner[stronger]
+        return replace(leaders, gap=leaders.gap * self._lanes.stretch(cars.lane, cars.progress))
 
     def _lanes_left(self, cars: Cars) -> tuple[Integers, Integers]:
         """Return the cars whose bodies still overlap the lane that they leave, and these lanes."""

@@ -3,18 +3,20 @@
 In junctions: first come, first served, one car at a time on conflicting lanes. The first car of a queue requests all
 lanes of its passage through the junction within its braking distance, if there is space behind the junction. They are
 granted when no car holds a lane that crosses, merges or diverges. A car holds a lane until it has left it, and against
-diverging lanes until it has cleared the fork. Long vehicles hold the lanes that they sweep over as well, and need them
-without other vehicles, also outside the junction.
+diverging lanes until it has cleared the fork. A vehicle that is too long to stop between two junctions requests the
+lanes of both. Long vehicles hold the lanes that they sweep over as well, and need them without other vehicles, also
+outside the junction.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Bools, number_in_groups
+from eidrive_scenario.base.arrays import Array, Bools, Integers, number_in_groups
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import SignalPlace
@@ -82,7 +84,7 @@ class StopLines:
         lines = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, none, self.closed())
         late = cars.speed**2 > 2.0 * TOO_LATE * np.maximum(lines.gap, 0.0)
         binding = (lines.gap >= 0.0) & ~late & ~cars.walks & ~cars.ignores_lights
-        return Leaders(np.where(binding, np.maximum(lines.gap - STOP_LINE, 1e-3), np.inf), lines.speed)
+        return replace(lines, gap=np.where(binding, np.maximum(lines.gap - STOP_LINE, 1e-3), np.inf))
 
 
 CLEARANCE = 3.2
@@ -115,16 +117,22 @@ class Crossings:
         self.sweeps: dict[str, Sweep] = {}
         """Sweeps of the long vehicles that hold lanes."""
 
+    def beside(self, lane: int) -> list[int]:
+        """Return all lanes of the junction of a lane."""
+        return self._by_junction.get(self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id or "", [])
+
     def meeting(self, lane: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
         if lane in self._meeting:
             return self._meeting[lane]
-        lines, low, high = self._lines
         conflicts: dict[int, bool] = {}
+        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
+        if junction is None:
+            return conflicts
+        lines, low, high = self._lines
         mine = lines[lane]
         points = NearestPoints(mine)
-        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
-        for other in () if junction is None else self._by_junction.get(junction, ()):
+        for other in self._by_junction.get(junction, ()):
             reach = CLEARANCE + max(self._swings[lane], self._swings[other])
             near_by = np.all(low[other] <= high[lane] + reach) and np.all(low[lane] <= high[other] + reach)
             if self._lanes.road[other] == self._lanes.road[lane] or not near_by:
@@ -161,37 +169,42 @@ class Crossings:
         pieces = np.split(points, np.cumsum(counts)[:-1])
         return dict(zip(inside.tolist(), pieces, strict=True)), low, high
 
-    def free(self, lane: int, name: str, blocked: set[int]) -> bool:
-        """Return True if `name` may hold a lane: no car holds and nothing blocks a lane in conflict with it."""
-        for other, only_fork in self.meeting(lane).items():
-            if other in blocked:
-                return False
-            for holder, rear in self.holders.get(other, {}).items():
-                if holder != name and not (only_fork and rear > FORK):
-                    return False
-        return True
+    def conflicts(self, passage: list[int], sweep: Sweep) -> set[int]:
+        """Return the lanes in conflict with a passage, and those that are swept from it."""
+        return {*sweep, *(other for lane in passage for other in self.meeting(lane))}
 
-    def is_swept(self, name: str, passage: list[int], sweep: Sweep) -> bool:
-        """Return whether a long vehicle that holds lanes and `name` would sweep over a lane or each other's way."""
+    def holder(self, name: str, passage: list[int], sweep: Sweep) -> str | None:
+        """Return a car that holds a lane in conflict with a passage of `name`, or that is in the way of a sweep."""
+        for lane in passage:
+            for other, only_fork in self.meeting(lane).items():
+                for holder, rear in self.holders.get(other, {}).items():
+                    if holder != name and not (only_fork and rear > FORK):
+                        return holder
+        return self._sweeping(name, passage, sweep)
+
+    def _sweeping(self, name: str, passage: list[int], sweep: Sweep) -> str | None:
+        """Return a car that holds lanes and sweeps over the way of `name`, or is in the way of its sweep."""
         ways = {int(self._lanes.backward[passage[0]]), *passage, *self._lanes.following[passage[-1]]}
         for holder, other in self.sweeps.items():
             meets = any(
                 other[lane][0] <= sweep[lane][1] and sweep[lane][0] <= other[lane][1] for lane in other.keys() & sweep
             )
-            if holder != name and (meets or not ways.isdisjoint(other)):
-                return True
+            ahead = holder in self.holders.get(passage[0], ())
+            if holder != name and not ahead and (meets or not ways.isdisjoint(other)):
+                return holder
         for lane, held in self.holders.items() if sweep else ():
             leaves = not sweep.keys().isdisjoint(self._lanes.following[lane])
             enters = int(self._lanes.backward[lane]) in sweep
             end = sweep[lane][1] if lane in sweep else -np.inf
             for holder, rear in held.items():
                 if holder != name and (leaves or (enters and rear == -np.inf) or (lane in sweep and rear <= end)):
-                    return True
-        return False
+                    return holder
+        return None
 
     def take(self, lane: int, name: str) -> None:
-        """Let `name` hold a lane."""
-        self.holders.setdefault(lane, {})[name] = -np.inf
+        """Let `name` hold a lane of a junction. Lanes between the junctions of a passage are not held."""
+        if self._lanes.in_junction[lane]:
+            self.holders.setdefault(lane, {})[name] = -np.inf
 
     def holds(self, name: str, lane: int) -> bool:
         """Return whether `name` holds a lane."""
@@ -216,6 +229,8 @@ def _swing(radius: Array) -> Array:
     return np.asarray(np.hypot(outer, VAN_FRONT) - outer)
 
 
+AT_REST = 0.1
+"""Maximum speed of a car that waits [m/s]."""
 PATIENCE = 20.0
 """Waiting time after which a car has priority over others at a junction [s]."""
 
@@ -229,11 +244,16 @@ class RightOfWay:
         self._sweeps = Sweeps(lanes)
         self._requested: list[Sweep] = []
         """Sweeps of the long vehicles that request a passage. Other vehicles do not stop in their ranges."""
+        self._set_back: dict[tuple[int, tuple[float, ...]], float] = {}
+        """Lengths at the ends of lanes that long bodies sweep over in the junction behind them [m]."""
+        self._waits_for: dict[str, str] = {}
+        """By the name of a standing car without a passage, the car for which it waited in the last decision."""
 
     def waits(self, cars: Cars, begins: Array) -> Leaders:
         """Return the stop lines of junctions that cars may not enter yet, and the starts of ranges that are swept."""
-        wait = self._distances(cars, begins) - cars.front - STOP_LINE
-        lines = Leaders(np.maximum(wait, 1e-3), np.zeros(len(cars)))
+        distance = self._distances(cars, begins)
+        wait = distance - cars.front - STOP_LINE - self._set_backs(cars, distance)
+        lines = replace(Leaders.none(len(cars)), gap=np.maximum(wait, 1e-3))
         swept = [
             (lane, low - STOP_LINE)
             for sweep in (*self._crossings.sweeps.values(), *self._requested)
@@ -246,7 +266,28 @@ class RightOfWay:
         ranges = Occupants(lane, low, low, low, np.zeros(len(lane)), np.full(len(lane), FIXED))
         starts = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, np.zeros(len(cars)), ranges)
         passes = cars.granted.any(axis=1) | (cars.speed**2 > 2.0 * TOO_LATE * np.maximum(starts.gap, 0.0))
-        return lines.or_nearer(Leaders(np.where(passes, np.inf, starts.gap), starts.speed))
+        return lines.or_nearer(replace(starts, gap=np.where(passes, np.inf, starts.gap)))
+
+    def _set_backs(self, cars: Cars, distance: Array) -> Array:
+        """Return the lengths (N,) before the next junction over which long vehicles of the fleet may sweep [m]."""
+        lengths = np.zeros(len(cars))
+        bodies = {
+            (*spec.offset, *spec.size): spec
+            for spec, front in zip(cars.specs, cars.front.tolist(), strict=True)
+            if front > VAN_FRONT
+        }
+        if not bodies:
+            return lengths
+        first = np.argmax(self._barred(cars), axis=1)
+        for index in np.flatnonzero(np.isfinite(distance)).tolist():
+            before, entered = cars.plan[index, first[index] - 1 : first[index] + 1].tolist()
+            for body, spec in bodies.items():
+                if (before, body) not in self._set_back:
+                    sweeps = [self._sweeps.of(spec, [lane]) for lane in self._crossings.beside(entered)]
+                    starts = [sweep[before][0] for sweep in sweeps if before in sweep]
+                    self._set_back[before, body] = self._lanes.lengths[before] - min(starts, default=np.inf)
+                lengths[index] = max(lengths[index], self._set_back[before, body])
+        return lengths
 
     def grant_right_of_way(
         self,
@@ -263,60 +304,94 @@ class RightOfWay:
         There must be space behind the junction. Lanes in conflict with one of `moving`, which moving foreign actors
         overlap, are not granted, nor are lanes that delay a car with priority. A car that a traffic light stops before
         the junction loses its passage.
+
+        Cars that wait for each other in a circle lose the lanes that they have not reached. They need no space behind
+        the next junction and ignore priority, so that the circle moves on.
         """
         self._follow(cars, lights, begins)
         distance, first = self._distances(cars, begins), np.argmax(self._barred(cars), axis=1)
         v = cars.speed
-        close = distance <= v * v / (2.0 * cars.drivers.deceleration) + cars.front + 4.0 * STOP_LINE + v
-        gap = leaders.gap + cars.front
+        braking = v * v / (2.0 * cars.drivers.deceleration) + v
+        close = distance <= braking + cars.front + 4.0 * STOP_LINE + self._set_backs(cars, distance)
+        gap, names = leaders.gap + cars.front, [spec.name for spec in cars.specs]
+        circle = self._circle(cars, leaders, names)
+        for index in [index for index, name in enumerate(names) if name in circle]:
+            self._revoke(cars, index, cars.granted[index] & (begins[index] > cars.front[index]))
         asking = []
         for index in np.flatnonzero(close & (gap > distance)).tolist():
-            passage = self._passage(cars, index)
+            needed = 0.0 if names[index] in circle else float(cars.front[index] - cars.rear[index]) + STOP_LINE
+            passage = self._passage(cars, index, needed)
             behind = distance[index] + self._lanes.length[passage].sum() - cars.rear[index]
-            if gap[index] > behind + cars.drivers.standstill_gap[index]:
+            if gap[index] > behind + cars.drivers.standstill_gap[index] or names[index] in circle:
                 if np.isnan(cars.asked[index]):
                     cars.asked[index] = time
-                asking.append(
-                    (float(cars.asked[index]), float(distance[index]), cars.specs[index].name, index, passage)
-                )
-        kept_free: set[int] = set()
+                asking.append((float(cars.asked[index]), float(distance[index]), names[index], index, passage))
+            elif leaders.owner[index] >= 0:
+                self._waits_for[names[index]] = names[leaders.owner[index]]
+        kept_free: dict[int, str] = {}
         self._requested = []
         for since, _, name, index, passage in sorted(asking):
             sweep = self._sweeps.of(cars.specs[index], passage)
             self._requested.append(sweep)
-            if self._is_occupied(sweep, occupants, index):
+            owners = self._owners(sweep, occupants, index)
+            if owners.size:
+                self._waits_for[name] = names[owners[0]] if owners[0] >= 0 else ""
                 continue
-            blocked = moving | kept_free
-            if (
-                all(self._crossings.free(lane, name, blocked) for lane in passage)
-                and blocked.isdisjoint(sweep)
-                and not self._crossings.is_swept(name, passage, sweep)
-            ):
+            holder = self._crossings.holder(name, passage, sweep)
+            conflicts = self._crossings.conflicts(passage, sweep)
+            prior = {} if name in circle else {lane: kept_free[lane] for lane in conflicts & kept_free.keys()}
+            if holder is None and not prior and conflicts.isdisjoint(moving):
                 for lane in passage:
                     self._crossings.take(lane, name)
                 if sweep:
                     self._crossings.sweeps[name] = sweep
                 cars.granted[index, first[index] : first[index] + len(passage)] = True
-                cars.asked[index] = np.nan
-            elif time - since > PATIENCE:
-                kept_free.update(passage)
+                if name not in circle:  # Else it keeps its rank until the circle has moved on
+                    cars.asked[index] = np.nan
+                continue
+            self._waits_for[name] = holder or min(prior.values(), default="")
+            if time - since > PATIENCE:
+                kept_free.update(dict.fromkeys(passage, name))
 
-    def _is_occupied(self, sweep: Sweep, occupants: Occupants, index: int) -> bool:
-        """Return whether another vehicle is in a swept range outside the junction, or cannot stop before it."""
+    def _revoke(self, cars: Cars, index: int, ahead: Bools) -> None:
+        """Revoke the lanes `ahead` (D,) of a passage, which the car has not reached."""
+        if ahead.any():
+            name, plan = cars.specs[index].name, cars.plan[index]
+            cars.granted[index] &= ~ahead
+            kept = plan[cars.granted[index]].tolist()
+            for lane in set(plan[ahead].tolist()).difference(kept):
+                self._crossings.release(name, lane)
+            if kept and name in self._crossings.sweeps:
+                self._crossings.sweeps[name] = self._sweeps.of(cars.specs[index], kept)
+
+    def _circle(self, cars: Cars, leaders: Leaders, names: list[str]) -> set[str]:
+        """Return the standing cars that wait for each other in closed circles, and forget for whom cars waited."""
+        waits = {}
+        for index in np.flatnonzero(cars.speed < AT_REST).tolist():
+            behind_leader = leaders.owner[index] >= 0 and leaders.gap[index] < 2.0 * cars.drivers.standstill_gap[index]
+            leader = names[leaders.owner[index]] if behind_leader else ""
+            waits[names[index]] = self._waits_for.get(names[index], leader)
+        self._waits_for = {}
+        circle = set(waits)
+        while len(after := {waits[name] for name in circle} & waits.keys()) < len(circle):
+            circle = after
+        return circle
+
+    def _owners(self, sweep: Sweep, occupants: Occupants, index: int) -> Integers:
+        """Return the owners that are in a swept range outside the junction, or cannot stop before it."""
         stopping = occupants.front + occupants.speed**2 / (2.0 * TOO_LATE)
         others = (occupants.owner != FIXED) & (occupants.owner != index)
-        return any(
-            np.any(
-                others & (occupants.lane == lane) & (stopping > low - STOP_LINE) & (occupants.rear < high + STOP_LINE)
-            )
-            for lane, (low, high) in sweep.items()
-            if not self._lanes.in_junction[lane]
-        )
+        inside = np.zeros(len(others), dtype=bool)
+        for lane, (low, high) in sweep.items():
+            if not self._lanes.in_junction[lane]:
+                reaches = (stopping > low - STOP_LINE) & (occupants.rear < high + STOP_LINE)
+                inside |= (occupants.lane == lane) & reaches
+        return np.asarray(occupants.owner[others & inside])
 
     def _follow(self, cars: Cars, lights: Leaders, begins: Array) -> None:
         """Update the progress of cars in junctions, and revoke passages that a traffic light blocks."""
         for index in np.flatnonzero(cars.granted[:, 0]).tolist():
-            held = self._crossings.holders[int(cars.plan[index, 0])]
+            held = self._crossings.holders.get(int(cars.plan[index, 0]), {})
             held[cars.specs[index].name] = float(cars.progress[index] + cars.rear[index])
         ahead = cars.granted.any(axis=1) & ~cars.granted[:, 0] & np.isfinite(lights.gap)
         for index in np.flatnonzero(ahead).tolist():
@@ -335,15 +410,22 @@ class RightOfWay:
         barred[:, 0] = False
         return np.asarray(barred)
 
-    def _passage(self, cars: Cars, index: int) -> list[int]:
-        """Return the lanes of the next junction that a car may not enter yet, up to its last connecting road."""
+    def _passage(self, cars: Cars, index: int, needed: float) -> list[int]:
+        """Return the lanes of the next junction that a car may not enter yet, up to its last connecting road.
+
+        With less than the length `needed` to stop [m] between this junction and the next one, they are those of both.
+        """
         lanes = self._lanes
         passage: list[int] = []
+        between: list[int] = []
         for lane, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):
             if lane >= 0 and lanes.in_junction[lane] and not granted:
-                passage.append(lane)
+                passage += [*between, lane]
+                between = []
             elif passage:
-                return passage
+                between.append(lane)
+                if lane < 0 or granted or sum(lanes.lengths[other] for other in between) >= needed:
+                    return passage
         while (ways := lanes.following[passage[-1]]) and lanes.road[ways[0]] == lanes.road[passage[-1]]:
             passage.append(ways[0])
         return passage

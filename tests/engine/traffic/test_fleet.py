@@ -18,6 +18,7 @@ from opendrive_xml import (
 )
 
 from eidrive_scenario.base.geometry import overlap
+from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, IntelligentDriver
 from eidrive_scenario.traffic.spawning.bodies import library_bodies
@@ -224,6 +225,57 @@ def test_car_on_a_circle_waits_before_its_second_passage() -> None:
     left = below.index(False)
     assert not any(below[left:800])
     assert any(below[800:])
+
+
+def test_cars_that_wait_for_each_other_on_a_circle_move_on() -> None:
+    """Four cars of 4.5 m stand on links of 7 m before connecting roads of 22 m. None has the space of its length and
+    the standstill gap behind the junction before the next car has moved. All then complete the circle of 116 m.
+    """
+    lane = section_xml(right=lane_xml(-1, link=lane_links_xml(-1, -1)))
+    radius = 116.0 / (2.0 * math.pi)
+    roads, angle = [], 0.0
+    for number in range(8):
+        length = 22.0 if number % 2 else 7.0
+        link = predecessor_xml(str((number - 1) % 8)) + successor_xml(str((number + 1) % 8))
+        roads.append(
+            road_xml(
+                str(number),
+                length=length,
+                x=radius * math.cos(angle),
+                y=radius * math.sin(angle),
+                hdg=angle + 0.5 * math.pi,
+                curvature=1.0 / radius,
+                junction=str(number) if number % 2 else "-1",
+                link=link,
+                lanes=lane,
+            )
+        )
+        angle += length / radius
+    circle = RoadNetwork.parse(map_xml(*roads))
+    fleet = Fleet(circle)
+    for road in "0246":
+        fleet.add(car(road), circle.location(road, -1, 1.5), speed=0.0)
+    before, covered = fleet.placements(), dict.fromkeys("0246", 0.0)
+    for _ in range(1200):
+        after = fleet.step(None, DT)
+        for name, place in after.items():
+            covered[name] += math.hypot(place.x - before[name].x, place.y - before[name].y)
+        before = after
+    assert min(covered.values()) > 116.0
+
+
+@pytest.mark.exhaustive
+def test_buses_leave_a_roundabout_with_short_links() -> None:
+    """Buses of 12.1 m cannot stop on the links of 8.1 m between the exits, so that none may enter to wait there."""
+    roads = RoadNetwork.load(library_path() / "roads" / "roundabout.xodr")
+    fleet = Fleet(roads)
+    spec, _ = library_bodies("bus")[0]
+    for road in "1234":
+        for number, s in enumerate((20.0, 40.0, 60.0)):
+            fleet.add(replace(spec, name=f"{road}.{number}"), roads.location(road, 1, s), speed=5.0)
+    for _ in range(round(300.0 / DT)):
+        fleet.step(None, DT)
+    assert not fleet.names
 
 
 def test_branches_depend_on_the_seed(library_roads: RoadNetwork) -> None:
