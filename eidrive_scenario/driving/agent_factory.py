@@ -124,6 +124,7 @@ def build_agent(
     if planner != NO_PLANNER:
         driver = construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed)
         driver.view = view or None
+        driver.can_read_light = detector.can_read_light
     controller: VehicleController | None = None
     if spec.has_wheels:
         kind, own = selected_extension(settings, "vehicle_controller", VehicleController)

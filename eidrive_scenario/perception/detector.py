@@ -146,3 +146,10 @@ class Detector(ABC):
     def signals(self) -> Sequence[SignalReading]:
         """Return the signals of the map found in the last readings, of the kinds in `detectable_signals`."""
         return ()
+
+    def can_read_light(self, signal: str, x: float, y: float, z: float, yaw: float) -> bool:
+        """Return whether the station would have the face of a light of the map in view at a place [m, rad].
+
+        A vehicle that has to stop for the light stops where this is True. Occluding objects do not count.
+        """
+        return True

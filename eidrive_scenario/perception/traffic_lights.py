@@ -43,7 +43,8 @@ class StopLine(NamedTuple):
 
 
 class SignalAhead(NamedTuple):
-    """Signal on the path: the distance to its stop line [m], its state, and whether it requires a stop.
+    """Signal on the path: the distance to its stop line and the height of that [m], its state, and whether it requires
+    a stop.
 
     `state` is None until the signal has been in sight. A stop sign that has been in sight requires a stop. `is_yellow`
     is True for a light that requires a stop if that is possible, before it shows red.
@@ -52,6 +53,7 @@ class SignalAhead(NamedTuple):
     signal: str
     kind: Kind
     distance: float
+    z: float
     state: str | None
     must_stop: bool
     is_yellow: bool = False
@@ -100,7 +102,7 @@ class SignalsAhead:
                     colors = self._colors[line.signal]
                     stop = must_stop(state or "", colors)
                     is_yellow = stop and not shows_red(state or "", colors)
-                yield SignalAhead(line.signal, line.kind, distance - progress, state, stop, is_yellow)
+                yield SignalAhead(line.signal, line.kind, distance - progress, line.z, state, stop, is_yellow)
 
 
 def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -> Iterator[StopLine]:

@@ -40,6 +40,16 @@ def lens_of(settings: CameraSettings) -> Pinhole:
     return Pinhole.of_fov(settings.width, settings.height, fov, settings.near, settings.far)
 
 
+def unexposed(settings: CameraSettings) -> CameraReading:
+    """Return a reading of a camera without an image and at the origin, for the projection of points."""
+
+    def expose() -> CameraImage:
+        raise RuntimeError("a camera without an image has no pixels")
+
+    image = DeferredImage((settings.width, settings.height), expose)
+    return CameraReading.of(image, lens_of(settings).intrinsics, np.eye(4), np.array(settings.distortion))
+
+
 @lru_cache(maxsize=32)
 def _distortion(settings: CameraSettings) -> _Distortion:
     """Return the direction of each pixel center, found by iteration to 1e-9.

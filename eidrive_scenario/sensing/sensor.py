@@ -51,17 +51,26 @@ class Mounting(msgspec.Struct, frozen=True):
 
     def pose(self, view: WorldView, row: int) -> Array:
         """Return the pose (4, 4) sensor to world, sensor frame x forward, y left, z up."""
-        body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
-        pose = np.eye(4)
-        pose[:3, :3] = body @ rotation_matrix(self.yaw, self.pitch)
-        pose[:3, 3] = view.position[row] + body @ (self.x, self.y, self.z)
-        return pose
+        return self._pose(view.position[row], rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row]))
 
     def camera_pose(self, view: WorldView, row: int) -> Array:
         """Return the pose (4, 4) camera to world, camera frame x right, y down, z forward."""
-        pose = self.pose(view, row)
-        pose[:3, :3] = pose[:3, :3] @ _OPTICAL
+        return _optical(self.pose(view, row))
+
+    def level_camera_pose(self, x: float, y: float, z: float, yaw: float) -> Array:
+        """Return the pose of `camera_pose` on an actor on level ground at this place [m] with this heading [rad]."""
+        return _optical(self._pose(np.array([x, y, z]), rotation_matrix(yaw)))
+
+    def _pose(self, position: Array, body: Array) -> Array:
+        pose = np.eye(4)
+        pose[:3, :3] = body @ rotation_matrix(self.yaw, self.pitch)
+        pose[:3, 3] = position + body @ (self.x, self.y, self.z)
         return pose
+
+
+def _optical(pose: Array) -> Array:
+    pose[:3, :3] = pose[:3, :3] @ _OPTICAL
+    return pose
 
 
 def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +47,8 @@ class Planner(ABC):
     planner_settings: PlannerSettings
     view: tuple[ViewSector, ...] | None = None
     """Sectors around the vehicle in which its detector can detect objects; None: in all directions."""
+    can_read_light: Callable[[str, float, float, float, float], bool] | None = None
+    """As `Detector.can_read_light`; None: the vehicle has all lights in view up to their stop lines."""
     observes_regions: bool = False
     """Whether the planner uses the perception regions, which are determined only then."""
 
@@ -175,6 +177,7 @@ class RoutePlanner(Planner):
             return None
         if self._path_of_stops is not path:
             self._path_of_stops = path
+            self._stops.can_read_light = self.can_read_light
             self._stops.follow(path.points, path_heights(path, self.roads, float(ego.position[2])))
         return self._stops.next(self._stops.along(self._progress, x, y), ego.speed, now)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,6 +34,9 @@ AT_LINE = 2.0
 """Maximum distance of the front from its stop point at which a stop counts for the sign [m]."""
 ANOTHER = 5.0
 """Minimum increase of the distance of a stop line that indicates the next lap [m]."""
+BACK, FARTHEST_BACK = 0.5, 20.0
+"""Steps in which a place to stop with a view of the light is searched, and its maximum distance from the usual one
+[m]: a light across a road of eight lanes leaves an image of 100° about 12 m before the line."""
 WAIT = 3.0
 """Waiting time at a stop sign [s]: 60 ticks of 0.05 s, as in EI-Drive."""
 
@@ -53,9 +57,11 @@ class _Decision:
     yellow_since    time at which the light was first seen in yellow [s]; None in another state
     standing_since  time at which the vehicle stopped at the sign [s]; None before
     is_served       whether the vehicle has waited at the sign
+    back            distance of the stop point from the usual one, so that the light stays in view [m]
     """
 
     distance: float
+    back: float = 0.0
     stops: bool | None = None
     yellow_since: float | None = None
     standing_since: float | None = None
@@ -67,6 +73,8 @@ class SignalStops:
 
     def __init__(self, roads: RoadNetwork | None, spec: ActorSpec) -> None:
         self.signals = SignalsAhead(roads)
+        self.can_read_light: Callable[[str, float, float, float, float], bool] | None = None
+        """As `Planner.can_read_light`."""
         self._front = spec.offset[0] + spec.size[0] / 2.0
         self._decisions: dict[str, _Decision] = {}
         """By the id of the signal; a signal whose stop line has been passed has none."""
@@ -91,14 +99,38 @@ class SignalStops:
             if name in ahead and ahead[name].distance <= decision.distance + ANOTHER
         }
         for name, signal in ahead.items():
-            decision = self._decisions.setdefault(name, _Decision(signal.distance))
+            if name not in self._decisions:
+                self._decisions[name] = _Decision(signal.distance, self._back(signal, along))
+            decision = self._decisions[name]
             decision.distance = signal.distance
-            left = signal.distance - self._front - BEFORE_LINE
+            left = signal.distance - self._front - BEFORE_LINE - decision.back
             holds = _light_holds if signal.kind == "light" else _sign_holds
             if holds(signal, decision, left, speed, now) and stop is None:
                 what = "traffic light" if signal.kind == "light" else "stop sign"
                 stop = StopPoint(along + max(left, 0.0), f"stop at {what} {name}")
         return stop
+
+    def _back(self, signal: SignalAhead, along: float) -> float:
+        """Return how far before its usual place a vehicle at distance `along` of the path has a light in view [m].
+
+        0 if it has it in view nowhere. One step more is for errors of the position and of the control.
+        """
+        if signal.kind != "light" or self.can_read_light is None:
+            return 0.0
+        stop = along + signal.distance - self._front - BEFORE_LINE
+        for back in np.arange(0.0, FARTHEST_BACK + BACK, BACK).tolist():
+            x, y, yaw = self._pose_at(stop - back)
+            if self.can_read_light(signal.signal, x, y, signal.z, yaw):
+                return back + BACK if back else 0.0
+        return 0.0
+
+    def _pose_at(self, along: float) -> tuple[float, float, float]:
+        """Return x, y [m] and heading [rad] at a distance along the path [m]."""
+        index = min(max(int(np.searchsorted(self._along, along)) - 1, 0), len(self._path) - 2)
+        (x0, y0), (x1, y1) = self._path[index : index + 2].tolist()
+        length = math.hypot(x1 - x0, y1 - y0) or 1.0
+        ahead = along - float(self._along[index])
+        return x0 + ahead * (x1 - x0) / length, y0 + ahead * (y1 - y0) / length, math.atan2(y1 - y0, x1 - x0)
 
     def limits(self, stop: StopPoint, part: slice) -> Array:
         """Return the maximum speeds at points of the path with which the vehicle stops there [m/s]."""
@@ -127,7 +159,8 @@ def _light_holds(light: SignalAhead, decision: _Decision, left: float, speed: fl
             if decision.yellow_since is None:
                 decision.yellow_since = now
             remaining = yellow_time(speed) - (now - decision.yellow_since)
-        can_stop = can_stop_for_light(left, speed, passes_in_time=left + BEFORE_LINE <= speed * remaining)
+        to_line = left + decision.back + BEFORE_LINE
+        can_stop = can_stop_for_light(left, speed, passes_in_time=to_line <= speed * remaining)
         decision.stops = can_stop or speed < STANDING
     return decision.stops
 

@@ -29,7 +29,9 @@ from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import check_weights_exist
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.camera import unexposed
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readings, SignalReading
+from eidrive_scenario.sensing.sensor import Mounting, mounting
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 
 CAR_HEIGHT = 1.5
@@ -60,6 +62,8 @@ class ImageDetector(Detector):
         self._map_context = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
+        self._cameras: list[tuple[Mounting, CameraReading]] = []
+        """Mountings of the cameras, and readings without an image."""
         self._roads: weakref.ref[RoadNetwork] | None = None
 
     @abstractmethod
@@ -80,6 +84,8 @@ class ImageDetector(Detector):
         for name, sensor in context.sensors.items():
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
+            elif isinstance(sensor, CameraSettings):
+                self._cameras.append((mounting(sensor, context.spec, "front"), unexposed(sensor)))
 
     @classmethod
     def prepare_batch(cls, detectors: Sequence[Self], readings: Sequence[Readings]) -> None:
@@ -139,6 +145,13 @@ class ImageDetector(Detector):
             self._patterns,
         )
         return type(self), network.identity, self._roads, digest
+
+    def can_read_light(self, signal: str, x: float, y: float, z: float, yaw: float) -> bool:
+        """Return whether a light would be inside the image of a camera; True if the network reads no lights."""
+        cameras = (camera.at(mount.level_camera_pose(x, y, z, yaw)) for mount, camera in self._cameras)
+        return "light" not in self.detectable_signals or any(
+            signal == light.id for camera in cameras for light in self._lights.in_view(camera)
+        )
 
     def range_of(self, sensor: SensorSettings) -> float:
         """Return the distance at which the image of a car has the minimum height of objects in training [m]."""

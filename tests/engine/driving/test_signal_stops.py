@@ -46,6 +46,9 @@ from eidrive_scenario.simulation import run_file
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
 
+FRONT = 1.4 + 2.446
+"""Distance of the front of the car from its reference point [m]."""
+
 
 class Drive:
     """Car that follows its lane from x = 20 m at 10 m/s with the readings of a signal sensor."""
@@ -60,17 +63,24 @@ class Drive:
         self.rig = Rig(CAR, {})
         self.reasons: list[str] = []
 
+    def reads(self, front: float) -> bool:
+        """Return whether the car has the lights in view with its front at a position [m]."""
+        return self.planner.can_read_light is None or self.planner.can_read_light(
+            "east", front - FRONT, -1.75, 0.0, 0.0
+        )
+
     def run(self, seconds: float, states: Mapping[str, str]) -> tuple[float, float]:
         """Run for a duration [s]; return the position of its front [m] and its speed [m/s]."""
         for _ in range(round(seconds / 0.05)):
             view = self.world.view()
             ego = self.rig.read(self.world, view).ego
-            self.planner.observe_signals(self.sensor.read(self.world, view, 0, states))
+            if self.reads(float(view.position[0, 0]) + FRONT):
+                self.planner.observe_signals(self.sensor.read(self.world, view, 0, states))
             plan = self.planner.plan(ego, Detections(view.time), Goal(), view.time)
             self.reasons.append(plan.reason)
             self.world.step({}, {"Ego": self.controller.control(ego, plan)})
         view = self.world.view()
-        return float(view.position[0, 0]) + 1.4 + 2.446, float(view.speed[0])
+        return float(view.position[0, 0]) + FRONT, float(view.speed[0])
 
 
 def test_car_stops_at_red_and_continues_at_green() -> None:
@@ -83,6 +93,31 @@ def test_car_stops_at_red_and_continues_at_green() -> None:
     front, speed = drive.run(6.0, {"east": "green"})
     assert front > 130.0
     drive.world.close()
+
+
+def test_car_stops_where_it_has_the_light_in_view() -> None:
+    """A camera shows the light of 120 m up to 7 m before it, so that the car at its line would never see green."""
+    drive = Drive(street(light("east", 120.0)))
+    drive.planner.can_read_light = lambda signal, x, y, z, yaw: x + FRONT <= 113.0
+    front, speed = drive.run(18.0, {"east": "red"})
+    assert 111.0 < front <= 113.0
+    assert abs(speed) < 0.05
+    front, speed = drive.run(6.0, {"east": "green"})
+    assert front > 125.0
+    drive.world.close()
+
+
+def test_car_stops_at_the_line_of_a_light_that_no_place_shows() -> None:
+    roads = street(light("east", 120.0))
+    stops = SignalStops(roads, CAR)
+    stops.follow(EAST)
+    stops.signals.update([SignalReading("east", "red")])
+    usual = stops.next(50.0, 10.0, 0.0)
+    blind = SignalStops(roads, CAR)
+    blind.can_read_light = lambda *place: False
+    blind.follow(EAST)
+    blind.signals.update([SignalReading("east", "red")])
+    assert blind.next(50.0, 10.0, 0.0) == usual
 
 
 def test_car_without_obey_signals_passes_red() -> None:

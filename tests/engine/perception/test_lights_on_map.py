@@ -29,7 +29,7 @@ from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, Readings, SignalReading
-from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.sensing.settings import CameraSettings, Mount
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -164,6 +164,19 @@ def test_detectable_signals_follow_network_classes() -> None:
     x, y, _ = camera.pose[:3, 3].tolist()
     detector.detect(Readings(0.0, EgoState(0.0, np.array([x, y, 0.0]), 0, 0, 0, 0, 0, 0), cameras={"camera": camera}))
     assert SignalReading("10", "red") in detector.signals()
+
+
+@pytest.mark.parametrize(("distance", "aside", "readable"), [(6.2, 6.0, True), (5.8, 6.0, False), (40.0, 0.0, True)])
+def test_light_is_readable_inside_the_image(distance: float, aside: float, readable: bool) -> None:
+    """With a field of view of 90° the image ends where a light is as far aside as ahead of the camera."""
+    settings = LearnedSettings(weights=str(ONNX), classes=("truck", "car"), input_size=(96, 64))
+    detector = YoloDetector(settings)
+    detector.load_weights()
+    camera = CameraSettings(width=640, height=480, fov=90.0, mount=Mount(x=2.0, y=0.0, z=1.5))
+    detector.setup(DetectorContext(TRUCK, {"camera": camera}, CROSSING))
+    pose = before(CROSSING, "10", distance + 2.0, aside)
+    x, y, _ = pose[:3, 3].tolist()
+    assert detector.can_read_light("10", x, y, 0.0, math.atan2(pose[1, 2], pose[0, 2])) == readable
 
 
 def test_lamp_network_equals_torch_implementation() -> None:
