@@ -40,6 +40,11 @@ class Mounting(msgspec.Struct, frozen=True):
     yaw: float = 0.0
     pitch: float = 0.0
 
+    @property
+    def heading(self) -> float:
+        """Direction of the sensor in the plane of the body, in [-pi, pi]: opposite to the yaw if it is upside down."""
+        return math.remainder(self.yaw if math.cos(self.pitch) >= 0.0 else self.yaw + math.pi, math.tau)
+
     def position(self, view: WorldView, row: int) -> tuple[float, float, float]:
         """Return the position in the world [m]."""
         x, y, z, yaw, pitch, roll, *_ = view.states[row]
@@ -113,7 +118,7 @@ def view_sectors(
     for settings in sensors:
         mount = mounting(settings, spec, "front" if isinstance(settings, CameraSettings) else "roof")
         angle = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0)))
-        sectors.append(ViewSector(mount.x, mount.y, mount.z, mount.yaw, angle / 2.0, range_of(settings)))
+        sectors.append(ViewSector(mount.x, mount.y, mount.z, mount.heading, angle / 2.0, range_of(settings)))
     return tuple(sectors)
 
 

@@ -108,7 +108,7 @@ def candidates(
     near[:, unseen] = False
     for index, sensor in enumerate(sensors):
         if sensor.half_field < math.pi:
-            heading = float(boxes[own[index], 6]) + sensor.mounting.yaw
+            heading = float(boxes[own[index], 6]) + sensor.mounting.heading
             ahead = math.cos(heading) * offset[index, :, 0] + math.sin(heading) * offset[index, :, 1]
             aside = math.cos(heading) * offset[index, :, 1] - math.sin(heading) * offset[index, :, 0]
             near[index] &= np.abs(np.arctan2(aside, ahead)) <= sensor.half_field
@@ -124,7 +124,7 @@ def few_candidates(
     for sensor, station in zip(sensors, own, strict=True):
         x, y, z, _, _, _, yaw = boxes[station]
         square, half = sensor.range_squared, sensor.half_field
-        ahead = yaw + sensor.mounting.yaw
+        ahead = yaw + sensor.mounting.heading
         cos, sin = (math.cos(ahead), math.sin(ahead)) if half < math.pi else (1.0, 0.0)
         rows: list[int] = []
         for row, box in enumerate(boxes):

@@ -62,6 +62,14 @@ def test_sectors_are_those_of_the_settings() -> None:
     assert truth == ViewSector(1.0, -0.5, 1.0, math.pi / 2, math.radians(60.0), 50.0)
 
 
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (360.0, -60.0), (180.0, 180.0), (-180.0, 100.0)])
+def test_sector_of_mount_to_the_front_is_ahead(angles: tuple[float, float]) -> None:
+    """A sensor turned and pitched by 180 degrees is upside down and looks ahead: its x axis is that of the body."""
+    mount = Mount(x=0.0, y=0.0, z=2.0, yaw=angles[0], pitch=angles[1])
+    (sector,) = view_sectors([LidarSettings(mount=mount)], CAR)
+    assert sector.yaw == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("detector", "sensor", "expected"),
     [

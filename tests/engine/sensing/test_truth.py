@@ -65,6 +65,8 @@ def test_truth_field_of_view_follows_body_and_mount(boxes: Any, heading: float) 
     assert set(visible_shares(boxes, actors, field_of_view=100.0)) == {"In"}
     back = Mount(x=0, y=0, z=1.9, yaw=180)
     assert set(visible_shares(boxes, actors, field_of_view=100.0, mount=back)) == {"Behind"}
+    upside_down = Mount(x=0, y=0, z=1.9, yaw=180, pitch=180)
+    assert set(visible_shares(boxes, actors, field_of_view=100.0, mount=upside_down)) == {"In"}
 
 
 def test_truth_ego_body_is_transparent(boxes: Any) -> None:
