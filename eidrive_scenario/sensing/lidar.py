@@ -99,7 +99,8 @@ def returns(
         # The distance in the air is drawn by the power from there. The air is measured if it is before the surface,
         # and stronger than the surface and the minimum of the receiver.
         strength = draws.gamma(shape, 1.0 / shape, len(distance))
-        depth = ranges[np.searchsorted(np.cumsum(soft) / soft.sum(), draws.random(len(distance)))]
+        below = np.cumsum(soft)
+        depth = ranges[np.searchsorted(below, draws.random(len(distance)) * below[-1])]
         peak = float(soft.max()) * strength
         false = (peak > hard) & (peak >= least) & (depth < distance)
         detected |= false

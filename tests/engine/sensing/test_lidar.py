@@ -204,6 +204,23 @@ def test_rain_causes_false_returns_and_clear_air_none() -> None:
     assert 0.0 < share(drizzle) < 0.04 < share(downpour) < 0.3
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "weather", [Weather(visual_range=1e-3), Weather(precipitation="snow", precipitation_intensity=1e-9)]
+)
+def test_air_without_measurable_scattering_returns_nothing(weather: Weather) -> None:
+    """Fog of 1 mm leaves exp(-7,000) of light over 0.9 m; flakes of 1e-9 mm/h scatter less than 1e-12 / (m sr)."""
+    back = returns(
+        np.full(100, np.inf),
+        np.zeros(100),
+        weather,
+        attenuation=0.0,
+        ten_percent_range=150.0,
+        draws=np.random.default_rng(7),
+    )
+    assert not back.detected.any()
+
+
 def test_wet_road_has_lower_intensity(boxes: Any) -> None:
     scene = boxes.scene(ego_and(boxes), ground=True)
     rays = {"channels": 8, "upper_fov": -10, "points_per_second": 8 * 60 * 20, **EXACT}
