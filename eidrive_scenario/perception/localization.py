@@ -69,22 +69,29 @@ class InertialFilter:
         self.propagation = np.zeros((6, 6))
         """Covariance of the error of the state with its error at the start of the time step."""
 
-    def predict(self, imu: ImuReading, step: float) -> None:
-        """Predict the state by `step` [s] with the accelerations and turn rates of the IMU."""
+    def predict(self, imu: ImuReading, step: float, pitch: float = 0.0) -> None:
+        """Predict the state by `step` [s] with the accelerations and turn rates of the IMU, at this pitch [rad].
+
+        Speed and acceleration are along the vehicle, and the displacement in the plane is their horizontal part.
+        """
         x, y, yaw, speed, turn_bias, acceleration_bias = self.estimate.state.tolist()
         turn = float(imu.angular_rate[2]) - turn_bias
         gain = float(imu.acceleration[0]) - acceleration_bias
         # The reading covers the step: the displacement has the mean speed and the mean direction.
         middle, mean = yaw + 0.5 * turn * step, speed + 0.5 * gain * step
         cos, sin = math.cos(middle), math.sin(middle)
-        distance = mean * step
+        level = step * math.cos(pitch)
+        distance = mean * level
         pose = x + distance * cos, y + distance * sin, yaw + turn * step
         state = np.array([*pose, speed + gain * step, turn_bias, acceleration_bias])
         forward = np.eye(6)
         forward[X, YAW], forward[Y, YAW] = -distance * sin, distance * cos
-        forward[X, SPEED], forward[Y, SPEED] = step * cos, step * sin
+        forward[X, SPEED], forward[Y, SPEED] = level * cos, level * sin
         forward[X, TURN_BIAS], forward[Y, TURN_BIAS] = 0.5 * step * distance * sin, -0.5 * step * distance * cos
-        forward[X, ACCELERATION_BIAS], forward[Y, ACCELERATION_BIAS] = -0.5 * step**2 * cos, -0.5 * step**2 * sin
+        forward[X, ACCELERATION_BIAS], forward[Y, ACCELERATION_BIAS] = (
+            -0.5 * step * level * cos,
+            -0.5 * step * level * sin,
+        )
         forward[YAW, TURN_BIAS] = forward[SPEED, ACCELERATION_BIAS] = -step
         noise = self._noise
         drive = np.zeros((6, 5))
@@ -160,7 +167,7 @@ class Localizer:
             self._filter.propagation = self._filter.estimate.covariance
         self._imu = readings.imu or self._imu
         if self._imu is not None and readings.time > self._time:
-            self._filter.predict(self._imu, readings.time - self._time)
+            self._filter.predict(self._imu, readings.time - self._time, truth.pitch)
         self._time = readings.time
         if readings.gnss is not None:
             self._filter.correct(readings.gnss)
