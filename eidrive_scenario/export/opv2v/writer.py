@@ -120,7 +120,13 @@ class Opv2vWriter:
         present = [name for name in self.stations if name in view]
         for name in present:
             if name not in self._rigs:
-                self._rigs[name] = Rig(self._world.spec(name), self._sensors_of(name), seed=self._seed)
+                sensors = self._sensors_of(name)
+                self._rigs[name] = Rig(self._world.spec(name), sensors, seed=self._seed)
+                self.warnings += [
+                    f"readers project beside the pixels of camera {camera!r} of {name!r}: the format has no distortion"
+                    for camera, settings in sensors.items()
+                    if isinstance(settings, CameraSettings) and any(settings.distortion)
+                ]
         readings = read_all([self._rigs[name] for name in present], self._world, view)
         lidars: dict[str, Array] = {}
         listed: dict[str, list[str]] = {}

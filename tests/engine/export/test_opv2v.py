@@ -85,8 +85,8 @@ class Exported:
         return content
 
 
-def export(folder: Path, scenario: str | Path, time_limit: float, **settings: Any) -> Exported:
-    writer, collector = Opv2vWriter(folder, SENSORS), FrameCollector()
+def export(folder: Path, scenario: str | Path, time_limit: float, sensors: Any = SENSORS, **settings: Any) -> Exported:
+    writer, collector = Opv2vWriter(folder, sensors), FrameCollector()
     given = RunSettings(time_limit=time_limit, **settings)
     result = run_file(scenario, settings=given, observers=[writer, collector])
     views = {frame.view.tick: frame.view for frame in collector.frames}
@@ -321,6 +321,14 @@ def test_second_roadside_unit_gets_an_id_of_vehicles_with_warning(tmp_path: Path
     exported = export(tmp_path / "units", "coop/scenario_7", 0.1)
     assert sorted(exported.writer.stations.values()) == [-1, 1001, 1002, 1003]
     assert any("roadside unit 'RSU2' has the id 1003" in warning for warning in exported.writer.warnings)
+
+
+def test_camera_with_distortion_is_a_warning(scene: Exported, tmp_path: Path) -> None:
+    """The frames of OPV2V have no field for the coefficients, so that readers project as through a pinhole."""
+    lens = {"front": SENSORS["front"].model_copy(update={"distortion": (-0.05, 0.0, 0.0, 0.0, 0.0)})}
+    warnings = export(tmp_path / "lens", "coop/scenario_1", 0.1, {**SENSORS, **lens}).writer.warnings
+    assert sum("the pixels of camera 'front' of 'Ego': the format has no distortion" in text for text in warnings) == 1
+    assert not any("distortion" in text for text in scene.writer.warnings)
 
 
 def test_export_without_station_or_with_other_time_steps_is_an_error(tmp_path: Path) -> None:
