@@ -259,3 +259,12 @@ def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: fl
 def distances_along(points: Array) -> Array:
     """Return the distances of the points (M, 2) of a polyline from its first point, along it (M,) [m]."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+JUMP = 1.0
+"""Displacement beyond the one at twice the speed that is a teleport [m]."""
+
+
+def is_teleport(distance: float, speed: float, duration: float) -> bool:
+    """Return whether a displacement [m] in this time [s] is a teleport of an actor with this speed [m/s]."""
+    return distance > 2.0 * speed * duration + JUMP

@@ -8,11 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.base.geometry import is_teleport
 from eidrive_scenario.roads import Lane, LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.world.view import WorldView
-
-JUMP = 1.0
-"""Displacement beyond the one at twice the speed that is a teleport [m]."""
 
 
 class Step(NamedTuple):
@@ -44,8 +42,7 @@ class Continuity:
         if before is None:
             return None
         duration, distance = view.time - before[0], math.hypot(x - before[1], y - before[2])
-        reach = 2.0 * max(speed, before[3]) * duration + JUMP
-        return Step(duration, distance) if distance <= reach else None
+        return None if is_teleport(distance, max(speed, before[3]), duration) else Step(duration, distance)
 
 
 AGAINST = math.cos(math.radians(120.0))

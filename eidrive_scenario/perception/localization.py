@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from pydantic import Field
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import is_teleport, wrap_angle
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.sensing.readings import EgoState, GnssReading, ImuReading, Readings
@@ -122,20 +122,21 @@ class InertialFilter:
 class Localizer:
     """Estimate the pose of a station and replace the true pose in its readings.
 
-    The filter starts at the first reading with the true pose and speed plus an error drawn from `start` for this seed
-    and station. Height, pitch and roll stay true. Measurements in sensor frames are unchanged; the sensor poses follow
-    from the estimate.
+    The filter starts at the first reading, and again after a teleport, with the true pose and speed plus an error drawn
+    from `start` for this seed and station. Height, pitch and roll stay true. Measurements in sensor frames are
+    unchanged; the sensor poses follow from the estimate.
     """
 
     def __init__(
         self, station: str, seed: int, *, noise: MotionNoise | None = None, start: StartNoise | None = None
     ) -> None:
-        self._key = (seed, "localization", station)
+        self._draws = generator(seed, "localization", station)
         self._noise = noise or MotionNoise()
         self._start = start or StartNoise()
         self._filter: InertialFilter | None = None
         self._imu: ImuReading | None = None
-        self._time = 0.0
+        self._last: EgoState | None = None
+        """True motion in the last reading."""
 
     @property
     def estimate(self) -> Estimate:
@@ -160,15 +161,15 @@ class Localizer:
 
     def with_estimated_pose(self, readings: Readings) -> Readings:
         """Return the readings with the estimated motion, and with the sensor poses that follow from it."""
-        truth = readings.ego
-        if self._filter is None:
-            self._filter, self._time = InertialFilter(self._initial_estimate(truth), self._noise), readings.time
+        truth, last = readings.ego, self._last
+        self._last = truth
+        self._imu = readings.imu or self._imu
+        if self._filter is None or last is None or _is_teleported(last, truth):
+            self._filter = InertialFilter(self._initial_estimate(truth), self._noise)
         else:
             self._filter.propagation = self._filter.estimate.covariance
-        self._imu = readings.imu or self._imu
-        if self._imu is not None and readings.time > self._time:
-            self._filter.predict(self._imu, readings.time - self._time, truth.pitch)
-        self._time = readings.time
+            if self._imu is not None and truth.time > last.time:
+                self._filter.predict(self._imu, truth.time - last.time, truth.pitch)
         if readings.gnss is not None:
             self._filter.correct(readings.gnss)
         x, y, yaw, speed, turn_bias, acceleration_bias = self._filter.estimate.state.tolist()
@@ -187,10 +188,15 @@ class Localizer:
         deviations = np.array(
             [start.position, start.position, start.yaw, start.speed, imu.gyroscope_bias, imu.accelerometer_bias]
         )
-        drawn = generator(*self._key).standard_normal(6) * deviations
+        drawn = self._draws.standard_normal(6) * deviations
         x, y, _ = truth.position.tolist()
         state = np.array([x, y, truth.yaw, truth.speed, 0.0, 0.0]) + drawn * (1.0, 1.0, 1.0, 1.0, 0.0, 0.0)
         return Estimate(state, np.diag(deviations**2))
+
+
+def _is_teleported(last: EgoState, now: EgoState) -> bool:
+    distance = math.dist(last.position[:2], now.position[:2])
+    return is_teleport(distance, max(abs(last.speed), abs(now.speed)), now.time - last.time)
 
 
 def at_pose(readings: Readings, ego: EgoState) -> Readings:

@@ -279,6 +279,22 @@ def test_localizer_of_a_station_that_enters_late_starts_at_its_first_reading() -
     assert (starts[0].yaw, starts[0].speed) == (starts[1].yaw, starts[1].speed)
 
 
+def test_localizer_after_teleport_starts_at_the_new_pose_with_a_new_error() -> None:
+    """The IMU does not measure a teleport of 100 m: both errors have 0.5 m in each axis, 1 degree and 0.2 m/s, and are
+    independent. The correlation of 300 independent pairs is below 0.2 in all but 0.05 % of samples."""
+    poses = ego(5.0, 6.0, 1.0, 3.0), ego(5.0, 106.0, -2.0, 8.0, DT)
+    errors = np.empty((2, 300, 4))
+    for seed in range(300):
+        localizer = Localizer("Ego", seed)
+        for number, pose in enumerate(poses):
+            found = localizer.with_estimated_pose(Readings(pose.time, pose, imu=imu())).ego
+            x, y = found.position[:2] - pose.position[:2]
+            errors[number, seed] = x, y, found.yaw - pose.yaw, found.speed - pose.speed
+        assert not localizer.lagged_covariance.any()
+    np.testing.assert_allclose(errors.std(axis=1), [[0.5, 0.5, math.radians(1.0), 0.2]] * 2, rtol=0.12)
+    assert max(abs(np.corrcoef(*errors[:, :, axis])[0, 1]) for axis in range(4)) < 0.2
+
+
 def test_estimate_before_first_reading_raises() -> None:
     with pytest.raises(ValueError, match="before the first reading"):
         Localizer("Ego", 1).estimate  # noqa: B018
