@@ -37,6 +37,11 @@ ANOTHER = 5.0
 BACK, FARTHEST_BACK = 0.5, 20.0
 """Steps in which a place to stop with a view of the light is searched, and its maximum distance from the usual one
 [m]: a light across a road of eight lanes leaves an image of 100° about 12 m before the line."""
+FARTHER, FARTHEST = 2.0, 100.0
+"""Steps in which the distance is searched up to which a light is in view, and its maximum [m], from which on it is no
+reason to slow down."""
+READING = 0.5
+"""Time from a light being in view to its state being known, for cameras of some images per second [s]."""
 WAIT = 3.0
 """Waiting time at a stop sign [s]: 60 ticks of 0.05 s, as in EI-Drive."""
 
@@ -58,10 +63,12 @@ class _Decision:
     standing_since  time at which the vehicle stopped at the sign [s]; None before
     is_served       whether the vehicle has waited at the sign
     back            distance of the stop point from the usual one, so that the light stays in view [m]
+    shown           distance before the stop point up to which the light is in view [m]
     """
 
     distance: float
     back: float = 0.0
+    shown: float = math.inf
     stops: bool | None = None
     yellow_since: float | None = None
     standing_since: float | None = None
@@ -89,7 +96,7 @@ class SignalStops:
 
     def next(self, along: float, speed: float, now: float) -> StopPoint | None:
         """Return the next stop of a vehicle at distance `along` of the path [m]; None if no signal requires one."""
-        stop: StopPoint | None = None
+        stops: list[StopPoint] = []
         ahead: dict[str, SignalAhead] = {}
         for signal in self.signals.ahead(along):
             ahead.setdefault(signal.signal, signal)
@@ -100,29 +107,43 @@ class SignalStops:
         }
         for name, signal in ahead.items():
             if name not in self._decisions:
-                self._decisions[name] = _Decision(signal.distance, self._back(signal, along))
+                self._decisions[name] = _Decision(signal.distance, *self._view_of(signal, along))
             decision = self._decisions[name]
             decision.distance = signal.distance
             left = signal.distance - self._front - BEFORE_LINE - decision.back
             holds = _light_holds if signal.kind == "light" else _sign_holds
-            if holds(signal, decision, left, speed, now) and stop is None:
+            if holds(signal, decision, left, speed, now):
                 what = "traffic light" if signal.kind == "light" else "stop sign"
-                stop = StopPoint(along + max(left, 0.0), f"stop at {what} {name}")
-        return stop
+                stops.append(StopPoint(along + max(left, 0.0), f"stop at {what} {name}"))
+            elif signal.state is None and left > decision.shown:
+                # It approaches so that it can still stop when it reads the light.
+                late = TOO_LATE * READING
+                entry = math.sqrt(late**2 + 2.0 * TOO_LATE * decision.shown) - late
+                beyond = entry**2 / (2.0 * APPROACH_DECELERATION)
+                stops.append(StopPoint(along + left - decision.shown + beyond, f"approach traffic light {name}"))
+        return min(stops, default=None)
 
-    def _back(self, signal: SignalAhead, along: float) -> float:
-        """Return how far before its usual place a vehicle at distance `along` of the path has a light in view [m].
+    def _view_of(self, signal: SignalAhead, along: float) -> tuple[float, float]:
+        """Return how far before its usual place a vehicle at distance `along` of the path has a light in view [m], and
+        from there up to which distance.
 
-        0 if it has it in view nowhere. One step more is for errors of the position and of the control.
+        0 and inf if it has it in view nowhere. One step more is for errors of the position and of the control.
         """
-        if signal.kind != "light" or self.can_read_light is None:
-            return 0.0
+        can_read = self.can_read_light
+        if signal.kind != "light" or can_read is None:
+            return 0.0, math.inf
         stop = along + signal.distance - self._front - BEFORE_LINE
-        for back in np.arange(0.0, FARTHEST_BACK + BACK, BACK).tolist():
+
+        def is_shown(back: float) -> bool:
             x, y, yaw = self._pose_at(stop - back)
-            if self.can_read_light(signal.signal, x, y, signal.z, yaw):
-                return back + BACK if back else 0.0
-        return 0.0
+            return can_read(signal.signal, x, y, signal.z, yaw)
+
+        nearest = next(filter(is_shown, np.arange(0.0, FARTHEST_BACK + BACK, BACK).tolist()), None)
+        if nearest is None:
+            return 0.0, math.inf
+        back = nearest + BACK if nearest else 0.0
+        hidden = (far for far in np.arange(back, FARTHEST, FARTHER).tolist() if not is_shown(far))
+        return back, max(next(hidden, math.inf) - back - FARTHER, 0.0)
 
     def _pose_at(self, along: float) -> tuple[float, float, float]:
         """Return x, y [m] and heading [rad] at a distance along the path [m]."""

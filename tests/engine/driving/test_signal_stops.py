@@ -107,6 +107,24 @@ def test_car_stops_where_it_has_the_light_in_view() -> None:
     drive.world.close()
 
 
+def test_car_approaches_a_light_that_it_sees_late_so_that_it_can_stop() -> None:
+    """It is in view from 8.5 m before the place to stop: enough for 0.5 s · v + v² / (2 · 5 m/s²) from 7.0 m/s."""
+    drive = Drive(street(light("east", 120.0)))
+    drive.planner.can_read_light = lambda signal, x, y, z, yaw: x + FRONT >= 110.0
+    front, speed = drive.run(18.0, {"east": "red"})
+    assert 118.0 < front < 120.0
+    assert abs(speed) < 0.05
+    again = Drive(street(light("east", 120.0)))
+    again.planner.can_read_light = drive.planner.can_read_light
+    front = 0.0
+    while front < 110.0:
+        front, speed = again.run(0.05, {"east": "green"})
+    assert 5.0 < speed <= 7.0
+    assert again.run(8.0, {"east": "green"})[1] > 8.0
+    drive.world.close()
+    again.world.close()
+
+
 def test_car_stops_at_the_line_of_a_light_that_no_place_shows() -> None:
     roads = street(light("east", 120.0))
     stops = SignalStops(roads, CAR)
