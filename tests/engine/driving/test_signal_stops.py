@@ -107,7 +107,7 @@ def test_car_stops_where_it_has_the_light_in_view() -> None:
     drive.world.close()
 
 
-def test_car_approaches_a_light_that_it_sees_late_so_that_it_can_stop() -> None:
+def test_car_can_stop_when_it_sees_a_light_late() -> None:
     """It is in view from 8.5 m before the place to stop: enough for 0.5 s · v + v² / (2 · 5 m/s²) from 7.0 m/s."""
     drive = Drive(street(light("east", 120.0)))
     drive.planner.can_read_light = lambda signal, x, y, z, yaw: x + FRONT >= 110.0
