@@ -117,22 +117,23 @@ class Crossings:
         self.sweeps: dict[str, Sweep] = {}
         """Sweeps of the long vehicles that hold lanes."""
 
-    def beside(self, lane: int) -> list[int]:
-        """Return all lanes of the junction of a lane."""
-        return self._by_junction.get(self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id or "", [])
+    def in_junction_of(self, lane: int) -> list[int]:
+        """Return all lanes in the junction of a lane; none if it is in no junction."""
+        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
+        return [] if junction is None else self._by_junction.get(junction, [])
 
     def meeting(self, lane: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
         if lane in self._meeting:
             return self._meeting[lane]
         conflicts: dict[int, bool] = {}
-        junction = self._lanes.roads.roads[self._lanes.keys[lane].road].junction_id
-        if junction is None:
+        others = self.in_junction_of(lane)
+        if not others:
             return conflicts
         lines, low, high = self._lines
         mine = lines[lane]
         points = NearestPoints(mine)
-        for other in self._by_junction.get(junction, ()):
+        for other in others:
             reach = CLEARANCE + max(self._swings[lane], self._swings[other])
             near_by = np.all(low[other] <= high[lane] + reach) and np.all(low[lane] <= high[other] + reach)
             if self._lanes.road[other] == self._lanes.road[lane] or not near_by:
@@ -271,11 +272,8 @@ class RightOfWay:
     def _set_backs(self, cars: Cars, distance: Array) -> Array:
         """Return the lengths (N,) before the next junction over which long vehicles of the fleet may sweep [m]."""
         lengths = np.zeros(len(cars))
-        bodies = {
-            (*spec.offset, *spec.size): spec
-            for spec, front in zip(cars.specs, cars.front.tolist(), strict=True)
-            if front > VAN_FRONT
-        }
+        long = [cars.specs[index] for index in np.flatnonzero(cars.front > VAN_FRONT).tolist()]
+        bodies = {(*spec.offset, *spec.size): spec for spec in long}
         if not bodies:
             return lengths
         first = np.argmax(self._barred(cars), axis=1)
@@ -283,7 +281,7 @@ class RightOfWay:
             before, entered = cars.plan[index, first[index] - 1 : first[index] + 1].tolist()
             for body, spec in bodies.items():
                 if (before, body) not in self._set_back:
-                    sweeps = [self._sweeps.of(spec, [lane]) for lane in self._crossings.beside(entered)]
+                    sweeps = [self._sweeps.of(spec, [lane]) for lane in self._crossings.in_junction_of(entered)]
                     starts = [sweep[before][0] for sweep in sweeps if before in sweep]
                     self._set_back[before, body] = self._lanes.lengths[before] - min(starts, default=np.inf)
                 lengths[index] = max(lengths[index], self._set_back[before, body])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -23,7 +23,7 @@ from eidrive_scenario.driving.planning.path import (
     lane_below,
     path_heights,
 )
-from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
+from eidrive_scenario.driving.planning.signal_stops import CanReadLight, SignalStops, StopPoint
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import Diagnostic
@@ -47,7 +47,7 @@ class Planner(ABC):
     planner_settings: PlannerSettings
     view: tuple[ViewSector, ...] | None = None
     """Sectors around the vehicle in which its detector can detect objects; None: in all directions."""
-    can_read_light: Callable[[str, float, float, float, float], bool] | None = None
+    can_read_light: CanReadLight | None = None
     """As `Detector.can_read_light`; None: the vehicle has all lights in view up to their stop lines."""
     observes_regions: bool = False
     """Whether the planner uses the perception regions, which are determined only then."""
@@ -177,9 +177,8 @@ class RoutePlanner(Planner):
             return None
         if self._path_of_stops is not path:
             self._path_of_stops = path
-            self._stops.can_read_light = self.can_read_light
             self._stops.follow(path.points, path_heights(path, self.roads, float(ego.position[2])))
-        return self._stops.next(self._stops.along(self._progress, x, y), ego.speed, now)
+        return self._stops.next(self._stops.along(self._progress, x, y), ego.speed, now, self.can_read_light)
 
     def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
         """Return the target speed [m/s]: that of the goal, of the settings, the speed limit of the lane, or the initial

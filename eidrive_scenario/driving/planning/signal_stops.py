@@ -34,16 +34,17 @@ AT_LINE = 2.0
 """Maximum distance of the front from its stop point at which a stop counts for the sign [m]."""
 ANOTHER = 5.0
 """Minimum increase of the distance of a stop line that indicates the next lap [m]."""
-BACK, FARTHEST_BACK = 0.5, 20.0
-"""Steps in which a place to stop with a view of the light is searched, and its maximum distance from the usual one
-[m]: a light across a road of eight lanes leaves an image of 100° about 12 m before the line."""
-FARTHER, FARTHEST = 2.0, 100.0
-"""Steps in which the distance is searched up to which a light is in view, and its maximum [m], from which on it is no
-reason to slow down."""
+STEP, FARTHEST = 1.0, 100.0
+"""Steps in which the places are searched from which a light is in view, and the maximum distance from the usual place
+to stop [m]; a light that is in view from farther away is no reason to slow down."""
 READING = 0.5
 """Time from a light being in view to its state being known, for cameras of some images per second [s]."""
 WAIT = 3.0
 """Waiting time at a stop sign [s]: 60 ticks of 0.05 s, as in EI-Drive."""
+
+
+CanReadLight = Callable[[str, float, float, float, float], bool]
+"""Function as `Detector.can_read_light`."""
 
 
 class StopPoint(NamedTuple):
@@ -80,8 +81,6 @@ class SignalStops:
 
     def __init__(self, roads: RoadNetwork | None, spec: ActorSpec) -> None:
         self.signals = SignalsAhead(roads)
-        self.can_read_light: Callable[[str, float, float, float, float], bool] | None = None
-        """As `Planner.can_read_light`."""
         self._front = spec.offset[0] + spec.size[0] / 2.0
         self._decisions: dict[str, _Decision] = {}
         """By the id of the signal; a signal whose stop line has been passed has none."""
@@ -94,8 +93,11 @@ class SignalStops:
         self._path = path
         self._along = distances_along(path)
 
-    def next(self, along: float, speed: float, now: float) -> StopPoint | None:
-        """Return the next stop of a vehicle at distance `along` of the path [m]; None if no signal requires one."""
+    def next(self, along: float, speed: float, now: float, can_read: CanReadLight | None = None) -> StopPoint | None:
+        """Return the next stop of a vehicle at distance `along` of the path [m]; None if no signal requires one.
+
+        can_read  as `Detector.can_read_light`; None: the vehicle has all lights in view up to their stop lines
+        """
         stops: list[StopPoint] = []
         ahead: dict[str, SignalAhead] = {}
         for signal in self.signals.ahead(along):
@@ -107,7 +109,7 @@ class SignalStops:
         }
         for name, signal in ahead.items():
             if name not in self._decisions:
-                self._decisions[name] = _Decision(signal.distance, *self._view_of(signal, along))
+                self._decisions[name] = _Decision(signal.distance, *self._view_of(signal, along, can_read))
             decision = self._decisions[name]
             decision.distance = signal.distance
             left = signal.distance - self._front - BEFORE_LINE - decision.back
@@ -123,35 +125,33 @@ class SignalStops:
                 stops.append(StopPoint(along + left - decision.shown + beyond, f"approach traffic light {name}"))
         return min(stops, default=None)
 
-    def _view_of(self, signal: SignalAhead, along: float) -> tuple[float, float]:
+    def _view_of(self, signal: SignalAhead, along: float, can_read: CanReadLight | None) -> tuple[float, float]:
         """Return how far before its usual place a vehicle at distance `along` of the path has a light in view [m], and
         from there up to which distance.
 
-        0 and inf if it has it in view nowhere. One step more is for errors of the position and of the control.
+        0 and inf if it has it in view nowhere, or in one place only. One step more is for errors of the position and of
+        the control.
         """
-        can_read = self.can_read_light
         if signal.kind != "light" or can_read is None:
             return 0.0, math.inf
-        stop = along + signal.distance - self._front - BEFORE_LINE
-
-        def is_shown(back: float) -> bool:
-            x, y, yaw = self._pose_at(stop - back)
-            return can_read(signal.signal, x, y, signal.z, yaw)
-
-        nearest = next(filter(is_shown, np.arange(0.0, FARTHEST_BACK + BACK, BACK).tolist()), None)
+        usual = along + signal.distance - self._front - BEFORE_LINE
+        distances = np.arange(0.0, FARTHEST, STEP).tolist()
+        is_shown = (can_read(signal.signal, *self._pose_at(usual - back, signal.z)) for back in distances)
+        views = zip(distances, is_shown, strict=True)
+        nearest = next((back for back, shown in views if shown), None)
         if nearest is None:
             return 0.0, math.inf
-        back = nearest + BACK if nearest else 0.0
-        hidden = (far for far in np.arange(back, FARTHEST, FARTHER).tolist() if not is_shown(far))
-        return back, max(next(hidden, math.inf) - back - FARTHER, 0.0)
+        hidden = next((back for back, shown in views if not shown), math.inf)
+        back = nearest + STEP if nearest else 0.0
+        shown = hidden - STEP - back
+        return (back, shown) if shown > 0.0 else (0.0, math.inf)
 
-    def _pose_at(self, along: float) -> tuple[float, float, float]:
-        """Return x, y [m] and heading [rad] at a distance along the path [m]."""
+    def _pose_at(self, along: float, z: float) -> tuple[float, float, float, float]:
+        """Return x, y, z [m] and heading [rad] at a distance along the path [m]."""
         index = min(max(int(np.searchsorted(self._along, along)) - 1, 0), len(self._path) - 2)
         (x0, y0), (x1, y1) = self._path[index : index + 2].tolist()
-        length = math.hypot(x1 - x0, y1 - y0) or 1.0
-        ahead = along - float(self._along[index])
-        return x0 + ahead * (x1 - x0) / length, y0 + ahead * (y1 - y0) / length, math.atan2(y1 - y0, x1 - x0)
+        yaw, ahead = math.atan2(y1 - y0, x1 - x0), along - float(self._along[index])
+        return x0 + ahead * math.cos(yaw), y0 + ahead * math.sin(yaw), z, yaw
 
     def limits(self, stop: StopPoint, part: slice) -> Array:
         """Return the maximum speeds at points of the path with which the vehicle stops there [m/s]."""

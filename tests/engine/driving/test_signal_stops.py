@@ -132,10 +132,9 @@ def test_car_stops_at_the_line_of_a_light_that_no_place_shows() -> None:
     stops.signals.update([SignalReading("east", "red")])
     usual = stops.next(50.0, 10.0, 0.0)
     blind = SignalStops(roads, CAR)
-    blind.can_read_light = lambda *place: False
     blind.follow(EAST)
     blind.signals.update([SignalReading("east", "red")])
-    assert blind.next(50.0, 10.0, 0.0) == usual
+    assert blind.next(50.0, 10.0, 0.0, lambda *place: False) == usual
 
 
 def test_car_without_obey_signals_passes_red() -> None:

@@ -226,20 +226,22 @@ def test_with_estimated_pose_moves_sensors_and_objects() -> None:
         },
         {"roof": LidarReading(np.ones((1, 3)), np.ones(1), pose)},
     )
-    found = localizer.with_estimated_pose(truth)
-    shift, turn = found.ego.position - truth.ego.position, found.ego.yaw
+    estimated = localizer.with_estimated_pose(truth)
+    shift, turn = estimated.ego.position - truth.ego.position, estimated.ego.yaw
     assert np.linalg.norm(shift) > 0.01
     assert abs(turn) > 1e-4
     assert shift[2] == 0.0
-    assert (found.ego.pitch, found.ego.roll) == (0.01, 0.02)
+    assert (estimated.ego.pitch, estimated.ego.roll) == (0.01, 0.02)
     cos, sin = math.cos(turn), math.sin(turn)
-    for reading in (found.cameras["front"], found.lidars["roof"]):
-        np.testing.assert_allclose(reading.pose[:3, 3] - found.ego.position, [cos, sin, 0.5], atol=1e-12)
+    for reading in (estimated.cameras["front"], estimated.lidars["roof"]):
+        np.testing.assert_allclose(reading.pose[:3, 3] - estimated.ego.position, [cos, sin, 0.5], atol=1e-12)
         assert reading.pose[0, 0] == pytest.approx(cos)
-    assert found.truth is not None
-    np.testing.assert_allclose(found.truth.boxes[0, :2] - found.ego.position[:2], [10 * cos, 10 * sin], atol=1e-12)
-    assert found.truth.boxes[0, 6] == pytest.approx(1.0 + turn)
-    np.testing.assert_allclose(found.truth.velocity, [[2 * cos, 2 * sin]])
+    assert estimated.truth is not None
+    np.testing.assert_allclose(
+        estimated.truth.boxes[0, :2] - estimated.ego.position[:2], [10 * cos, 10 * sin], atol=1e-12
+    )
+    assert estimated.truth.boxes[0, 6] == pytest.approx(1.0 + turn)
+    np.testing.assert_allclose(estimated.truth.velocity, [[2 * cos, 2 * sin]])
 
 
 def test_localizer_between_fixes_follows_imu() -> None:
@@ -249,10 +251,10 @@ def test_localizer_between_fixes_follows_imu() -> None:
     for tick in range(40):
         time = tick * DT
         fix = GnssReading(np.array([10.0 * time, 0.0, 0.0]), 0.01 * np.eye(3)) if tick % 20 == 0 else None
-        found = localizer.with_estimated_pose(
+        estimated = localizer.with_estimated_pose(
             Readings(time, ego(10.0 * time, 0.0, 0.0, 10.0, time), gnss=fix, imu=imu())
         )
-        xs.append(float(found.ego.position[0]))
+        xs.append(float(estimated.ego.position[0]))
     np.testing.assert_allclose(np.diff(xs), 0.5, atol=0.05)
 
 
@@ -264,9 +266,9 @@ def test_speed_on_slope_is_that_along_the_vehicle(pitch: float) -> None:
         time, x = tick * DT, 10.0 * math.cos(pitch) * tick * DT
         truth = replace(ego(x, 0.0, 0.0, 10.0, time), pitch=pitch)
         fix = GnssReading(np.array([x, 0.0, 0.0]), 0.01 * np.eye(3))
-        found = localizer.with_estimated_pose(Readings(time, truth, gnss=fix, imu=imu()))
+        estimated = localizer.with_estimated_pose(Readings(time, truth, gnss=fix, imu=imu()))
     assert math.sqrt(localizer.estimate.covariance[3, 3]) < 0.025
-    assert found.ego.speed == pytest.approx(10.0, abs=0.02)
+    assert estimated.ego.speed == pytest.approx(10.0, abs=0.02)
 
 
 def test_localizer_of_a_station_that_enters_late_starts_at_its_first_reading() -> None:
@@ -287,9 +289,9 @@ def test_localizer_after_teleport_starts_at_the_new_pose_with_a_new_error() -> N
     for seed in range(300):
         localizer = Localizer("Ego", seed)
         for number, pose in enumerate(poses):
-            found = localizer.with_estimated_pose(Readings(pose.time, pose, imu=imu())).ego
-            x, y = found.position[:2] - pose.position[:2]
-            errors[number, seed] = x, y, found.yaw - pose.yaw, found.speed - pose.speed
+            estimated = localizer.with_estimated_pose(Readings(pose.time, pose, imu=imu())).ego
+            x, y = estimated.position[:2] - pose.position[:2]
+            errors[number, seed] = x, y, estimated.yaw - pose.yaw, estimated.speed - pose.speed
         assert not localizer.lagged_covariance.any()
     np.testing.assert_allclose(errors.std(axis=1), [[0.5, 0.5, math.radians(1.0), 0.2]] * 2, rtol=0.12)
     assert max(abs(np.corrcoef(*errors[:, :, axis])[0, 1]) for axis in range(4)) < 0.2

@@ -142,8 +142,8 @@ class Situation(msgspec.Struct, frozen=True):
 
     def rows_of(self, owner: int) -> tuple[int, ...]:
         """Return the row of an object among the fused objects; none if it is lost."""
-        row = self.objects[owner].row
-        return () if row is None else (row,)
+        fused = self.objects[owner].row
+        return () if fused is None else (fused,)
 
     def free_progress(self, horizon: float) -> float:
         """Return the distance that the vehicle covers without objects [m], by limits, walls and acceleration."""

@@ -19,7 +19,7 @@ from eidrive_scenario.driving.planning.behavior.right_of_way import (
     Passage,
 )
 from eidrive_scenario.driving.planning.path import ALIGNED
-from eidrive_scenario.driving.planning.signal_stops import COMFORTABLE
+from eidrive_scenario.driving.planning.signal_stops import COMFORTABLE, PERCEPTION
 from eidrive_scenario.roads import RoadNetwork
 
 STANDING = 0.3
@@ -38,9 +38,6 @@ NOTICEABLE, GREATEST = 0.8, 4.0
 """Accelerations below which an object keeps its speed, and maximum acceleration that is considered [m/s²]."""
 PERSISTENCE = 1.5
 """Time constant with which the predicted acceleration decreases [s]."""
-REACTION = 1.0
-"""Time for which a vehicle that accelerates is expected to do so before it can brake for a curve [s]; a usual reaction
-time."""
 STOPPING = 2.0
 """Deceleration with which a vehicle is predicted to stop at a sign [m/s²]; one that needs COMFORTABLE for it passes."""
 AT_SIGN = 1.0
@@ -164,7 +161,8 @@ class Predictor:
         followed: list[Course] = []
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
-        soon = now + max(known_object.acceleration, 0.0) * REACTION - noise
+        # A vehicle that accelerates does so until its driver reacts to a curve.
+        soon = now + max(known_object.acceleration, 0.0) * PERCEPTION - noise
         for course in courses:
             along, left, heading = course.project(known_object.x, known_object.y)
             turn = float(wrap_angle(direction - heading))
