@@ -3,8 +3,9 @@
 A watchdog thread interrupts the thread of the run by raising LimitReached in it: through a signal in the main thread,
 which also ends waiting system calls, else between two steps of the interpreter. It repeats that until the run ends,
 as code may catch the exception, and the interpreter ignores exceptions in finalizers and callbacks of weak references:
-each time step and the end of a run raise it, too. Code that never returns to the interpreter cannot be interrupted: a
-process that has a LastResort ends in that case. The run does not depend on the clock before the limit is reached.
+each time step and the end of a run raise it, too, and interruptions that were ignored are not reported. Code that never
+returns to the interpreter cannot be interrupted: a process that has a LastResort ends in that case. The run does not
+depend on the clock before the limit is reached.
 """
 
 from __future__ import annotations
@@ -202,6 +203,37 @@ def _is_protected(frame: FrameType | None) -> bool:
 _PROTECTED = frozenset({_LimitedBlock.__enter__.__code__, _LimitedBlock.__exit__.__code__, Limit.publish.__code__})
 
 
+class _UnreportedInterruptions:
+    """Context manager in which the interpreter does not report the interruptions that it ignores.
+
+    pytest would fail the test of a run for such a report. Several threads may enter it at once.
+    """
+
+    def __init__(self) -> None:
+        self._entered = 0
+        self._lock = threading.Lock()
+        self._before = sys.unraisablehook
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._entered += 1
+            if self._entered == 1:
+                self._before, sys.unraisablehook = sys.unraisablehook, self._report
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._entered -= 1
+            if self._entered == 0 and sys.unraisablehook == self._report:
+                sys.unraisablehook = self._before
+
+    def _report(self, unraisable: sys.UnraisableHookArgs) -> None:
+        if not issubclass(unraisable.exc_type, LimitReached):
+            self._before(unraisable)
+
+
+_unreported_interruptions = _UnreportedInterruptions()
+
+
 class _Watchdog:
     """Thread that interrupts the thread of its creation from the limit on."""
 
@@ -239,8 +271,11 @@ class _Watchdog:
             signal.signal(signal.SIGUSR2, signal.SIG_DFL if self._before is None else self._before)
 
     def _watch(self) -> None:
-        if self._ended.wait(self.limit.seconds):
-            return
+        if not self._ended.wait(self.limit.seconds):
+            with _unreported_interruptions:
+                self._interrupt_until_end()
+
+    def _interrupt_until_end(self) -> None:
         last, is_closing = time.monotonic() + GRACE, False
         while not self._ended.is_set():
             self._is_postponed = False

@@ -74,12 +74,11 @@ def test_hung_detector_in_another_thread_is_interrupted(package: Path, tmp_path:
 
 
 @pytest.mark.process
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("is_main", [True, False])
 def test_interruption_in_a_finalizer_aborts_the_run_at_its_next_step(
     package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_main: bool
 ) -> None:
-    """The interpreter ignores exceptions in finalizers, and no second interruption follows here."""
+    """The interpreter ignores exceptions in finalizers, and pytest would report it. No second interruption follows."""
     monkeypatch.setattr(wall_limit, "REPEAT", LONG)
 
     class Interrupted:
