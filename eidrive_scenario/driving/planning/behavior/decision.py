@@ -397,7 +397,7 @@ class Decider:
         A vehicle that has to wait does so at the edge of its lane if there is enough space: it has a better view there.
         """
         motion = self._motion(situation, scene, profile, self._settings.time_gap)
-        beside = situation.lanes_ahead
+        beside = situation.lanes_along(profile)
         outlook = Outlook(situation.line, scene, beside, situation.now)
         is_current = self._current is not None and self._current.name == profile.name
         has_begun = self._passes and is_current

@@ -100,6 +100,12 @@ class Situation(msgspec.Struct, frozen=True):
         """Lanes beside the line shortly ahead of the vehicle."""
         return self.line.lanes_beside(self.s + VIEWED)
 
+    def lanes_along(self, profile: LateralProfile) -> LanesBeside:
+        """Return the lanes beside the line shortly ahead, or, if none of these is of the opposite direction, as in a
+        junction, beside what a profile passes."""
+        beside = [self.lanes_ahead, *map(self.line.lanes_beside, profile.places[-3:-1])]
+        return next((lanes for lanes in beside if not math.isnan(lanes.oncoming)), self.lanes_ahead)
+
     @property
     def stops(self) -> list[Wall]:
         """Place at which a signal requires a stop, if there is one."""

@@ -318,7 +318,7 @@ def _beside(lanes: list[_Lane], own: int) -> LanesBeside:
         if same:
             left_edge = far_edge
             left = offset if math.isnan(left) and 2.0 * width >= NARROWEST else left
-        elif math.isnan(oncoming) and math.isnan(left):
+        elif math.isnan(oncoming):
             oncoming = offset
     for _, offset, width, drivable, with_traffic in lanes[own + 1 :]:
         if not drivable or not with_traffic:

@@ -199,6 +199,21 @@ def test_standing_vehicle_is_passed_over_a_solid_line() -> None:
     assert run.front > 120.0
 
 
+@pytest.mark.parametrize("arrival", [9.0, 11.0, 13.0])
+def test_vehicle_behind_a_junction_is_passed_only_in_a_gap(arrival: float) -> None:
+    """A car comes at 8 m/s in the lane of the opposite direction, which the vehicle sees across the junction."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    standing = KnownBox(63.0, 0.0, kind="truck", size=(6.1, 2.2))
+    run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
+    run.run(30.0, lambda now: [standing, KnownBox(63.0 + 8.0 * (arrival - now), 3.5, vx=-8.0, yaw=math.pi)])
+    run.world.close()
+    oncoming = (63.0 + 8.0 * (arrival - 0.05 * number) for number in range(len(run.path)))
+    beside = [y for (x, y, _), other in zip(run.path, oncoming, strict=True) if abs(x + 1.4 - other) < 5.0]
+    # Half the widths of both: 0.9 m each.
+    assert max(beside, default=0.0) < 3.5 - 1.8
+    assert run.front > 80.0
+
+
 def marked_road(mark: str) -> RoadNetwork:
     """Return a road of two directions with a mark in the middle."""
     lane = f'<lane id="0" type="none"><roadMark sOffset="0" type="{mark}"/></lane>'
