@@ -329,6 +329,8 @@ class Decider:
                 holds.append(end)
             seeks_gap = change is not None and situation.s >= change.begin and not merges
             way = inside_way(scene, profile, self._body.half_width)
+            if verdict is not Verdict.WAIT:
+                holds += situation.clear_of_junctions(scene, way)
             for hold in holds:
                 way &= scene.rear < hold.s + self._body.front
             crossing = conflicts(scene, way, situation.s)
@@ -417,6 +419,7 @@ class Decider:
                 # Nearer to the obstacle it would see less.
                 stop = situation.speed**2 / (2.0 * self._settings.comfortable_deceleration)
                 waits_at = min(waits_at, situation.s + stop)
+            waits_at = situation.outside_junctions(waits_at)
             waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene):
                 is_last_place = math.isinf(profile.waits_at)

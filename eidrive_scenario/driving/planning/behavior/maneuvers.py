@@ -10,13 +10,14 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, STILL, KnownObject
 from eidrive_scenario.driving.planning.behavior.merging import has_gap_now
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    BEFORE_ZONE,
     HASTY,
     ONCOMING_SPEED,
     SIMILAR_SPEED,
@@ -67,8 +68,15 @@ class Situation(msgspec.Struct, frozen=True):
     """Kind of the nearest way ahead that no sensor shows and that limits the speed; empty without one."""
     change: LaneChange | None = None
     """Next lane change that the route requires."""
-    junction: float = math.inf
-    """Distance along the line at which the current or next junction begins [m]."""
+    passages: tuple[Passage, ...] = ()
+    """Current and next passages of junctions."""
+    crossings: tuple[Passage, ...] = ()
+    """Those of junctions with cross traffic."""
+
+    @property
+    def junction(self) -> float:
+        """Distance along the line at which the current or next junction begins [m]; inf without one."""
+        return self.passages[0].start if self.passages else math.inf
 
     @property
     def motion(self) -> tuple[float, float]:
@@ -105,6 +113,35 @@ class Situation(msgspec.Struct, frozen=True):
         junction, beside what a profile passes."""
         beside = [self.lanes_ahead, *map(self.line.lanes_beside, profile.places[-3:-1])]
         return next((lanes for lanes in beside if not math.isnan(lanes.oncoming)), self.lanes_ahead)
+
+    def outside_junctions(self, place: float) -> float:
+        """Return the place at which the vehicle stops instead of at `place`, where it would obstruct the cross traffic
+        of junctions [m]; those that it cannot stop before any more count as passed."""
+        stop = self.s + self.speed**2 / (2.0 * self.settings.comfortable_deceleration) - LATE_STOP
+        for passage in reversed(self.crossings):
+            before = passage.entry - BEFORE_ZONE - self.body.front
+            if place - self.body.rear < passage.end and place > before >= stop:
+                place = before
+        return place
+
+    def clear_of_junctions(self, scene: Surroundings, way: Bools) -> list[Wall]:
+        """Return the wall before the junctions that the vehicle would not leave before it stops behind a queue.
+
+        The vehicles that still move in its way (N, K) will stand there, too (section 11 of the German road traffic
+        rules: traffic does not enter a junction in which it would have to wait).
+        """
+        if not self.crossings:
+            return []
+        ahead = way[:, 0] & scene.may_lead[:, 0] & (scene.rear[:, 0] > self.front) & scene.certain
+        stands = ahead & (np.abs(scene.speed[:, 0]) < STILL)
+        if not stands.any():
+            return []
+        end = float((scene.rear[stands, 0] - scene.passing_gap[stands]).min())
+        between = np.flatnonzero(ahead & ~stands & (scene.rear[:, 0] < end))
+        length = {scene.owner[row]: 2.0 * scene.half_length[row, 0] + self.settings.standstill_gap for row in between}
+        place = end - sum(length.values()) - self.settings.standstill_gap - self.body.front
+        wall = self.outside_junctions(place)
+        return [Wall(wall, math.inf, "keep a junction clear")] if wall < place else []
 
     @property
     def stops(self) -> list[Wall]:
@@ -169,6 +206,8 @@ class Situation(msgspec.Struct, frozen=True):
         return max(min(math.sqrt(self.speed**2 + gain), self.wanted, limit), self.speed)
 
 
+LATE_STOP = 1.0
+"""Distance by which a stop before a junction that has begun may come too late [m]."""
 VIEWED = 10.0
 """Distance ahead of the vehicle at which the lanes beside the line are determined [m]."""
 SLOWER = 2.0

@@ -249,6 +249,7 @@ class BehaviorPlanner(RoutePlanner):
         ]
         near = [known_objects[index] for index in indexes]
         stop = self._stop(line.path, ego, x, y, now)
+        passages = tuple(passage for passage in self._passages if passage.end > s)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
         low = line.index_at(s - MARGIN_AHEAD)
         high = line.index_at(s + way + MARGIN_AHEAD) + 1
@@ -268,17 +269,19 @@ class BehaviorPlanner(RoutePlanner):
             window=(low, max(high, low + 2)),
             stop=None if stop is None else Wall(line.along_of(stop.along), math.inf, stop.reason),
             now=now,
-            gives_way=self._gives_way(s),
+            gives_way=self._gives_way(passages),
             hidden=hidden,
             change=self._change(line, s),
-            junction=next((passage.start for passage in self._passages if passage.end > s), math.inf),
+            passages=passages,
+            crossings=tuple(filter(self._rules.has_cross_traffic, passages)) if self._rules is not None else (),
         )
         return self._decider.decide(situation)
 
-    def _gives_way(self, s: float) -> Callable[[Passage], bool] | None:
-        """Return a function that determines whether the vehicle at `s` gives way to traffic on another passage."""
+    def _gives_way(self, passages: Sequence[Passage]) -> Callable[[Passage], bool] | None:
+        """Return a function that determines whether a vehicle with these passages ahead gives way to traffic on another
+        one."""
         rules = self._rules
-        ahead = {passage.junction: passage for passage in reversed(self._passages) if passage.end > s}
+        ahead = {passage.junction: passage for passage in reversed(passages)}
         if rules is None or not ahead:
             return None
         return lambda other: other.junction in ahead and rules.gives_way(ahead[other.junction], other)

@@ -26,6 +26,8 @@ NEAR = 3.0
 """Distance from a way within which a stop line may hold its traffic [m]."""
 ALIKE, OPPOSITE = math.radians(30.0), math.radians(150.0)
 """Angles between two entries below which they have the same direction, and from which on they are oncoming [rad]."""
+CROSSING = math.sin(math.radians(45.0))
+"""Sine of the angle between two ways in a junction from which on they cross."""
 TURNING = math.radians(30.0)
 """Change of the heading in a junction from which on a vehicle turns [rad]."""
 
@@ -34,11 +36,13 @@ class Passage(NamedTuple):
     """Passage of a way through a junction.
 
     start, end  distances along the way [m];  heading  at the entry [rad];  turn  change of heading, left positive [rad]
+    entry       distance along the way of its stop line, or its start without one [m]
     gives_way   whether a stop sign or a sign to give way stands before it;  has_light  whether a light controls it
     road        connecting road in a junction with priorities of the map; None in other junctions
     """
 
     junction: str
+    entry: float
     start: float
     end: float
     heading: float
@@ -59,6 +63,8 @@ class JunctionRules:
         self._priorities: Mapping[str, frozenset[tuple[str, str]]] = {
             junction.id: frozenset(junction.priorities) for junction in roads.junctions.values() if junction.priorities
         }
+        self._headings: dict[str, Array] = {}
+        """Headings of the roads through each junction at their ends [rad]."""
         self._right = 1.0 if all(road.rule == "RHT" for road in roads.roads.values()) else -1.0
         """Sign of angles, which are exchanged with traffic on the left."""
 
@@ -95,9 +101,11 @@ class JunctionRules:
             road = max(counts, key=lambda road: (counts[road], road), default=None)
             start, end, before = float(along[first]), float(along[last]), float(heading[max(first - 1, 0)])
             turn = float(wrap_angle(float(heading[min(last, len(heading) - 1)]) - before))
-            kinds = {line.kind for place, line in signs if start - BEFORE_ENTRY <= place <= start + BEYOND_ENTRY}
+            lines = [(place, line.kind) for place, line in signs if -BEFORE_ENTRY <= place - start <= BEYOND_ENTRY]
+            kinds = {kind for _, kind in lines}
+            entry = min(max((place for place, _ in lines), default=start), start)
             gives_way, has_light = bool(kinds - {"light"}), "light" in kinds
-            passages.append(Passage(junction, start, end, before, turn, gives_way, has_light, road))
+            passages.append(Passage(junction, entry, start, end, before, turn, gives_way, has_light, road))
         return tuple(passages)
 
     def _lines_near(self, points: Array) -> list[StopLine]:
@@ -122,6 +130,17 @@ class JunctionRules:
         if own.has_light or abs(relation) <= ALIKE:
             return False
         return relation > 0.0
+
+    def has_cross_traffic(self, own: Passage) -> bool:
+        """Return whether ways through a junction cross the direction of a passage, other than where lanes only part or
+        join, as on motorways."""
+        headings = self._headings.get(own.junction)
+        if headings is None:
+            inside = [road for road in self._roads.roads.values() if road.junction_id == own.junction]
+            ends = [(road.id, s) for road in inside for s in (0.0, road.length)]
+            headings = np.array([self._roads.road_pose_at(*end).h for end in ends])
+            self._headings[own.junction] = headings
+        return bool((np.abs(np.sin(headings - own.heading)) > CROSSING).any())
 
     def may_cross(self, own: Passage, other: Passage) -> bool:
         """Return whether traffic that cannot be seen may cross on another passage of the same junction.

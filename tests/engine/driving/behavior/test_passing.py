@@ -205,7 +205,7 @@ def test_vehicle_behind_a_junction_is_passed_only_in_a_gap(arrival: float) -> No
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
     standing = KnownBox(63.0, 0.0, kind="truck", size=(6.1, 2.2))
     run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
-    run.run(30.0, lambda now: [standing, KnownBox(63.0 + 8.0 * (arrival - now), 3.5, vx=-8.0, yaw=math.pi)])
+    run.run(40.0, lambda now: [standing, KnownBox(63.0 + 8.0 * (arrival - now), 3.5, vx=-8.0, yaw=math.pi)])
     run.world.close()
     oncoming = (63.0 + 8.0 * (arrival - 0.05 * number) for number in range(len(run.path)))
     beside = [y for (x, y, _), other in zip(run.path, oncoming, strict=True) if abs(x + 1.4 - other) < 5.0]
