@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
-from urllib.parse import quote
+from typing import NamedTuple
+from urllib.parse import quote, unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +15,14 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import box_corners, rotation_matrix
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.atomic import create
+from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.sensing.readings import CameraReading
 
 Image = NDArray[np.uint8]
+_IMAGE_NAME = re.compile(r"(.+)-(\d{6,})\.jpg")
 
 QUALITY = 90
 """Quality of the JPEG files [percent]."""
@@ -79,6 +83,22 @@ class CameraImageWriter:
 def image_file(camera: str, tick: int) -> str:
     """Return the name of an image."""
     return f"{quote(camera, safe=' ')}-{tick:06d}.jpg"
+
+
+class Picture(NamedTuple):
+    """Image file of a camera of a station at a tick."""
+
+    station: str
+    camera: str
+    tick: int
+    path: Path
+
+
+def pictures_in(folder: Path) -> list[Picture]:
+    """Return the images below a folder that CameraImageWriter wrote, in the order of stations, cameras and ticks."""
+    names = ((path, _IMAGE_NAME.fullmatch(path.name)) for path in folder.glob("*/*.jpg"))
+    images = [(path.parent, name[1], int(name[2]), path) for path, name in names if name and is_regular_file(path)]
+    return [Picture(unquote(folder.name), unquote(camera), tick, path) for folder, camera, tick, path in sorted(images)]
 
 
 def camera_file(camera: str) -> str:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, stamp, vector
 from eidrive_scenario.files.atomic import partial_path
-from eidrive_scenario.files.bounded import is_regular_file, load_json, read_regular_file
-from eidrive_scenario.recording.camera_images import camera_file
+from eidrive_scenario.files.bounded import load_json, read_regular_file
+from eidrive_scenario.recording.camera_images import Picture, camera_file, pictures_in
 from eidrive_scenario.recording.run_files import IMAGES
 
-_NAME = re.compile(r"(.+)-(\d{6,})\.jpg")
 _LARGEST_IMAGE = 64 * 2**20
 """Maximum size of an image file [bytes]."""
 _LARGEST_DESCRIPTION = 2**16
@@ -39,15 +36,6 @@ class Camera:
     pose: Array
 
 
-@dataclass(frozen=True)
-class Picture:
-    """Image file of a camera."""
-
-    station: str
-    camera: str
-    path: Path
-
-
 class CameraImages:
     """Images of a run by tick. Damaged descriptions of cameras are omitted with a warning."""
 
@@ -57,27 +45,19 @@ class CameraImages:
         folder = recording.parent / IMAGES
         if not folder.is_dir():
             folder = partial_path(folder)
-        for station_folder in sorted(folder.iterdir()) if folder.is_dir() else ():
-            if station_folder.is_dir():
-                self._read(unquote(station_folder.name), station_folder, warnings)
+        cameras: dict[tuple[str, str], Path] = {}
+        for picture in pictures_in(folder):
+            self._pictures.setdefault(picture.tick, []).append(picture)
+            cameras[picture.station, picture.camera] = picture.path.with_name(camera_file(picture.camera))
+        for (station, name), path in cameras.items():
+            try:
+                self.cameras.append(_camera(station, name, path))
+            except (OSError, AttributeError, LookupError, TypeError, ValueError) as error:
+                warnings.append(f"{path}: no calibration: {str(error)[:200]}")
 
     def at(self, tick: int) -> list[Picture]:
         """Return the images of a tick."""
         return self._pictures.get(tick, [])
-
-    def _read(self, station: str, folder: Path, warnings: list[str]) -> None:
-        names = set()
-        for path in sorted(folder.iterdir()):
-            match = _NAME.fullmatch(path.name)
-            if match is not None and is_regular_file(path):
-                camera = unquote(match[1])
-                names.add(camera)
-                self._pictures.setdefault(int(match[2]), []).append(Picture(station, camera, path))
-        for name in sorted(names):
-            try:
-                self.cameras.append(_camera(station, name, folder / camera_file(name)))
-            except (OSError, AttributeError, LookupError, TypeError, ValueError) as error:
-                warnings.append(f"{folder / camera_file(name)}: no calibration: {str(error)[:200]}")
 
 
 def _camera(station: str, name: str, path: Path) -> Camera:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 from pydantic import ValidationError
 
@@ -19,6 +18,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.files.bounded import load_json, path_argument
+from eidrive_scenario.recording.camera_images import pictures_in
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recording import Recording, open_recording
@@ -39,8 +39,6 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.recorded_outcome import BODIES, CONTEXT, TRAILERS, recorded_bodies, recorded_outcome
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
-_NAME = re.compile(r"(?P<camera>.+)-(?P<tick>\d+)\.jpg")
-
 
 def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
     """Return the images in the folder of a run, by station and camera: their ticks in order, and the part of their
@@ -49,21 +47,12 @@ def camera_files(run: Path, page: Path) -> dict[str, dict[str, Any]]:
     The result is empty without images.
     """
     files: dict[str, dict[str, Any]] = {}
-    folder = run / IMAGES
-    if not folder.is_dir():
-        return files
-    for station in sorted(path for path in folder.iterdir() if path.is_dir()):
-        ticks: dict[str, list[int]] = {}
-        for entry in os.scandir(station):
-            match = _NAME.fullmatch(entry.name)
-            if match is not None:
-                ticks.setdefault(match["camera"], []).append(int(match["tick"]))
-        if ticks:
-            relative = quote(os.fsencode(Path(os.path.relpath(station, page)).as_posix()))
-            files[unquote(station.name)] = {
-                unquote(camera): {"address": f"{relative}/{quote(os.fsencode(camera))}-", "ticks": sorted(numbers)}
-                for camera, numbers in sorted(ticks.items())
-            }
+    for station, camera, tick, path in pictures_in(run / IMAGES):
+        of_station = files.setdefault(station, {})
+        if camera not in of_station:
+            address = quote(os.fsencode(Path(os.path.relpath(path, page)).as_posix()))
+            of_station[camera] = {"address": f"{address.rpartition('-')[0]}-", "ticks": []}
+        of_station[camera]["ticks"].append(tick)
     return files
 
 
