@@ -17,6 +17,9 @@ NO_PLANNER = "none"
 DEFAULT_PLANNER = "behavior"
 """Planner of a vehicle whose controller names none."""
 
+REACTION = 0.5
+"""Time from the sight of an obstacle or of hidden traffic to braking [s]."""
+
 Polygon = tuple[tuple[float, float], ...]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.base.geometry import point_in_polygon
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.driving.planner_settings import Polygon
+from eidrive_scenario.driving.planner_settings import REACTION, Polygon
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.station_declarations import property_line, station_controller
 from eidrive_scenario.errors import Diagnostic
@@ -94,10 +94,6 @@ def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -
                 f"its detector_latency is only {station.detector_latency:g} s",
                 "use a smaller step (RunSettings.dt) to resolve it",
             )
-
-
-REACTION = 0.5
-"""Time from the sight of an obstacle to braking [s], as in the occlusion model of the planner."""
 
 
 def short_views(settings: Mapping[str, AgentSettings], detectors: Mapping[str, Detector]) -> Iterator[Diagnostic]:

@@ -11,14 +11,13 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.driving.planner_settings import REACTION
 from eidrive_scenario.driving.planning.behavior.conflict_ways import UPSTREAM, ConflictWay
 from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE, Body, time_to_gain
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.road_objects import buildings, road_object_bodies
 
-REACTION = 0.5
-"""Time from the sight of hidden traffic to braking [s]."""
 CREEP = 1.39
 """Speed at which the vehicle moves on until it has a view [m/s], that of Autoware before occluded junctions."""
 TARGET_HEIGHT = 1.0
