@@ -33,11 +33,11 @@ class Verdict:
 
     name: str
     passed: bool
-    value: float | None
-    limit: float | None
-    unit: str
-    first_violation: float | None
-    reason: str
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    first_violation: float | None = None
+    reason: str = ""
     fatal: bool = False
     """True if the failure ends the run. The failure must be final: no later event can fulfill the criterion."""
     violation_state: tuple[str, ...] = field(default=(), compare=False)

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from eidrive_scenario.errors import Diagnostic, InputError, quoted
+from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.simulation.result import typed
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
@@ -21,22 +22,6 @@ OUTCOMES = ("failed", "did not finish", "not judged", "passed")
 """Outcomes of a run in the order of pages: what needs attention comes first."""
 
 
-class ReportedCriterion(BaseModel):
-    """Verdict in the format of `--json`."""
-
-    model_config = ConfigDict(extra="ignore")
-
-    name: str
-    passed: bool
-    value: float | None = None
-    limit: float | None = None
-    unit: str = ""
-    reason: str = ""
-    first_violation: float | None = None
-    violation_state: tuple[str, ...] = ()
-    """Lines about the stations at the first violation, of which the first has its time; empty for older results."""
-
-
 class ReportedRun(BaseModel):
     """Run in the format of `--json`."""
 
@@ -47,7 +32,7 @@ class ReportedRun(BaseModel):
     channel: str = ""
     passed: bool
     end_reason: str
-    criteria: tuple[ReportedCriterion, ...] = ()
+    criteria: tuple[Verdict, ...] = ()
     metrics: dict[str, float | None] = {}
     warnings: tuple[str, ...] = ()
     trace_hash: str = ""
@@ -71,8 +56,7 @@ class ReportedRun(BaseModel):
         """Return the value of an axis of a sweep or of a parameter, as a number if it is one; None without it."""
         if name in self.axes:
             return self.axes[name]
-        value = typed(self.parameters[name]) if name in self.parameters else None
-        return value if value is None or isinstance(value, int | float) else str(value)
+        return typed(self.parameters[name]) if name in self.parameters else None
 
     @property
     def is_swept(self) -> bool:

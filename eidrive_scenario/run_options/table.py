@@ -8,6 +8,7 @@ option is one declaration, and the line of the engine that uses its value.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -300,6 +301,9 @@ OPTIONS: tuple[RunOption, ...] = tuple(
     for declared in fields(RunSettings)
 )
 """All options of a run, in the order of RunSettings."""
+FLAGS: Mapping[str, str] = {option.name: option.flag for option in OPTIONS}
+"""Options of the command line by the name of the setting."""
+_SETTING = re.compile(r"(?<!\w)RunSettings\.(\w+)")
 
 
 def option_of(name: str) -> RunOption:
@@ -317,3 +321,18 @@ def checked_settings(settings: RunSettings | None) -> RunSettings:
     if settings is not None and not isinstance(settings, RunSettings):
         raise SettingError(Diagnostic(f"settings is {quoted(settings)}", "give RunSettings(…)"))
     return settings or RunSettings()
+
+
+def with_option_names(text: str, names: Mapping[str, str] = FLAGS) -> str:
+    """Return a message of the engine with the options of a surface in place of `RunSettings.NAME`.
+
+    names  options by the name of the setting; a setting without one keeps the name that it has in Python
+    """
+    return _SETTING.sub(lambda match: names.get(match[1], match[0]), text)
+
+
+def diagnostic_with_option_names(diagnostic: Diagnostic, names: Mapping[str, str] = FLAGS) -> Diagnostic:
+    """Return a diagnostic with the options of a surface in its texts, as `with_option_names`."""
+    keys = ("message", "hint", "source")
+    texts: dict[str, Any] = {key: with_option_names(getattr(diagnostic, key), names) for key in keys}
+    return replace(diagnostic, **texts)

@@ -81,7 +81,7 @@ class ResolvedSettings(RunSettings):
 
     def as_json(self) -> dict[str, Any]:
         """Return the settings as JSON values."""
-        content = {field.name: _plain(getattr(self, field.name)) for field in fields(self) if field.name not in _HIDDEN}
+        content = {field.name: plain(getattr(self, field.name)) for field in fields(self) if field.name not in _HIDDEN}
         first = {name: content[name] for name in ("scenario", "seed", "run")}
         files = [{"role": role, "name": name, "sha256": digest} for role, name, digest in self.files]
         return {**first, **content, "files": files}
@@ -207,14 +207,14 @@ def _with_files(value: Any, convert: Callable[[str | Path], Any], *, is_file: bo
     return convert(value) if is_file and isinstance(value, str | Path) else value
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return a value of JSON types; numbers that JSON lacks and all other types become texts."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, frozenset | set):
-        return sorted((_plain(item) for item in value), key=str)
+        return sorted((plain(item) for item in value), key=str)
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     return value if value is None or isinstance(value, bool | int | str) else str(value)

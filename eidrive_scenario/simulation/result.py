@@ -20,8 +20,9 @@ from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 Scalar = str | int | float | bool | None
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,17})", re.ASCII)
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_MOST_DIGITS = 16
+"""Maximum number of digits of an integer; longer ones are identifiers."""
 
 
 @dataclass(frozen=True)
@@ -156,14 +157,15 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
     return {**{key: getattr(verdict, key) for key in keys}, "violation_state": list(verdict.violation_state)}
 
 
-def typed(text: str) -> Scalar:
-    """Return the text of a parameter as a number if it is one; `007` and words remain texts."""
-    if _WHOLE.fullmatch(text):
-        return int(text)
-    if _NUMBER.fullmatch(text) and not re.match(r"[+-]?0\d", text):
-        value = float(text)
-        return value if math.isfinite(value) else text
-    return text
+def typed(text: str) -> str | int | float:
+    """Return the text of a parameter as a number if it can be written as one again; `007` and words remain texts."""
+    if not NUMBER.fullmatch(text) or re.match(r"[+-]?0\d", text):
+        return text
+    digits = text.lstrip("+-")
+    if digits.isdecimal():
+        return int(text) if len(digits) <= _MOST_DIGITS else text
+    value = float(text)
+    return value if math.isfinite(value) else text
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Scalar]]:

@@ -19,6 +19,7 @@ from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.model import ParameterType
 from eidrive_scenario.run_options import OPTIONS, RunSettings
+from eidrive_scenario.simulation.result import NUMBER, typed
 from eidrive_scenario.v2x.profile import load_profile
 
 Scalar = str | int | float
@@ -38,12 +39,8 @@ DESCRIPTIVE = frozenset({"name", "description"})
 """Settings of a channel profile that have no effect on runs."""
 _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 _RANGE_SIGN = re.compile(r"\s*(?:\.{2,3}|…|:|\bto\b)\s*")
 """Signs of a range, of which only the colon is one here."""
-_MOST_DIGITS = 16
-"""Maximum number of digits of an integer; longer ones are identifiers."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +98,7 @@ def parse_axis(text: str) -> Axis:
     if not separator or not name or not given:
         raise _error(text, "expected NAME=VALUES, such as EgoSpeed=6:12:0.5 or detector=oracle,yolov5")
     parts = given.split(":")
-    if len(parts) in (2, 3) and all(_NUMBER.fullmatch(part.strip()) for part in parts):
+    if len(parts) in (2, 3) and all(NUMBER.fullmatch(part.strip()) for part in parts):
         numbers = [Decimal(part.strip()) for part in parts]
         return _interval(name, text, numbers) if len(parts) == 2 else Axis(name, _range(text, *numbers))
     texts = [part.strip() for part in given.split(",")]
@@ -109,7 +106,7 @@ def parse_axis(text: str) -> Axis:
         raise _error(text, "expected a value between commas")
     if any(map(_resembles_range, texts)):
         raise _error(text, f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH")
-    values = tuple(map(typed_value, texts))
+    values = tuple(map(typed, texts))
     if len(set(values)) < len(values):
         raise _error(text, "a value is given twice")
     return Axis(name, values)
@@ -148,7 +145,7 @@ def is_setting(name: str) -> bool:
 def _resembles_range(text: str) -> bool:
     """Return whether a text is numbers with signs of a range between them, as in `0..1`, which would be no number."""
     limits = _RANGE_SIGN.split(text)
-    return len(limits) > 1 and any(limits) and all(not limit or _NUMBER.fullmatch(limit) for limit in limits)
+    return len(limits) > 1 and any(limits) and all(not limit or NUMBER.fullmatch(limit) for limit in limits)
 
 
 def _interval(name: str, text: str, limits: list[Decimal]) -> Axis:
@@ -170,25 +167,6 @@ def _range(text: str, low: Decimal, high: Decimal, step: Decimal) -> tuple[Scala
     values = [low + number * step for number in range(count)]
     whole = all(value == value.to_integral_value() for value in (low, step))
     return tuple(int(value) if whole else float(value) for value in values)
-
-
-def typed_value(text: str) -> Scalar:
-    """Return the value of an axis that a text is: a number if it can be written as one again."""
-    if not is_number(text):
-        return text
-    return int(text) if _INTEGER.fullmatch(text) else float(text)
-
-
-def is_number(text: str) -> bool:
-    """Return whether a text is a number that it can be written as again.
-
-    Texts with leading zeros (`007`) and integers of more than 16 digits are identifiers.
-    """
-    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
-        return False
-    digits = text.lstrip("+-")
-    has_leading_zero = len(digits) > 1 and digits[0] == "0" and digits[1].isdecimal()
-    return not has_leading_zero and not (_INTEGER.fullmatch(text) and len(digits) > _MOST_DIGITS)
 
 
 def settings_at(point: Point, base: RunSettings, profile: Mapping[str, Any] | None) -> RunSettings:

@@ -20,15 +20,16 @@ from eidrive_scenario.experiments.sweeps.axes import (
     Axis,
     Point,
     Scalar,
-    is_number,
     is_setting,
     settings_at,
     without_run,
 )
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
+from eidrive_scenario.run_options import diagnostic_with_option_names
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation.resolved_settings import ResolvedSettings, plain
+from eidrive_scenario.simulation.result import typed
 from eidrive_scenario.v2x.profile import load_profile
 
 MOST_TRIED = 100
@@ -91,14 +92,17 @@ def contents_of(scenario: Path, points: Sequence[Point], settings: RunSettings) 
         values = dict.fromkeys(point[name] for point in points if name in point)
         texts = [value for value in values if isinstance(value, str)]
         numbers = [value for value in values if not isinstance(value, str)]
-        if name in SETTINGS:
-            for number in [min(numbers), max(numbers)] if numbers else []:
+        try:
+            for number in [min(numbers), max(numbers)] if numbers and name in SETTINGS else []:
                 with suppress(ConstraintError):
                     _resolved(scenario, points[0].get(RUN), settings_at({name: number}, settings, None))
-        for text in () if name.startswith(f"{CHANNEL}.") else texts:
-            digest = _digest_with(name, text, scenario, points, settings)
-            if digest is not None:
-                contents[name, text] = digest
+            for text in () if name.startswith(f"{CHANNEL}.") else texts:
+                digest = _digest_with(name, text, scenario, points, settings)
+                if digest is not None:
+                    contents[name, text] = digest
+        except InputError as error:
+            at = {name: f"--vary: {name}"}
+            raise type(error)([diagnostic_with_option_names(each, at) for each in error.diagnostics]) from error
     if RUN in points[0]:
         contents |= _contents_of_runs(scenario, dict.fromkeys(int(point[RUN]) for point in points), settings)
     return contents
@@ -138,7 +142,7 @@ def _contents_of_runs(scenario: Path, runs: Iterable[int], settings: RunSettings
     expansion = load_distribution(scenario)
     texts = {}
     for number in runs:
-        named = tuple(parameter for parameter in expansion[number].parameters.items() if not is_number(parameter[1]))
+        named = tuple(item for item in expansion[number].parameters.items() if isinstance(typed(item[1]), str))
         if named:
             texts[number] = named
     with_text: dict[tuple[str, str], list[int]] = {}
@@ -238,7 +242,7 @@ class SweepPlan:
         run = int(point[RUN]) if RUN in point else None
         contents = {name: digest for name in point if (digest := self.contents.get((name, point[name]))) is not None}
         inputs = {"inputs": self.inputs, "contents": contents}
-        content = {**inputs, "run": run, "seed": seed, "settings": _as_json(asdict(settings))}
+        content = {**inputs, "run": run, "seed": seed, "settings": plain(asdict(settings))}
         return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
 
 
@@ -360,11 +364,3 @@ def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[i
 def source_of(job: SweepJob) -> Path | ConcreteRun:
     """Return what a job runs: a scenario, or one run of a distribution."""
     return job.scenario if job.run is None else load_distribution(job.scenario)[job.run]
-
-
-def _as_json(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _as_json(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_as_json(item) for item in value]
-    return value if value is None or isinstance(value, str | int | float | bool) else str(value)

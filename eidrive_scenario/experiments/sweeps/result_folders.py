@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 
@@ -179,7 +179,7 @@ def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
     point.update(_channel_settings(settings.get("channel_profile"), CHANNEL))
     for name, text in resolved.parameters.items():
         if name not in (*resolved.drawn, *resolved.varied):
-            point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = cast("Scalar", typed(text))
+            point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = typed(text)
     return point
 
 

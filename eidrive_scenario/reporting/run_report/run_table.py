@@ -7,7 +7,8 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
-from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedCriterion, ReportedRun
+from eidrive_scenario.evaluation.criterion import Verdict
+from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedRun
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 from eidrive_scenario.reporting.run_report.settings_text import flatten
 
@@ -21,7 +22,7 @@ _UNITS = {"count": "", "at_fault": "", "impact_speed": "m/s", "time": "s", "marg
 """Units that differ from the unit of the criterion, by the last part of the name of the metric."""
 
 
-def failure_reason(criterion: ReportedCriterion) -> str:
+def failure_reason(criterion: Verdict) -> str:
     """Return why a criterion failed: its reason, else its value and limit, as stores of sweeps have no reasons."""
     if criterion.reason or criterion.value is None:
         return criterion.reason
@@ -108,7 +109,7 @@ def _numbers() -> Numbers:
     return numbers
 
 
-def _verdict(criterion: ReportedCriterion, kinds: Numbers, texts: Numbers) -> list[Any]:
+def _verdict(criterion: Verdict, kinds: Numbers, texts: Numbers) -> list[Any]:
     """Return kind (name, limit, unit), whether the criterion passed, value, reason, and the lines of the state at its
     first violation."""
     reason = criterion.reason if criterion.passed else failure_reason(criterion)

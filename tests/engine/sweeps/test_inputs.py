@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from opendrive_xml import map_xml, road_xml
 
-from eidrive_scenario.errors import SettingError
+from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, Point, parse_axes, points_of
 from eidrive_scenario.experiments.sweeps.jobs import SweepPlan, plan_of
 from eidrive_scenario.simulation import RunSettings
@@ -108,3 +108,10 @@ def test_parameter_of_all_runs_that_the_distribution_varies_raises(distribution:
 def test_unknown_axis_of_a_search_raises_before_its_runs(scenario: Path) -> None:
     with pytest.raises(SettingError, match="did you mean 'Speed'"):
         plan_of(scenario, [{}], RunSettings(), space=(Axis("Sped", low=0.0, high=1.0),))
+
+
+def test_invalid_text_of_axis_is_error_of_vary(scenario: Path) -> None:
+    with pytest.raises(InputError, match=r"^RunSettings\.weather: "):
+        plan_of(scenario, [{}], RunSettings(weather="hail"))
+    with pytest.raises(InputError, match=r"^--vary: weather: no weather preset 'hail'"):
+        plan_of(scenario, grid("weather=sunny,hail"), RunSettings())
