@@ -38,15 +38,6 @@ class IntelligentDriver:
     emergency: float = 8.0
     lateral_acceleration: float = 2.0
 
-    def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
-        """Return the accelerations (N,) [m/s²].
-
-        speed, desired_speed  (N,) [m/s]
-        gap                   (N,) distance between bumpers, inf without a leader [m]
-        approach              (N,) own speed minus the speed of the leader [m/s]
-        """
-        return Drivers.of([self]).response(speed, desired_speed, gap, approach)
-
 
 COLUMNS = tuple(entry.name for entry in fields(IntelligentDriver))
 

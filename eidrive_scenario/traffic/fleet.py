@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.car_following import Drivers, IntelligentDriver, ballistic
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanger, LaneChanges
 from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
@@ -184,22 +184,6 @@ class Fleet:
 
     def __len__(self) -> int:
         return len(self._index)
-
-    def add(
-        self,
-        spec: ActorSpec,
-        location: LaneLocation,
-        *,
-        speed: float = 0.0,
-        desired_speed: float | None = None,
-        driver: IntelligentDriver | None = None,
-    ) -> Placement:
-        """Add a car at the center line of a lane. Without a desired speed it uses the speed limit.
-
-        Raise PositionError if the lane does not exist, ValueError if the name is in use.
-        """
-        lane, progress = self.lanes.of(location)
-        return self.add_at(spec, lane, progress, speed=speed, desired_speed=desired_speed, driver=driver)
 
     def add_at(
         self,

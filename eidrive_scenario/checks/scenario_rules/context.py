@@ -58,13 +58,10 @@ class TriggerAnalysis:
 
     owner   element that the trigger starts or stops
     starts  True for a start trigger, False for a stop trigger
-    first   earliest evaluation [s]
     """
 
     owner: Node
-    trigger: Trigger
     starts: bool
-    first: float
     groups: tuple[GroupAnalysis, ...]
 
     @property
@@ -137,7 +134,7 @@ class ReachabilityAnalysis:
                 first = self._first_time(node, starts=starts)
                 if trigger is not None and first < math.inf:
                     groups = tuple(self._analyze(group, node, starts, first) for group in trigger.condition_group)
-                    yield TriggerAnalysis(node, trigger, starts, first, groups)
+                    yield TriggerAnalysis(node, starts, groups)
 
     def _analyze(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> GroupAnalysis:
         conditions = tuple(self._analyze_condition(condition, owner, starts, first) for condition in group.condition)

@@ -39,11 +39,6 @@ class Polynomials:
         self.is_zero = self.constant_value == 0.0
         """True if the function is 0 everywhere."""
 
-    @classmethod
-    def constant(cls, value: float) -> Polynomials:
-        """Return the constant function `value`."""
-        return cls([(0.0, value, 0.0, 0.0, 0.0)])
-
     def value(self, s: float) -> float:
         """Return the value at s."""
         if self.constant_value is not None:

@@ -74,11 +74,6 @@ class MotionState:
         return self._route
 
     @property
-    def branch_selector(self) -> BranchSelector | None:
-        """Selects the branch at junctions that the route leaves open; None selects the default route."""
-        return self._branch_selector
-
-    @property
     def end_of_road(self) -> bool:
         """Whether the actor has reached the end of its road."""
         return self._end_of_road

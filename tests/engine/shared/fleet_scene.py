@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from opendrive_xml import lanes_xml, map_xml, road_xml
 
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.traffic import Fleet
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -25,6 +26,13 @@ def street(
 
 def car(name: str) -> ActorSpec:
     return ActorSpec(name, "car", "car", (LENGTH, WIDTH, 1.5), (REAR_AXLE, 0.0, 0.75), wheelbase=2.8, max_speed=60.0)
+
+
+def add_car(
+    fleet: Fleet, spec: ActorSpec, location: LaneLocation, *, speed: float = 0.0, desired_speed: float | None = None
+) -> Placement:
+    """Add a car to a fleet at the center line of a lane."""
+    return fleet.add_at(spec, *fleet.lanes.of(location), speed=speed, desired_speed=desired_speed)
 
 
 def view_of(placements: Mapping[str, Placement], time: float = 0.0, tick: int = 0) -> WorldView:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fleet_scene import LENGTH, car, view_of
+from fleet_scene import LENGTH, add_car, car, view_of
 from opendrive_xml import (
     lane_links_xml,
     lane_xml,
@@ -50,7 +50,7 @@ def test_ring_of_cars_converges_to_equilibrium_gap(loop: RoadNetwork) -> None:
     for k in range(count):
         place = (k + 0.3 * rng.uniform(-1, 1)) * 2 * math.pi * RADIUS / count % (2 * math.pi * RADIUS)
         road, s = ("a", place) if place < math.pi * RADIUS else ("b", place - math.pi * RADIUS)
-        fleet.add(car(f"car{k}"), loop.location(road, -1, s), speed=float(rng.uniform(0, 6)), desired_speed=15.0)
+        add_car(fleet, car(f"car{k}"), loop.location(road, -1, s), speed=float(rng.uniform(0, 6)), desired_speed=15.0)
     smallest = math.inf
     for _ in range(8000):
         smallest = min(smallest, *gaps(fleet.step(None, DT)))
@@ -72,7 +72,7 @@ def test_shorter_time_steps_give_the_same_positions(loop: RoadNetwork) -> None:
     for dt in (0.05, 0.01):
         fleet = Fleet(loop)
         for k, speed in enumerate((3.0, 12.0, 8.0)):
-            fleet.add(car(f"car{k}"), loop.location("a", -1, 20.0 + 25.0 * k), speed=speed, desired_speed=13.0)
+            add_car(fleet, car(f"car{k}"), loop.location("a", -1, 20.0 + 25.0 * k), speed=speed, desired_speed=13.0)
         path = [fleet.step(None, dt) for _ in range(round(20.0 / dt))]
         places[dt] = path[round(0.05 / dt) - 1 :: round(0.05 / dt)]
     for coarse, fine in zip(places[0.05], places[0.01], strict=True):
@@ -83,9 +83,9 @@ def test_shorter_time_steps_give_the_same_positions(loop: RoadNetwork) -> None:
 def test_car_added_between_decisions_reacts_in_the_next_step(loop: RoadNetwork) -> None:
     """A car is added 8 m ahead of a car that drives 10 m/s. The follower brakes in the next step."""
     fleet = Fleet(loop)
-    fleet.add(car("first"), loop.location("a", -1, 20.0), speed=10.0, desired_speed=13.0)
+    add_car(fleet, car("first"), loop.location("a", -1, 20.0), speed=10.0, desired_speed=13.0)
     fleet.step(None, 0.01)
-    fleet.add(car("second"), loop.location("a", -1, 20.0 + LENGTH + 8.0), speed=0.0)
+    add_car(fleet, car("second"), loop.location("a", -1, 20.0 + LENGTH + 8.0), speed=0.0)
     before = fleet.speeds["first"]
     fleet.step(None, 0.01)
     assert fleet.speeds["first"] < before - 0.05
@@ -95,7 +95,7 @@ def test_car_added_between_decisions_reacts_in_the_next_step(loop: RoadNetwork) 
 def test_string_of_cars_stops_for_obstacle_and_restarts_after_its_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     for k in range(5):
-        fleet.add(car(f"car{k}"), loop.location("a", -1, 100.0 - 20.0 * k), speed=10.0, desired_speed=13.0)
+        add_car(fleet, car(f"car{k}"), loop.location("a", -1, 100.0 - 20.0 * k), speed=10.0, desired_speed=13.0)
     pose = loop.lane_pose_at("a", -1, 250.0)
     wall = {"wall": Placement(pose.x, pose.y, yaw=pose.h)}
     closest = math.inf
@@ -113,7 +113,7 @@ def test_string_of_cars_stops_for_obstacle_and_restarts_after_its_removal(loop: 
 
 def test_car_beside_the_lane_is_ignored(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
-    fleet.add(car("car"), loop.location("a", -1, 50.0), speed=10.0, desired_speed=10.0)
+    add_car(fleet, car("car"), loop.location("a", -1, 50.0), speed=10.0, desired_speed=10.0)
     pose = loop.lane_pose_at("a", -1, 90.0, -4.0)
     for _ in range(100):
         fleet.step(view_of({"parked": Placement(pose.x, pose.y, yaw=pose.h)}), DT)
@@ -122,7 +122,7 @@ def test_car_beside_the_lane_is_ignored(loop: RoadNetwork) -> None:
 
 def test_step_length_equals_speed_times_dt(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
-    before = fleet.add(car("car"), loop.location("a", -1, 300.0), speed=12.0, desired_speed=12.0)
+    before = add_car(fleet, car("car"), loop.location("a", -1, 300.0), speed=12.0, desired_speed=12.0)
     assert before.teleport
     for _ in range(100):
         (after,) = fleet.step(None, DT).values()
@@ -134,7 +134,7 @@ def test_step_length_equals_speed_times_dt(loop: RoadNetwork) -> None:
 def test_cars_slow_down_ahead_of_a_bend(library_roads: RoadNetwork) -> None:
     fleet = Fleet(library_roads, seed=1, driver=IntelligentDriver(lateral_acceleration=2.0))
     for k in range(6):
-        fleet.add(car(f"car{k}"), library_roads.location("3", 1, 80.0 - 14.0 * k), desired_speed=13.0)
+        add_car(fleet, car(f"car{k}"), library_roads.location("3", 1, 80.0 - 14.0 * k), desired_speed=13.0)
     turned = False
     heading: dict[str, float] = {}
     for _ in range(1200):
@@ -161,7 +161,7 @@ def crossing_fleet(library_roads: RoadNetwork, seed: int, *, bus: bool = False) 
                 if bus and k % 2
                 else car(f"{road}/{n}/{k}")
             )
-            fleet.add(spec, library_roads.location(road, n, s), speed=5.0)
+            add_car(fleet, spec, library_roads.location(road, n, s), speed=5.0)
     return fleet
 
 
@@ -186,7 +186,7 @@ def test_vehicles_pass_a_crossing_without_contact(library_roads: RoadNetwork, se
 
 def test_cars_wait_for_foreign_car_in_crossing(library_roads: RoadNetwork) -> None:
     fleet = Fleet(library_roads)
-    fleet.add(car("car"), library_roads.location("3", 1, 8.0), speed=8.0)
+    add_car(fleet, car("car"), library_roads.location("3", 1, 8.0), speed=8.0)
     route = library_roads.route(library_roads.location("1", -1, 90.0), library_roads.location("2", -1, 40.0))
     for tick in range(200):
         pose = route.pose_at(min(4.0 * tick * DT, route.length))
@@ -216,7 +216,7 @@ def test_car_on_a_circle_waits_before_its_second_passage() -> None:
     ]
     street = road_xml("c", length=60.0, x=2.0, y=-5.0, hdg=-math.pi / 2, lanes=lane, junction="9")
     fleet = Fleet(RoadNetwork.parse(map_xml(*halves, street)))
-    fleet.add(car("car"), fleet.lanes.roads.location("b", -1, 5.0), speed=5.0)
+    add_car(fleet, car("car"), fleet.lanes.roads.location("b", -1, 5.0), speed=5.0)
     foreign = {"foreign": Placement(0.0, -50.0, yaw=-math.pi / 2, speed=1.0)}
     below = []
     for tick in range(1200):
@@ -254,7 +254,7 @@ def test_cars_that_wait_for_each_other_on_a_circle_move_on() -> None:
     circle = RoadNetwork.parse(map_xml(*roads))
     fleet = Fleet(circle)
     for road in "0246":
-        fleet.add(car(road), circle.location(road, -1, 1.5), speed=0.0)
+        add_car(fleet, car(road), circle.location(road, -1, 1.5), speed=0.0)
     before, covered = fleet.placements(), dict.fromkeys("0246", 0.0)
     for _ in range(1200):
         after = fleet.step(None, DT)
@@ -272,7 +272,7 @@ def test_buses_leave_a_roundabout_with_short_links() -> None:
     spec, _ = library_bodies("bus")[0]
     for road in "1234":
         for number, s in enumerate((20.0, 40.0, 60.0)):
-            fleet.add(replace(spec, name=f"{road}.{number}"), roads.location(road, 1, s), speed=5.0)
+            add_car(fleet, replace(spec, name=f"{road}.{number}"), roads.location(road, 1, s), speed=5.0)
     for _ in range(round(300.0 / DT)):
         fleet.step(None, DT)
     assert not fleet.names
@@ -292,12 +292,12 @@ def test_branches_depend_on_the_seed(library_roads: RoadNetwork) -> None:
 
 def test_add_with_used_name_is_an_error_until_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
-    fleet.add(car("car"), loop.location("a", -1, 10.0))
+    add_car(fleet, car("car"), loop.location("a", -1, 10.0))
     with pytest.raises(ValueError, match="'car' is in the fleet already"):
-        fleet.add(car("car"), loop.location("a", -1, 30.0))
+        add_car(fleet, car("car"), loop.location("a", -1, 30.0))
     fleet.remove("car")
     assert fleet.step(None, DT) == {}
-    fleet.add(car("car"), loop.location("a", -1, 30.0))
+    add_car(fleet, car("car"), loop.location("a", -1, 30.0))
     assert fleet.names == ("car",)
 
 
@@ -306,7 +306,7 @@ def test_cars_keep_their_order_over_a_long_run(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     wishes = (6.0, 14.0, 9.0, 12.0)
     for k, wish in enumerate(wishes):
-        fleet.add(car(f"car{k}"), loop.location("a", -1, 280.0 - 30.0 * k), desired_speed=wish)
+        add_car(fleet, car(f"car{k}"), loop.location("a", -1, 280.0 - 30.0 * k), desired_speed=wish)
     for _ in range(3000):
         placements = fleet.step(None, DT)
         ahead = sorted(placements, key=lambda name: math.atan2(placements[name].y, placements[name].x))

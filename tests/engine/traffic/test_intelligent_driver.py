@@ -12,7 +12,7 @@ DRIVER = IntelligentDriver(time_gap=1.5, standstill_gap=2.0, acceleration=1.2, d
 
 
 def response(speed: float, desired: float, gap: float = math.inf, approach: float = 0.0) -> float:
-    return float(DRIVER.response(*(np.array([value]) for value in (speed, desired, gap, approach)))[0])
+    return float(Drivers.of([DRIVER]).response(*(np.array([value]) for value in (speed, desired, gap, approach)))[0])
 
 
 def test_free_car_accelerates_to_desired_speed() -> None:
@@ -31,8 +31,8 @@ def test_drivers_use_individual_parameters() -> None:
     other = IntelligentDriver(time_gap=0.8, standstill_gap=3.0, acceleration=2.0)
     speed, desired, gap, approach = np.array([[8.0, 8.0], [15.0, 15.0], [20.0, 20.0], [1.0, 1.0]])
     both = Drivers.of([DRIVER, other]).response(speed, desired, gap, approach)
-    assert both[0] == DRIVER.response(speed, desired, gap, approach)[0]
-    assert both[1] == other.response(speed, desired, gap, approach)[1]
+    assert both[0] == Drivers.of([DRIVER]).response(speed, desired, gap, approach)[0]
+    assert both[1] == Drivers.of([other]).response(speed, desired, gap, approach)[1]
     assert both[0] != both[1]
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fleet_scene import car, street
+from fleet_scene import add_car, car, street
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.base.geometry import overlap
@@ -60,11 +60,11 @@ def queue(roads: RoadNetwork, changer: LaneChanger, *, leader_gap: float, follow
     follower is in the other lane.
     """
     fleet = Fleet(roads, changer=changer)
-    fleet.add(car("me"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
-    fleet.add(car("leader"), roads.location("1", -2, 400.0 + BUMPERS + leader_gap), speed=10.0, desired_speed=10.0)
+    add_car(fleet, car("me"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
+    add_car(fleet, car("leader"), roads.location("1", -2, 400.0 + BUMPERS + leader_gap), speed=10.0, desired_speed=10.0)
     if follower_gap is not None:
         behind = roads.location("1", -1, 400.0 - BUMPERS - follower_gap)
-        fleet.add(car("follower"), behind, speed=20.0, desired_speed=25.0)
+        add_car(fleet, car("follower"), behind, speed=20.0, desired_speed=25.0)
     return fleet
 
 
@@ -102,8 +102,8 @@ def test_polite_leader_changes_lane_for_faster_follower() -> None:
     for politeness, lane in ((0.09, -2), (0.10, -1)):
         roads = street()
         fleet = Fleet(roads, changer=LaneChanger(politeness=politeness))
-        fleet.add(car("me"), roads.location("1", -2, 504.6), speed=10.0, desired_speed=10.0)
-        fleet.add(car("follower"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
+        add_car(fleet, car("me"), roads.location("1", -2, 504.6), speed=10.0, desired_speed=10.0)
+        add_car(fleet, car("follower"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
         assert lane_after_one_step(fleet) == lane
 
 
@@ -115,8 +115,8 @@ def test_solid_marking_prevents_lane_change() -> None:
 def test_car_does_not_change_to_oncoming_lane() -> None:
     roads = street(1, 1)
     fleet = Fleet(roads)
-    fleet.add(car("me"), roads.location("1", -1, 400.0), speed=20.0, desired_speed=25.0)
-    fleet.add(car("leader"), roads.location("1", -1, 450.0), speed=10.0, desired_speed=10.0)
+    add_car(fleet, car("me"), roads.location("1", -1, 400.0), speed=20.0, desired_speed=25.0)
+    add_car(fleet, car("leader"), roads.location("1", -1, 450.0), speed=10.0, desired_speed=10.0)
     assert lane_after_one_step(fleet) == -1
 
 
@@ -130,7 +130,7 @@ def test_free_car_returns_to_slow_lane_with_bias_only() -> None:
     ):
         roads = street(rule=rule)
         fleet = Fleet(roads, changer=LaneChanger(bias=bias))
-        fleet.add(car("me"), roads.location("1", lane, 500.0), speed=20.0, desired_speed=20.0)
+        add_car(fleet, car("me"), roads.location("1", lane, 500.0), speed=20.0, desired_speed=20.0)
         assert lane_after_one_step(fleet) == after
 
 
@@ -138,8 +138,8 @@ def test_one_of_two_cars_changes_into_the_same_gap() -> None:
     roads = street(right=3)
     fleet = Fleet(roads)
     for lane in (-1, -3):
-        fleet.add(car(f"me{lane}"), roads.location("1", lane, 400.0), speed=20.0, desired_speed=25.0)
-        fleet.add(car(f"leader{lane}"), roads.location("1", lane, 450.0), speed=10.0, desired_speed=10.0)
+        add_car(fleet, car(f"me{lane}"), roads.location("1", lane, 400.0), speed=20.0, desired_speed=25.0)
+        add_car(fleet, car(f"leader{lane}"), roads.location("1", lane, 450.0), speed=10.0, desired_speed=10.0)
     fleet.step(None, 0.5)
     rows = fleet.places(["me-1", "me-3"])[0]
     assert sorted(fleet.lanes.keys[int(row)].lane for row in rows) in ([-2, -1], [-3, -2])
@@ -163,8 +163,8 @@ def test_bus_changes_lanes_without_its_front_in_the_oncoming_lane() -> None:
     (bus,) = (spec for spec, _ in library_bodies("bus"))
     roads = street(1, 2)
     fleet = Fleet(roads)
-    fleet.add(bus, roads.location("1", -2, 400.0), speed=3.0, desired_speed=3.0)
-    fleet.add(car("leader"), roads.location("1", -2, 440.0), speed=1.0, desired_speed=1.0)
+    add_car(fleet, bus, roads.location("1", -2, 400.0), speed=3.0, desired_speed=3.0)
+    add_car(fleet, car("leader"), roads.location("1", -2, 440.0), speed=1.0, desired_speed=1.0)
     for _ in range(600):
         pose = fleet.step(None, 0.05)[bus.name]
         length, width, _ = bus.size
@@ -179,8 +179,8 @@ def test_changing_car_brakes_for_standing_car_beyond_a_nearer_faster_one() -> No
     fleet = queue(roads, LaneChanger(), leader_gap=100.0)
     assert lane_after_one_step(fleet) == -1
     x, v = float(fleet.places(["me"])[1][0]), fleet.speeds["me"]
-    fleet.add(car("fast"), roads.location("1", -2, x + BUMPERS + 40.0), speed=v)
-    fleet.add(car("standing"), roads.location("1", -1, x + BUMPERS + 80.0), desired_speed=0.0)
+    add_car(fleet, car("fast"), roads.location("1", -2, x + BUMPERS + 40.0), speed=v)
+    add_car(fleet, car("standing"), roads.location("1", -1, x + BUMPERS + 80.0), desired_speed=0.0)
     fleet.step(None, 0.05)
     expected = 1.0 - (v / 25.0) ** 4 - ((2.0 + v + v * v / (2.0 * math.sqrt(1.5))) / 80.0) ** 2
     assert (fleet.speeds["me"] - v) / 0.05 == pytest.approx(expected)
@@ -193,7 +193,7 @@ def test_dense_traffic_changes_lanes_without_contact() -> None:
     fleet = Fleet(roads, seed=2)
     for k in range(45):
         place = roads.location("1", -1 - k % 3, 20.0 + 14.0 * k)
-        fleet.add(car(f"car{k}"), place, speed=12.0, desired_speed=float(rng.uniform(9.0, 25.0)))
+        add_car(fleet, car(f"car{k}"), place, speed=12.0, desired_speed=float(rng.uniform(9.0, 25.0)))
     lanes = {name: {0} for name in fleet.names}
     for tick in range(1200):
         fleet.step(None, 0.05)
@@ -241,8 +241,8 @@ def test_cars_leave_lane_that_ends_or_merges(link: str) -> None:
     fleet = Fleet(roads)
     assert fleet.lanes.ends_at[np.isfinite(fleet.lanes.ends_at)] == pytest.approx([270.0])
     for k in range(6):
-        fleet.add(car(f"right{k}"), roads.location("1", -2, 20.0 + 25.0 * k), speed=13.0, desired_speed=14.0)
-        fleet.add(car(f"left{k}"), roads.location("1", -1, 10.0 + 25.0 * k), speed=13.0, desired_speed=14.0)
+        add_car(fleet, car(f"right{k}"), roads.location("1", -2, 20.0 + 25.0 * k), speed=13.0, desired_speed=14.0)
+        add_car(fleet, car(f"left{k}"), roads.location("1", -1, 10.0 + 25.0 * k), speed=13.0, desired_speed=14.0)
     arrived: set[str] = set()
     for _ in range(1600):
         placements = fleet.step(None, 0.05)

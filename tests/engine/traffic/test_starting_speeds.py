@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fleet_scene import LENGTH, REAR_AXLE, car, street
+from fleet_scene import LENGTH, REAR_AXLE, add_car, car, street
 
 from eidrive_scenario.base.car_following import IntelligentDriver
 from eidrive_scenario.roads import RoadNetwork
@@ -37,7 +37,7 @@ def test_car_brakes_comfortably_for_its_leader() -> None:
     """With b = 1.5 m/s² behind a standing car at a gap of 30 m: ((2 + v + v²/(2·√1.5)) / 30)² = 1.5."""
     roads = street()
     fleet = Fleet(roads)
-    fleet.add(car("standing"), roads.location("1", -1, 400.0))
+    add_car(fleet, car("standing"), roads.location("1", -1, 400.0))
     v = speed_at(fleet, roads, -1, 400.0 - LENGTH - 30.0)
     assert ((2.0 + v + v * v / (2.0 * math.sqrt(1.5))) / 30.0) ** 2 == pytest.approx(1.5, abs=1e-5)
     assert speed_at(fleet, roads, -2, 400.0) == math.inf

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from fleet_scene import car, street
+from fleet_scene import add_car, car, street
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.roads import RoadNetwork
@@ -34,7 +34,7 @@ class Lights:
 
 def approaching(roads: RoadNetwork, lights: Lights, *, lane: int = -1, at: float = 60.0) -> Fleet:
     fleet = Fleet(roads, must_stop=lights)
-    fleet.add(car("me"), roads.location("1", lane, at), speed=14.0, desired_speed=14.0)
+    add_car(fleet, car("me"), roads.location("1", lane, at), speed=14.0, desired_speed=14.0)
     return fleet
 
 
@@ -56,7 +56,7 @@ def test_car_waits_at_red_light_until_green() -> None:
 def test_following_car_stops_behind_waiting_car() -> None:
     roads = street(right=1, extra=light())
     fleet = approaching(roads, Lights())
-    fleet.add(car("next"), roads.location("1", -1, 30.0), speed=14.0, desired_speed=14.0)
+    add_car(fleet, car("next"), roads.location("1", -1, 30.0), speed=14.0, desired_speed=14.0)
     for _ in range(800):
         places = fleet.step(None, 0.05)
     assert places["me"].x - places["next"].x - 4.6 == pytest.approx(2.0, abs=0.3)
@@ -108,7 +108,7 @@ def test_car_standing_on_stop_line_continues() -> None:
     second = road_xml("2", x=100.0, link=predecessor_xml("1"), lanes=lanes[1], extra=light(0.5))
     roads = RoadNetwork.parse(map_xml(first, second))
     fleet = Fleet(roads, must_stop=Lights())
-    fleet.add(car("me"), roads.location("1", -1, 98.0))
+    add_car(fleet, car("me"), roads.location("1", -1, 98.0))
     for _ in range(100):
         place = fleet.step(None, 0.05)["me"]
     assert place.x > 102.0
@@ -118,7 +118,7 @@ def test_red_light_holds_car_before_junction_until_green(library_roads: RoadNetw
     lights = Lights()
     fleet = Fleet(library_roads, must_stop=lights)
     start = library_roads.location("3", 1, 70.0)
-    fleet.add(car("me"), start, speed=8.0)
+    add_car(fleet, car("me"), start, speed=8.0)
     for _ in range(600):
         place = fleet.step(None, 0.05)["me"]
     assert lights.asked == {"10", "20", "30", "40"}

@@ -350,13 +350,13 @@ class Decider:
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
                 if verdict is Verdict.FOLLOW:
                     time_gap = max(self._settings.time_gap, VIEW_TIME_GAP)
-                options.append(Option(proposal, profile, way, *reactions[kind], time_gap))
+                options.append(Option(proposal, profile, *reactions[kind], time_gap))
             if change is not None and seeks_gap:
                 walls, leads = reactions["all"]
                 comfortable = self._settings.comfortable_deceleration
                 leads = leads | gap_leader(scene, change.offset, situation.motion, self._body, comfortable)
                 gently = Proposal(number, 1.0, "all", comfortable)
-                options.append(Option(gently, profile, way, walls, leads, MERGING_TIME_GAP))
+                options.append(Option(gently, profile, walls, leads, MERGING_TIME_GAP))
         rolled = self._roll(situation, scene, options)
         late = None
         if change is not None and end is not None and situation.s >= change.begin:
@@ -384,7 +384,7 @@ class Decider:
         way = inside_way(scene, profile, self._body.half_width)
         crossing = conflicts(scene, way, situation.s)
         leads = leading(scene, way, crossing, situation.center, CRUISE.precedence)
-        rolled = self._roll(situation, scene, [Option(CRUISE, profile, way, situation.stops, leads, time_gap)])
+        rolled = self._roll(situation, scene, [Option(CRUISE, profile, situation.stops, leads, time_gap)])
         return Motion(rolled.s[0], rolled.speed[0])
 
     def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:

@@ -295,7 +295,6 @@ class Wall(msgspec.Struct, frozen=True):
 class Option(msgspec.Struct, frozen=True):
     """Proposal with the profile that it follows and what it reacts to.
 
-    way    where the hypotheses are in the way (N, K) of a vehicle that follows the profile
     walls  places before which it waits
     leads  where the hypotheses lead it (N, K); options may share an array
     time_gap  behind leaders [s]
@@ -303,7 +302,6 @@ class Option(msgspec.Struct, frozen=True):
 
     proposal: Proposal
     profile: LateralProfile
-    way: Bools
     walls: Sequence[Wall]
     leads: Bools
     time_gap: float

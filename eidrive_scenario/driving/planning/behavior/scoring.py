@@ -67,13 +67,12 @@ WEIGHTS = Weights()
 
 
 class Evaluation(msgspec.Struct, frozen=True):
-    """Scores (P,); time of the first collision (P,), inf without one [s]; greatest risk (P,) in [0, 1]; speed of the
-    collision (P,) [m/s]; hypothesis that causes the first one (P,), -1 without one."""
+    """Scores (P,); time of the first collision (P,), inf without one [s]; greatest risk (P,) in [0, 1];
+    hypothesis that causes the first collision (P,), -1 without one."""
 
     score: Array
     collision: Array
     risk: Array
-    impact: Array
     cause: Array
 
 
@@ -134,7 +133,7 @@ def evaluate(
             continue
         lanes = WEIGHTS.aside * (profile.side != 0) + WEIGHTS.oncoming * profile.uses_oncoming
         values[index] -= lanes + WEIGHTS.switch * switches + WEIGHTS.refused * (proposal.profile in refused)
-    return Evaluation(np.array(values), collision, risk, impact, cause)
+    return Evaluation(np.array(values), collision, risk, cause)
 
 
 def _offsets(options: Sequence[Option], rolled: Rollout, ego: Body) -> Array:

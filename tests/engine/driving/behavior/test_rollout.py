@@ -35,7 +35,7 @@ def roll(
 ) -> Rollout:
     limits = SpeedLimits(ALONG, np.full(len(ALONG), 50.0), wanted)
     leads = np.ones((len(scene), len(TIMES)), dtype=bool)
-    option = Option(proposal, LateralProfile("route", (0.0,), (0.0,)), leads, walls or [], leads, SETTINGS.time_gap)
+    option = Option(proposal, LateralProfile("route", (0.0,), (0.0,)), walls or [], leads, SETTINGS.time_gap)
     return Roller(SETTINGS, TIMES, 4.5).roll([option], limits, (0.0, speed), (FRONT, CENTER), scene)
 
 
@@ -138,6 +138,6 @@ def test_vehicle_accelerates_harder_past_standing_objects_in_the_oncoming_lane(
     nobody = np.zeros((1, len(TIMES)), dtype=bool)
     roller = Roller(SETTINGS, TIMES, max_acceleration)
     for profile, expected in ((passing, past), (route, usual)):
-        option = Option(FREE, profile, nobody, [], nobody, SETTINGS.time_gap)
+        option = Option(FREE, profile, [], nobody, SETTINGS.time_gap)
         rolled = roller.roll([option], limits, (0.0, 0.0), (FRONT, CENTER), leader(900.0, 15.0))
         assert rolled.speed[0, 8] == pytest.approx(2.0 * expected, rel=0.02)

@@ -43,7 +43,7 @@ def risk(arrival: float, *, yields: bool) -> float:
     route, body = LateralProfile("route", (0.0,), (0.0,)), Body(1.4, 2.4, 0.9, 2.85)
     scene = crossing_car(3.0 * SPEED, arrival, yields=yields)
     way = inside_way(scene, route, body.half_width)
-    options = [Option(Proposal(0, 1.0, "all", 4.0), route, way, [], way, SETTINGS.time_gap)]
+    options = [Option(Proposal(0, 1.0, "all", 4.0), route, [], way, SETTINGS.time_gap)]
     kept = frozenset({"route"})
     evaluation = evaluate(options, rolled, scene, TIMES, body, SETTINGS, wanted=SPEED, kept=kept)
     return float(evaluation.risk[0])
@@ -74,10 +74,9 @@ def test_emergency_brake_acts_for_what_is_near(collision: float, risk: float, br
         score=np.array([-100.0, -2.0]),
         collision=np.array([collision, np.inf]),
         risk=np.array([risk, 0.0]),
-        impact=np.zeros(2),
         cause=np.full(2, -1),
     )
     rolled = Rollout(np.zeros((2, 1)), np.zeros((2, 1)), np.full((2, 1), -1))
-    alike = [Option(proposal, route, way, [], way, SETTINGS.time_gap) for proposal in proposals]
+    alike = [Option(proposal, route, [], way, SETTINGS.time_gap) for proposal in proposals]
     options = Options(alike, rolled, evaluation, 8.0)
     assert options.best() == int(brakes)
