@@ -69,17 +69,13 @@ def codec(kind: Any) -> Codec:
     raise TypeError(f"{kind!r}: no JSON encoding is defined for this type")
 
 
-def _same(value: Any) -> Any:
-    return value
-
-
 def _literal(values: tuple[Any, ...]) -> Codec:
     def decode(data: Json) -> Any:
         if data not in values:
             raise ValueError(f"{str(data)[:80]!r} is none of {', '.join(map(str, values))}")
         return data
 
-    return Codec(_same, decode, {"enum": list(values)})
+    return Codec(lambda value: value, decode, {"enum": list(values)})
 
 
 def _encode_float(value: float) -> Json:

@@ -133,6 +133,7 @@ def _neighbor(number: int, step: int) -> int:
     return number + step or step
 
 
+_MODES = {ON: "MODE_CONSTANT", FLASHING: "MODE_FLASHING"}
 _DEPTH = 0.1
 """Length of the box of a lamp along its direction [m]."""
 
@@ -162,9 +163,5 @@ class TrafficLights:
                 set_orientation(base.orientation, head.pose.h)
                 lamp.classification.color = kinds.Color.Value(f"COLOR_{color.upper()}")
                 lamp.classification.icon = kinds.Icon.Value("ICON_NONE")
-                lamp.classification.mode = kinds.Mode.Value(_mode(mode))
+                lamp.classification.mode = kinds.Mode.Value(_MODES.get(mode, "MODE_OFF"))
                 lamp.source_reference.add(type="net.asam.opendrive", identifier=[head.signal.id])
-
-
-def _mode(mode: str) -> str:
-    return {ON: "MODE_CONSTANT", FLASHING: "MODE_FLASHING"}.get(mode, "MODE_OFF")
