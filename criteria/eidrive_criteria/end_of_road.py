@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from eidrive_criteria.folds import SummedCriterion, SummedSettings
-from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.common import EPSILON, LaneKey, WorldView
 
 
 class EndOfRoadSettings(SummedSettings):
@@ -39,9 +39,26 @@ class EndOfRoad(SummedCriterion):
             return None
         road, key = roads.road(location.road), self.lanes.key(location)
         _, _, _, length, _, _, yaw = view.plain_boxes[row]
-        direction = 1 if math.cos(yaw - roads.road_pose_at(location.road, location.s).h) >= 0.0 else -1
+        ahead = math.cos(yaw - roads.road_pose_at(location.road, location.s).h)
+        direction = 1 if ahead >= 0.0 else -1
         section = road.sections[key.section]
         left = section.end - location.s if direction > 0 else location.s - section.s
-        if left - length / 2.0 > self._within:
-            return None
-        return None if any(True for _ in roads.links.beyond(key, direction)) else duration
+        front = abs(ahead) * length / 2.0
+        return duration if self._ends(key, direction, left - front) else None
+
+    def _ends(self, lane: LaneKey, direction: int, left: float) -> bool:
+        """Return whether all ways along a lane, of which `left` [m] are ahead of the front, end within the distance."""
+        roads, ends = self.lanes.roads, False
+        ways, reached = [(lane, direction, left)], {(lane, direction)}
+        while ways:
+            lane, direction, left = ways.pop()
+            if left > self._within + EPSILON:
+                return False
+            following = list(roads.links.beyond(lane, direction))
+            ends = ends or not following
+            for way in following:
+                if way not in reached:
+                    reached.add(way)
+                    section = roads.road(way[0].road).sections[way[0].section]
+                    ways.append((*way, left + section.end - section.s))
+        return ends

@@ -47,6 +47,10 @@ class KeepLane(SummedCriterion):
         roads = self.lanes.roads
         if any(second == following for way in (1, -1) for following, _ in roads.links.beyond(first, way)):
             return True
+        # A step may pass several lanes of short sections or roads.
+        continued = roads.links.continued(first, second.road, second.section)
+        if continued == second.lane:
+            return True
         if first.road == second.road:
-            return abs(first.section - second.section) > 1
+            return continued is None and abs(first.section - second.section) > 1
         return any(roads.road(key.road).junction_id is not None for key in (first, second))

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from eidrive_criteria.stop_lines import StopLineCriterion, StopLineSettings
-from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_scenario.api.common import EPSILON, TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Crossing, Frame, along, beside
 
 FORGOTTEN = 60.0
@@ -51,15 +51,16 @@ class RunningStopSign(StopLineCriterion):
         self._stopped.clear()
 
     def approach(self, frame: Frame, row: int, point: tuple[float, float]) -> None:
-        view = frame.view
-        near = {line.signal for line in self.crossings.near(point, FORGOTTEN)}
+        view, z = frame.view, frame.view.states[row].z
+        near = {line.signal for line in self.crossings.near(point, FORGOTTEN, z)}
         self._stopped = {signal: end for signal, end in self._stopped.items() if signal in near}
         stands = abs(float(view.speed[row])) < self._own.below
         if not stands:
             self._since.clear()
             return
-        for line in self.crossings.near(point):
-            if -self._own.within <= along(line, point) <= 0.0 and beside(line, point) <= HALF_LANE:
+        for line in self.crossings.near(point, z=z):
+            is_before = -self._own.within - EPSILON <= along(line, point) <= EPSILON
+            if is_before and beside(line, point) <= HALF_LANE:
                 since = self._since.setdefault(line.signal, view.time)
                 if view.time - since >= self._own.duration - TIME_TOLERANCE:
                     self._stopped[line.signal] = view.time

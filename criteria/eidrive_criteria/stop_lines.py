@@ -65,7 +65,7 @@ class StopLineCriterion(FollowedCriterion):
         reach = length / 2.0 if self.part == "front" else -length / 2.0
         point = x + reach * math.cos(yaw), y + reach * math.sin(yaw)
         if step is not None:
-            for crossing in self.crossings.crossings(self._before, point, yaw, view.time):
+            for crossing in self.crossings.crossings(self._before, point, yaw, view.time, view.states[row].z):
                 self._passed += 1
                 if self.is_illegal(crossing):
                     self._illegal.append(crossing)

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.geometry import segment_distance
-from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, StopLine, stop_lines
+from eidrive_scenario.base.tolerances import EPSILON
+from eidrive_scenario.perception.traffic_lights import ON_PATH, OTHER_LEVEL, SAME_WAY, StopLine, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.signals import Kind
 
@@ -51,20 +52,24 @@ class StopLineCrossings:
         """Forget undecided crossings, after an absence or a teleport."""
         self._pending.clear()
 
-    def near(self, point: Point, reach: float = NEAR) -> list[StopLine]:
-        """Return the stop lines within a distance of a point in x and y."""
+    def near(self, point: Point, reach: float = NEAR, z: float | None = None) -> list[StopLine]:
+        """Return the stop lines within a distance of a point in x and y, on the level of a height `z` [m] or on all."""
         if not self.lines:
             return []
         rows = np.flatnonzero(np.abs(self._positions - point).max(axis=1) <= reach)
-        return [self.lines[row] for row in rows.tolist()]
+        lines = [self.lines[row] for row in rows.tolist()]
+        return [line for line in lines if z is None or abs(line.z - z) <= OTHER_LEVEL]
 
-    def crossings(self, before: Point, now: Point, heading: float, time: float) -> list[Crossing]:
+    def crossings(
+        self, before: Point, now: Point, heading: float, time: float, z: float | None = None
+    ) -> list[Crossing]:
         """Return the crossings that are certain now, at most one per signal.
 
-        before, now  position of the point in the previous frame and in this one; heading  of the actor [rad]
+        before, now  position of the point in the previous frame and in this one
+        heading, z   of the actor [rad], and its height [m], which selects among lines above each other
         """
         crossings = self._decide(before, now)
-        for line in self.near(now):
+        for line in self.near(now, z=z):
             if not crosses(line, before, now, heading):
                 continue
             if line.beyond is None:
@@ -91,11 +96,14 @@ class StopLineCrossings:
 
 
 def crosses(line: StopLine, before: Point, now: Point, heading: float) -> bool:
-    """Whether a point passes a stop line within half a lane of its center, in the direction of its traffic."""
+    """Whether a point passes a stop line within half a lane of its center, in the direction of its traffic.
+
+    A point on the line is before it.
+    """
     first, last = along(line, before), along(line, now)
-    if not first < 0.0 <= last or math.cos(heading - line.heading) < SAME_WAY:
+    if not first <= EPSILON < last or math.cos(heading - line.heading) < SAME_WAY:
         return False
-    share = first / (first - last)
+    share = (EPSILON - first) / (last - first)
     x, y = before[0] + share * (now[0] - before[0]), before[1] + share * (now[1] - before[1])
     return math.hypot(x - line.x, y - line.y) <= ON_PATH
 

@@ -13,6 +13,11 @@ from eidrive_criteria.wrong_lane import WrongLane, WrongLaneSettings
 from eidrive_scenario.api.common import RoadNetwork, SettingError
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
 
+STRAIGHT = """<road id="{id}" length="{length}" junction="-1"><link>{link}</link><planView>
+<geometry s="0" x="{x}" y="1.75" hdg="0" length="{length}"><line/></geometry></planView><lanes><laneSection s="0">
+<center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link><predecessor id="-1"/>
+<successor id="-1"/></link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>"""
+
 ALL = [
     OffRoad(OffRoadSettings(of="Ego")),
     OnSidewalk(OnSidewalkSettings(of="Ego")),
@@ -25,6 +30,26 @@ ALL = [
 def judge(criterion: Criterion, frames: list[Any], roads: RoadNetwork) -> Verdict:
     (verdict,) = evaluate_criteria(frames, [criterion], roads)
     return verdict
+
+
+def chain(*lengths: float) -> RoadNetwork:
+    """Return straight roads one after another from x = 0 on, with one lane at y = 0."""
+    roads = [
+        STRAIGHT.format(
+            id=number,
+            length=length,
+            x=sum(lengths[:number]),
+            link=(f'<predecessor elementType="road" elementId="{number - 1}" contactPoint="end"/>' if number else "")
+            + (
+                f'<successor elementType="road" elementId="{number + 1}" contactPoint="start"/>'
+                if number + 1 < len(lengths)
+                else ""
+            ),
+        )
+        for number, length in enumerate(lengths)
+    ]
+    text = f'<OpenDRIVE><header revMajor="1" revMinor="6"/>{"".join(roads)}</OpenDRIVE>'
+    return RoadNetwork.parse(text.encode())
 
 
 def along(frame: Any, car: Any, *ys: float, x: float = -60.0, speed: float = 5.0, yaw: float = 0.0) -> list[Any]:
@@ -116,6 +141,28 @@ def test_keep_lane_excludes_junctions_and_teleports(frame: Any, car: Any, roads:
     assert judge(KeepLane(KeepLaneSettings(of="Ego")), straight, roads).value == 0.0
     jump = [*along(frame, car, 0.0, 0.0), frame(1.0, {"Ego": car(0, 3.5, math.pi, 5.0)})]
     assert judge(KeepLane(KeepLaneSettings(of="Ego")), jump, roads).value == 0.0
+
+
+def test_keep_lane_across_a_road_shorter_than_a_step(frame: Any, car: Any) -> None:
+    """Steps of 2.5 m from 9 m to 11.5 m pass the road from 10 m to 11 m."""
+    frames = along(frame, car, *[0.0] * 5, x=4.0)
+    assert judge(KeepLane(KeepLaneSettings(of="Ego")), frames, chain(10.0, 1.0, 10.0)).value == 0.0
+
+
+@pytest.mark.parametrize("last", [0.5, 1.5, 2.5, 10.0])
+@pytest.mark.parametrize(("before", "value"), [(0.0, 1.0), (1.0, 1.0), (1.01, 0.0)])
+def test_end_of_road_with_the_center_on_an_earlier_road(
+    frame: Any, car: Any, last: float, before: float, value: float
+) -> None:
+    """The front is 2 m ahead of the center, and `before` [m] the end of the last road."""
+    frames = along(frame, car, 0.0, 0.0, 0.0, x=20.0 + last - 2.0 - before, speed=0.0)
+    assert judge(EndOfRoad(EndOfRoadSettings(of="Ego")), frames, chain(20.0, last)).value == value
+
+
+def test_end_of_road_across_the_lane_refers_to_the_front(frame: Any, car: Any) -> None:
+    """At 60° to the lane the front is 1 m ahead of the center along it: 1.5 m before the end of the road."""
+    frames = along(frame, car, 0.0, 0.0, 0.0, x=17.5, speed=0.0, yaw=math.pi / 3)
+    assert judge(EndOfRoad(EndOfRoadSettings(of="Ego")), frames, chain(20.0)).value == 0.0
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from eidrive_criteria.running_red_light import RunningRedLight, RunningRedLightSettings
 from eidrive_criteria.running_stop_sign import RunningStopSign, RunningStopSignSettings
 from lxml import etree
+from msgspec.structs import replace
 
 from eidrive_scenario.api.common import RoadNetwork, SettingError
 from eidrive_scenario.api.criteria import Criterion, Frame, Verdict, evaluate_criteria
@@ -101,7 +103,7 @@ def test_light_on_a_connecting_road_is_valid_for_its_route(frame: Any, car: Any,
     verdict = judge(light(), frames, roads)
     assert (verdict.passed, verdict.value) == (passed, 0.0 if passed else 1.0)
     if not passed:
-        assert verdict.first_violation == pytest.approx(0.8), "the front reaches the line when the center is at 18 m"
+        assert verdict.first_violation == pytest.approx(0.9), "the front is at the line when the center is at 18 m"
 
 
 def test_red_light_counts_for_a_route_that_is_certain_minutes_later(frame: Any, car: Any) -> None:
@@ -116,7 +118,7 @@ def test_red_light_counts_for_a_route_that_is_certain_minutes_later(frame: Any, 
         frames.append(frame(202.0 + 0.1 * n, {"Ego": car(pose.x, pose.y, pose.h, 10.0)}, signals={"10": "green"}))
     verdict = judge(light(), frames, roads)
     assert (verdict.passed, verdict.value) == (False, 1.0)
-    assert verdict.first_violation == pytest.approx(0.8), "the front reaches the line when the center is at 18 m"
+    assert verdict.first_violation == pytest.approx(0.9), "the front is at the line when the center is at 18 m"
 
 
 def approach(frame: Any, car: Any, stop: float | None, ticks: int = 1, speed: float = 0.0) -> list[Frame]:
@@ -133,7 +135,10 @@ def approach(frame: Any, car: Any, stop: float | None, ticks: int = 1, speed: fl
     [
         (None, {}, False),
         (13.0, {}, True),  # front 0.6 m before the line
+        (13.6, {}, True),  # on the line
+        (13.61, {}, False),  # 0.01 m behind it
         (9.7, {}, True),  # 3.9 m
+        (9.6, {}, True),  # 4 m
         (9.5, {}, False),  # 4.1 m
         (9.5, {"within": 5.0}, True),
         (14.0, {}, False),  # 0.4 m behind the line
@@ -152,6 +157,16 @@ def test_stop_sign_requires_a_stop_before_the_line(
 @pytest.mark.parametrize(("speed", "passed"), [(0.05, True), (0.2, False)])
 def test_stop_sign_speed_of_a_stop(frame: Any, car: Any, roads: RoadNetwork, speed: float, passed: bool) -> None:
     assert judge(sign(), approach(frame, car, 13.0, speed=speed), roads).passed is passed
+
+
+def test_stop_sign_below_a_bridge_is_not_passed_on_it(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    frames = approach(frame, car, None)
+    above = [
+        replace(each, view=replace(each.view, position=each.view.position + np.array([0.0, 0.0, 6.0])))
+        for each in frames
+    ]
+    verdict = judge(sign(), above, roads)
+    assert (verdict.passed, verdict.value) == (True, 0.0)
 
 
 def test_stop_sign_requires_a_stop_in_each_lap(frame: Any, car: Any, roads: RoadNetwork) -> None:
