@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
 from eidrive_criteria.folds import exceeds, require_two_actors
 from eidrive_criteria.pairs import SurroundedCriterion
-from eidrive_scenario.api.criteria import CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api.common import LaneLocation, WorldView
+from eidrive_scenario.api.criteria import CriterionSettings, Frame, Surroundings, Verdict, actor_never_present
+
+SAME_WAY = math.cos(math.radians(45.0))
+"""Cosine of the largest angle between the headings on two roads that have the same direction."""
+RANGE = 200.0
+"""Distance along roads from which on an emergency vehicle that was near has taken another way [m]."""
+
+
+class Pursuit(NamedTuple):
+    """Position of the emergency vehicle: distance of its center ahead of that of the actor, negative behind, and the
+    gap between the bodies [m]; whether it drives in the direction of the actor.
+    """
+
+    ahead: float
+    gap: float
+    is_same_way: bool
 
 
 class YieldToEmergencyVehicleSettings(CriterionSettings):
@@ -30,9 +47,9 @@ class YieldToEmergencyVehicleSettings(CriterionSettings):
 class YieldToEmergencyVehicle(SurroundedCriterion):
     """Criterion that fails if an emergency vehicle that approaches from behind does not get past the actor.
 
-    It approaches when it drives in the direction of the actor, at most `within` behind it, in any lane. The approach
-    ends when its center is ahead of that of the actor, or when it takes another way. It continues if the vehicle falls
-    farther behind or either of both is removed.
+    It approaches when it drives in the direction of the actor, at most `within` behind it along connected roads, in any
+    lane. The approach ends when its center is ahead of that of the actor, or when it leaves a junction on another road
+    than those to the actor. It continues if the vehicle falls farther behind or either of both is removed.
     """
 
     settings_type = YieldToEmergencyVehicleSettings
@@ -53,6 +70,11 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
         """Description of the end of the last approach."""
         self._removed = False
         """Whether either of both is absent since the present approach."""
+        self._locations: dict[str, LaneLocation | None] = {}
+        """Last location of each actor on the roads."""
+        self._road = ""
+        """Last road of the emergency vehicle from which roads led to the actor."""
+        self._straight = Surroundings(None)
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
@@ -61,12 +83,13 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
         self._removed = not (settings.of in view.rows and settings.to in view.rows)
         if self._removed:
             return
-        relation = next(self.surroundings.relations(view, settings.of, self.others), None)
+        pursuit = self._pursuit(view)
         if self._since is None:
             approaches = (
-                relation is not None
-                and relation.ahead <= 0.0 < relation.other_speed
-                and relation.gap <= settings.within
+                pursuit is not None
+                and pursuit.is_same_way
+                and pursuit.ahead <= 0.0
+                and not exceeds(pursuit.gap, settings.within)
             )
             self._since = view.time if approaches else None
         if self._since is None:
@@ -75,14 +98,60 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
         self._longest = waited if self._longest is None else max(self._longest, waited)
         if self._violated is None and exceeds(waited, settings.at_most):
             self._violated = view.time
-        if relation is None:
-            # Without a relation a vehicle that had fallen back is out of range; a near one is on another way.
-            if self._gap <= settings.within:
+        if pursuit is None:
+            # One that had fallen back is out of range. Overlapping roads of a junction do not show a way.
+            if self._gap <= settings.within and self._has_left_way():
                 self._since, self._outcome = None, "took another way than"
             return
-        self._gap = relation.gap
-        if relation.ahead > 0.0:
+        self._gap, self._road = pursuit.gap, self._present_road()
+        if pursuit.ahead > 0.0:
             self._since, self._outcome = None, "was past"
+
+    def _pursuit(self, view: WorldView) -> Pursuit | None:
+        """Return the position of the emergency vehicle; None if no road leads it to the actor within RANGE, or back.
+
+        Away from all roads, distances are those along the heading of the actor.
+        """
+        settings, roads = self._settings, self.roads
+        own, other = (view.row(name) for name in (settings.of, settings.to))
+        here, there = (self._locate(view, row) for row in (own, other))
+        if roads is None or here is None or there is None:
+            relation = next(self._straight.relations(view, settings.of, self.others), None)
+            return relation and Pursuit(relation.ahead, relation.gap, relation.other_speed > 0.0)
+        distance, runs = roads.distance(here, there), roads.orientation(here, there)
+        if distance is None or runs is None or abs(distance[0]) > RANGE:
+            return None
+        boxes, speed = view.plain_boxes, float(view.speed[other])
+        yaw, other_yaw = boxes[own][6], boxes[other][6]
+        along, other_along = (
+            math.cos(angle - roads.road_pose_at(place.road, place.s).h)
+            for angle, place in ((yaw, here), (other_yaw, there))
+        )
+        direction = along * other_along * runs
+        if here.road != there.road and direction < 0.0:
+            return None
+        ahead = math.copysign(distance[0], distance[0] * along * roads.driving_direction(here.road, here.lane))
+        is_turned = here.road != there.road and math.cos(yaw - other_yaw) < SAME_WAY
+        is_same_way = direction * speed > 0.0 and not is_turned
+        return Pursuit(ahead, max(abs(ahead) - (boxes[own][3] + boxes[other][3]) / 2.0, 0.0), is_same_way)
+
+    def _locate(self, view: WorldView, row: int) -> LaneLocation | None:
+        if self.roads is None:
+            return None
+        (x, y, *_), name = view.plain_boxes[row], view.names[row]
+        self._locations[name] = self.roads.locate_at(x, y, self._locations.get(name), view.states[row].z)
+        return self._locations[name]
+
+    def _present_road(self) -> str:
+        """Return the road of the emergency vehicle; "" in junctions and away from all roads."""
+        location = self._locations.get(self._settings.to)
+        if self.roads is None or location is None:
+            return ""
+        return location.road if self.roads.road(location.road).junction_id is None else ""
+
+    def _has_left_way(self) -> bool:
+        """Return whether the emergency vehicle is on another road than when a road last led to the actor."""
+        return self.roads is None or self._present_road() not in ("", self._road)
 
     def verdict(self) -> Verdict:
         settings = self._settings

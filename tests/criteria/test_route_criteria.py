@@ -42,8 +42,8 @@ def outside(frames: list[Any], roads: Any, **settings: Any) -> Verdict:
     return judge(OutsideRouteLanes(OutsideRouteLanesSettings(of="Ego", **settings)), frames, roads)
 
 
-def yields(frames: list[Any], **settings: Any) -> Verdict:
-    return judge(YieldToEmergencyVehicle(YieldToEmergencyVehicleSettings(of="Ego", to="EV", **settings)), frames)
+def yields(frames: list[Any], roads: Any = None, **settings: Any) -> Verdict:
+    return judge(YieldToEmergencyVehicle(YieldToEmergencyVehicleSettings(of="Ego", to="EV", **settings)), frames, roads)
 
 
 def drive(frame: Any, car: Any, *points: Point, speed: float = 30.0) -> list[Any]:
@@ -207,6 +207,41 @@ def test_emergency_vehicle_that_is_removed_or_falls_back_is_not_past(frame: Any,
     verdict = yields([*chase(frame, car, 3), *back])
     assert not verdict.passed
     assert "still behind" in verdict.reason
+
+
+def turn(roads: Any, route: str) -> list[tuple[float, float, float]]:
+    """Return poses each meter along road 1 from x = -30 m on, a road of the junction and 40 m straight on."""
+    poses = [(float(x), 0.0, 0.0) for x in range(-30, 20)]
+    for s in range(int(roads.roads[route].length)):
+        pose = roads.lane_pose_at(route, -1, float(s))
+        poses.append((pose.x, pose.y, pose.h))
+    x, y, h = poses[-1]
+    return [*poses, *((x + s * np.cos(h), y + s * np.sin(h), h) for s in range(1, 41))]
+
+
+@pytest.mark.parametrize("gap", [10, 30])
+@pytest.mark.parametrize(("way", "other_way"), [("101", "101"), ("102", "102"), ("103", "103"), ("101", "103")])
+def test_emergency_vehicle_follows_through_a_junction(
+    frame: Any, car: Any, roads: Any, gap: int, way: str, other_way: str
+) -> None:
+    """Both drive 1 m per frame of 0.1 s, the EV `gap` and 4 m behind. It is still behind at the end or turns off."""
+    ego, other = turn(roads, way), turn(roads, other_way)
+    count = min(len(ego), len(other)) - gap - 4
+    frames = [frame(0.1 * n, {"Ego": car(*ego[n + gap + 4], 10.0), "EV": car(*other[n], 10.0)}) for n in range(count)]
+    verdict = yields(frames, roads)
+    assert verdict.passed is (way != other_way)
+    if way == other_way:
+        assert verdict.value == pytest.approx(0.1 * (count - 1))
+    else:
+        assert "took another way" in verdict.reason
+
+
+def test_emergency_vehicle_in_the_other_lane_counts_from_the_distance(frame: Any, car: Any, roads: Any) -> None:
+    """From x = -70 m at 10 m/s the EV is 48 m behind the body at 0.2 s, and past the standing Ego at -16 m at 5.5 s."""
+    frames = [frame(0.1 * n, {"Ego": car(-16.0, 0.0), "EV": car(-70.0 + n, 3.5, speed=10.0)}) for n in range(70)]
+    verdict = yields(frames, roads, within=48.0)
+    assert verdict.passed
+    assert verdict.value == pytest.approx(5.3)
 
 
 def test_missing_actors_fail(frame: Any, car: Any, roads: Any) -> None:
