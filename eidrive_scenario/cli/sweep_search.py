@@ -130,7 +130,8 @@ class Search:
         )
         name = self.boundary.name
         if math.isnan(boundary.value) or boundary.inside < 0.5:
-            echo(f"{name}: the success rate does not cross {self.bound:g} in the range ({boundary.runs} runs)")
+            runs = f"({boundary.runs} runs)"
+            echo(f"{name}: the success rate does not cross {self.bound:g} in the range if it is monotone {runs}")
             return
         change = "rises" if boundary.rising > 0.5 else "falls"
         echo(

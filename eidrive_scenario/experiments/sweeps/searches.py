@@ -22,7 +22,11 @@ from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
 
 BOUNDARIES = 241
-"""Number of tested boundaries, over the range and half of its length on either side."""
+"""Number of tested boundaries, over the tested range and half of its length on either side."""
+FEWEST = 4
+"""Minimum number of steps between tested boundaries in the interval; at fewer, the tested range shrinks around it."""
+SHRUNK = 8
+"""Length of a shrunk range, in lengths of the interval."""
 WIDTHS = 12
 """Number of tested widths."""
 NARROWEST, WIDEST = 0.002, 0.5
@@ -59,24 +63,36 @@ class BoundarySearch:
     """
 
     def __init__(self, low: float, high: float, bound: float = 0.5) -> None:
-        from scipy.special import logit
-
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ValueError(f"range: not low < high (got {low} and {high})")
         if not 0.0 < bound < 1.0:
             raise ValueError(f"bound: not between 0 and 1 (got {bound})")
         self.low, self.high = low, high
+        self._bound = bound
+        self._outcomes: list[tuple[float, bool]] = []
+        self._set_range(low, high)
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self._outcomes)
+
+    def _set_range(self, low: float, high: float) -> None:
+        """Lay tested boundaries, widths and values over a range within that of the search."""
+        from scipy.special import logit
+
         length = high - low
         self._boundaries = np.linspace(low - length / 2.0, high + length / 2.0, BOUNDARIES)
-        widths = length * np.geomspace(NARROWEST, WIDEST, WIDTHS)
+        widths = np.geomspace(NARROWEST * length, WIDEST * (self.high - self.low), WIDTHS)
         boundary, width, sign, lapse = np.meshgrid(self._boundaries, widths, (-1.0, 1.0), LAPSES, indexing="ij")
         self._tried = np.linspace(low, high, TRIED)
         # The rate at the boundary is the bound, except for the lapses.
-        share = np.clip((bound - lapse / 2.0) / (1.0 - lapse), 1e-6, 1.0 - 1e-6)
+        share = np.clip((self._bound - lapse / 2.0) / (1.0 - lapse), 1e-6, 1.0 - 1e-6)
         self._shape = boundary, width, sign, lapse, logit(share)
         self._rates = np.stack([self._rate(x) for x in self._tried])
         self._log = np.zeros(boundary.shape)
-        self.runs = 0
+        for x, success in self._outcomes:
+            self._log += self._log_likelihood(x, success)
 
     def _rate(self, x: float) -> Array:
         from scipy.special import expit
@@ -86,8 +102,9 @@ class BoundarySearch:
 
     def add(self, x: float, success: bool) -> None:
         """Add the outcome of a run at a value."""
+        self._outcomes.append((x, success))
         self._log += self._log_likelihood(x, success)
-        self.runs += 1
+        self._shrink()
 
     def _log_likelihood(self, x: float, success: bool) -> Array:
         rate = self._rate(x)
@@ -101,6 +118,22 @@ class BoundarySearch:
             proposals.append(x)
             held = held + self._log_likelihood(x, likelier)
         return proposals
+
+    def _shrink(self) -> None:
+        """Shrink the tested range if the boundaries in the interval are too few to resolve it."""
+        low, middle, high = self._quantiles(0.95)
+        step = self._boundaries[1] - self._boundaries[0]
+        if high - low < FEWEST * step and self.low <= middle <= self.high:
+            reach = SHRUNK * (high - low) / 2.0
+            self._set_range(max(middle - reach, self.low), min(middle + reach, self.high))
+
+    def _quantiles(self, confidence: float) -> tuple[float, float, float]:
+        """Return the lower limit of the central credible interval of the boundary, its median and its upper limit."""
+        marginal = _normalized(self._log).reshape(BOUNDARIES, -1).sum(axis=1)
+        ends = self._boundaries + (self._boundaries[1] - self._boundaries[0]) / 2.0
+        shares = (1.0 - confidence) / 2.0, 0.5, (1.0 + confidence) / 2.0
+        low, middle, high = np.interp(shares, np.cumsum(marginal), ends).tolist()
+        return low, middle, high
 
     def _next_value(self, log: Array) -> tuple[float, bool]:
         """Return the value with the minimum expected entropy of the boundary, and its likelier outcome."""
@@ -117,13 +150,7 @@ class BoundarySearch:
         """Return the estimate with its central credible interval."""
         posterior = _normalized(self._log)
         marginal = posterior.reshape(BOUNDARIES, -1).sum(axis=1)
-        cumulated = np.cumsum(marginal)
-        step = self._boundaries[1] - self._boundaries[0]
-        ends = self._boundaries + step / 2.0
-        low, middle, high = (
-            float(np.interp(share, cumulated, ends))
-            for share in ((1.0 - confidence) / 2.0, 0.5, (1.0 + confidence) / 2.0)
-        )
+        low, middle, high = self._quantiles(confidence)
         is_inside = (self._boundaries >= self.low) & (self._boundaries <= self.high)
         inside = float(marginal[is_inside].sum())
         rising = float(posterior[:, :, 1].sum())

@@ -54,6 +54,16 @@ def test_sharp_boundary_needs_few_runs() -> None:
         assert found.rising < 0.01
 
 
+@pytest.mark.statistical
+def test_interval_contains_steps_between_coarse_boundaries() -> None:
+    """The first range tests boundaries 0.008 apart and values 0.017 apart, and shrinks to resolve ±0.004."""
+    steps = [0.05 + 0.0913 * k for k in range(10)]
+    estimates = [searched(1, 64, lambda x, step=step: float(x < step)) for step in steps]
+    assert all(is_found(estimate, 0.004) for estimate in estimates)
+    assert all(abs(estimate.value - step) <= 0.004 for estimate, step in zip(estimates, steps, strict=True))
+    assert sum(each.low <= step <= each.high for each, step in zip(estimates, steps, strict=True)) >= 8
+
+
 def test_rising_rate_and_other_range_are_found() -> None:
     found = searched(1, 80, lambda x: float(expit((x - 8.0) / 0.2)), low=6.0, high=12.0)
     assert found.value == pytest.approx(8.0, abs=0.3)
