@@ -112,23 +112,32 @@ class Search:
             text = f"{plan.scenario}: a search needs one scenario (got a distribution of {len(plan.points)} runs)"
             raise SettingError(Diagnostic(text, "give the scenario of the distribution, and --vary or --param"))
 
+        unjudged: dict[str, StoredRun] = {}
+
         def execute(jobs: Sequence[SweepJob]) -> list[StoredRun]:
             run_sweep(jobs, store, workers, wall_limit=wall_limit, retry=retry, files=files)
-            return store.rows([job.key for job in jobs])
+            executed = store.rows([job.key for job in jobs])
+            unjudged.update({run.key: run for run in executed if not run.has_verdict})
+            return executed
 
         if self.boundary is None:
             self._falsify(plan, execute)
-            return
+        else:
+            self._find_boundary(plan, self.boundary, execute)
+        for run in list(unjudged.values())[:1]:
+            echo(f"{len(unjudged)} runs have no verdict and do not count: {run.status}: {run.error}", err=True)
+
+    def _find_boundary(self, plan: SweepPlan, axis: Axis, execute: Execute) -> None:
         boundary = find_boundary(
             plan,
-            self.boundary,
+            axis,
             execute,
             bound=self.bound,
             tolerance=self.tolerance,
             runs=self.runs,
             shown=lambda estimate: echo(f"{estimate.runs} runs: {estimate.low:.4g} to {estimate.high:.4g}", err=True),
         )
-        name = self.boundary.name
+        name = axis.name
         if math.isnan(boundary.value) or boundary.inside < 0.5:
             runs = f"({boundary.runs} runs)"
             echo(f"{name}: the success rate does not cross {self.bound:g} in the range if it is monotone {runs}")

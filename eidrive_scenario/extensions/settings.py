@@ -48,7 +48,7 @@ def parse_settings(
     try:
         settings = model.model_validate(dict(data))
     except ValidationError as error:
-        details = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
+        details = _without_consequences(error.errors(include_url=False))[:MAX_DIAGNOSTICS]
         diagnostics = [
             _with_origins(
                 _diagnostic(model, data, detail, source, line, lines or {}), _value_path(detail, data), origins
@@ -118,6 +118,12 @@ def _diagnostic(
     text = detail["msg"]
     hint = text.removeprefix("Value error, ") if kind == "value_error" else text.lower()
     return Diagnostic(message if path else "settings contradict each other", hint, source, key_line)
+
+
+def _without_consequences(details: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Return errors without those of lists that are too short only because pydantic leaves out their invalid values."""
+    inner = {detail["loc"][:-1] for detail in details}
+    return [detail for detail in details if detail["type"] != "too_short" or detail["loc"] not in inner]
 
 
 def _with_origins(diagnostic: Diagnostic, path: str | None, origins: Mapping[str, str]) -> Diagnostic:

@@ -348,14 +348,14 @@ def _margin(run: StoredRun, criterion: str) -> float | None:
         return float(stated)
     value: Any = run.result.get(f"{criterion}.value")
     limit: Any = run.result.get(f"{criterion}.limit")
-    if _is_number(value) and _is_number(limit) and limit != 0:
+    if _is_number(value) and _is_number(limit) and limit != 0 and math.isfinite(limit):
         margin = abs(float(value - limit) / float(limit))
         return margin if passed else -margin
     return None if passed else -1.0
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)
 
 
 def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:

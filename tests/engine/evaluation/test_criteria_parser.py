@@ -166,6 +166,13 @@ def test_contradictory_settings_are_reported(text: str, message: str) -> None:
     assert message in diagnostic
 
 
+def test_invalid_value_of_a_list_is_one_error() -> None:
+    with pytest.raises(SettingError) as caught:
+        parse_criteria("detection_count: {of: Ego, classes: [cars]}")
+    (diagnostic,) = caught.value.diagnostics
+    assert "'classes.0' is 'cars'" in diagnostic.message
+
+
 def test_diagnostics_of_listed_criteria_have_their_own_lines() -> None:
     text = "[collision: {off_: A},\n collision: {of: B},\n collision: {\n of: C, with: 3}]"
     assert [diagnostic.split(": ")[0] for diagnostic in diagnostics(text)] == [

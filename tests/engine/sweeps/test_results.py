@@ -253,6 +253,14 @@ def test_find_boundary_command_prints_value(eidrive: Eidrive, scenario: Path, tm
     assert "falls through 0.5" in done.stdout
 
 
+def test_search_states_the_number_of_runs_without_a_verdict(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    """Speeds from 40 m/s on are excluded; the search ends with runs at or near 60 m/s among its first eight."""
+    options = ("--find-boundary", "Speed=10:60", "--runs", "8", "--store", tmp_path / "s.db", "--workers", "1")
+    done = eidrive("sweep", scenario, *options)
+    assert done.exit_code == 0
+    assert "runs have no verdict and do not count: excluded: " in done.stderr
+
+
 def test_results_of_different_versions_are_named(eidrive: Eidrive, store: Path, tmp_path: Path) -> None:
     """Shards of two releases, and one package of an extension with two versions in one store."""
     with ResultStore.open(store, {"numpy": "2"}) as opened:
