@@ -15,8 +15,8 @@ from eidrive_scenario.api.criteria import CriterionSettings, Frame, Surroundings
 
 SAME_WAY = math.cos(math.radians(45.0))
 """Cosine of the largest angle between the headings on two roads that have the same direction."""
-RANGE = 200.0
-"""Distance along roads from which on an emergency vehicle that was near has taken another way [m]."""
+BEHIND, AHEAD = 200.0, 100.0
+"""Maximum distances along roads [m]. In a junction, on an overlapping road, the way may lead around a block."""
 
 
 class Pursuit(NamedTuple):
@@ -108,7 +108,7 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
             self._since, self._outcome = None, "was past"
 
     def _pursuit(self, view: WorldView) -> Pursuit | None:
-        """Return the position of the emergency vehicle; None if no road leads it to the actor within RANGE, or back.
+        """Return the position of the emergency vehicle; None if no near road leads it to the actor or back.
 
         Away from all roads, distances are those along the heading of the actor.
         """
@@ -119,7 +119,7 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
             relation = next(self._straight.relations(view, settings.of, self.others), None)
             return relation and Pursuit(relation.ahead, relation.gap, relation.other_speed > 0.0)
         distance, runs = roads.distance(here, there), roads.orientation(here, there)
-        if distance is None or runs is None or abs(distance[0]) > RANGE:
+        if distance is None or runs is None:
             return None
         boxes, speed = view.plain_boxes, float(view.speed[other])
         yaw, other_yaw = boxes[own][6], boxes[other][6]
@@ -128,9 +128,9 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
             for angle, place in ((yaw, here), (other_yaw, there))
         )
         direction = along * other_along * runs
-        if here.road != there.road and direction < 0.0:
-            return None
         ahead = math.copysign(distance[0], distance[0] * along * roads.driving_direction(here.road, here.lane))
+        if not -BEHIND <= ahead <= AHEAD or (here.road != there.road and direction < 0.0):
+            return None
         is_turned = here.road != there.road and math.cos(yaw - other_yaw) < SAME_WAY
         is_same_way = direction * speed > 0.0 and not is_turned
         return Pursuit(ahead, max(abs(ahead) - (boxes[own][3] + boxes[other][3]) / 2.0, 0.0), is_same_way)
