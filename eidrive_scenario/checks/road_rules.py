@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from eidrive_scenario.checks.rule import Level, Rule, at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.driving.station_declarations import declared_settings
-from eidrive_scenario.driving.station_warnings import areas_off_road
+from eidrive_scenario.driving.station_warnings import areas_off_road, lights_out_of_view
 from eidrive_scenario.errors import Diagnostic, InputError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import Pose, PositionError, RoadNetwork
@@ -136,11 +137,14 @@ def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
 
 def conflict_areas_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield conflict areas without a part on a road; invalid settings are reported by the run setup."""
-    try:
-        settings = declared_settings(context.scenario)
-    except InputError:
-        return
-    yield from areas_off_road(context.scenario, settings, context.roads)
+    with suppress(InputError):
+        yield from areas_off_road(context.scenario, declared_settings(context.scenario), context.roads)
+
+
+def unseen_lights(context: RoadLintContext) -> Iterator[Diagnostic]:
+    """Yield vehicles that obey traffic lights and have none in view; invalid settings are reported by the run setup."""
+    with suppress(InputError):
+        yield from lights_out_of_view(context.scenario, declared_settings(context.scenario), context.roads)
 
 
 MARGIN = 2.0
@@ -300,5 +304,6 @@ ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (
     Rule("trajectory-off-road", Level.WARNING, "a trajectory that leaves the road", trajectories_off_road),
     Rule("waypoint-off-road", Level.WARNING, "a waypoint or a destination outside the road", waypoints_off_road),
     Rule("conflict-area-off-road", Level.WARNING, "a conflict area outside the road", conflict_areas_off_road),
+    Rule("unseen-lights", Level.WARNING, "a vehicle that obeys lights and has none in view", unseen_lights),
 )
 """Rules that need a scenario and its road network."""

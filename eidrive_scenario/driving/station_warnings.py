@@ -1,4 +1,4 @@
-"""Warnings about stations: areas off the roads, short delays and views, driving stations at rest."""
+"""Warnings about stations: areas off the roads, lights out of view, short delays and views, stations at rest."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ import numpy as np
 
 from eidrive_scenario.base.geometry import point_in_polygon
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
+from eidrive_scenario.driving.agent_factory import build_detector
 from eidrive_scenario.driving.planner_settings import REACTION, Polygon
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.station_declarations import property_line, station_controller
+from eidrive_scenario.driving.station_declarations import possible_drivers, property_line, station_controller
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.traffic_lights import stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
 from eidrive_scenario.v2x.profile import ChannelProfile
+from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
 MARGIN = 2.0
@@ -62,6 +65,42 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
     x, y = np.array(points, dtype=float).T
     nearest = float(roads.locate(x, y, reach=np.inf).outside.min())
     return max(0.0, nearest - reach)
+
+
+BACK, STEP = 100.0, 5.0
+"""Distance before a stop line within which a light should be in view, and steps of the search for such a place [m]."""
+
+
+def lights_out_of_view(
+    scenario: Scenario, settings: Mapping[str, AgentSettings], roads: RoadNetwork | None
+) -> Iterator[Diagnostic]:
+    """Yield a warning for each driving station that obeys traffic lights, and whose cameras show none of the map."""
+    lines = [line for line in stop_lines(roads) if line.kind == "light"] if roads is not None else []
+    for name in possible_drivers(scenario, settings) if lines else ():
+        station = settings[name]
+        if not station.obey_signals:
+            continue
+        detector = build_detector(station)
+        sensors = station.rig_sensors(detector.needs, detector.default_sensors)
+        detector.setup(DetectorContext(actor_spec(name, scenario.entities[name]), sensors, roads))
+        if not any(
+            detector.can_read_light(
+                line.signal,
+                line.x - back * math.cos(line.heading),
+                line.y - back * math.sin(line.heading),
+                line.z,
+                line.heading,
+            )
+            for line in lines
+            for back in np.arange(0.0, BACK, STEP).tolist()
+        ):
+            controller = station_controller(scenario, name)
+            yield Diagnostic(
+                f"{name!r} passes red lights: its cameras show no traffic light of the map to a vehicle before it",
+                "add a camera with a view ahead, or with more pixels",
+                controller.source,
+                property_line(controller, "sensors", "obey_signals"),
+            )
 
 
 def short_channel_delay(

@@ -26,6 +26,7 @@ from eidrive_scenario.driving.station_declarations import (
 )
 from eidrive_scenario.driving.station_warnings import (
     areas_off_road,
+    lights_out_of_view,
     short_channel_delay,
     short_detector_latencies,
     short_views,
@@ -205,6 +206,7 @@ class Stations(DrivingStack):
     def warnings(self) -> Iterator[Diagnostic]:
         context = self._context
         yield from areas_off_road(context.scenario, self._settings, context.roads)
+        yield from lights_out_of_view(context.scenario, self._settings, context.roads)
         yield from short_detector_latencies(self._settings, context.dt)
         yield from short_views({name: self._settings[name] for name in self.possible_drivers}, self._detectors)
         if context.channel is not None:

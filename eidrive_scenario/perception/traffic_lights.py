@@ -92,6 +92,10 @@ class SignalsAhead:
         """Update the states of signals in sight."""
         self._states.update((reading.id, reading.state) for reading in readings)
 
+    def forget(self, signal: str) -> None:
+        """Remove the state of a signal."""
+        self._states.pop(signal, None)
+
     def ahead(self, progress: float) -> Iterator[SignalAhead]:
         """Yield the signals whose stop lines are beyond `progress` [m] along the path, the nearest first."""
         for distance, line in self._on_path:

@@ -1,4 +1,5 @@
-"""Warnings of a run: what never started, who never moved, delays below a step, conflict areas off the road."""
+"""Warnings of a run: what never started, who never moved, delays below a step, conflict areas off the road, and
+traffic lights out of view."""
 
 from __future__ import annotations
 
@@ -187,6 +188,19 @@ def test_conflict_area_off_the_road_is_reported_by_run_and_check(make: Make, are
     assert ("conflict-area-off-road" in checked) is off
     line = next(n for n, text in enumerate(path.read_text().splitlines(), 1) if '"conflict_area" value' in text)
     assert all(f"{path}:{line}: " in warning for warning in warnings)
+
+
+@pytest.mark.parametrize(
+    ("mount", "detector", "warns"), [("front", "ssd", 0), ("back", "ssd", 1), ("back", "lidar", 0)]
+)
+def test_cameras_that_show_no_traffic_light_are_reported(make: Make, mount: str, detector: str, warns: int) -> None:
+    """The lidar detector reads no lights from images."""
+    area = '<Property name="conflict_area"'
+    sensors = f'<Property name="sensors" value="{{camera: {{mount: {mount}}}, lidar: {{}}}}"/>'
+    obeys = '<Property name="obey_signals" value="true"/>'
+    path = make((area, f"{obeys}{sensors}{area}"), ("coop_1.xodr", "coop_2.xodr"))
+    warnings = run_file(path, settings=RunSettings(detector=detector, time_limit=0.05)).warnings
+    assert len([warning for warning in warnings if "its cameras show no traffic light" in warning]) == warns
 
 
 def test_conflict_area_beside_other_planner_settings_is_reported_with_its_own_line(make: Make) -> None:

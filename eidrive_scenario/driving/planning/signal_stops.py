@@ -15,6 +15,8 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.path import APPROACH_DECELERATION
 from eidrive_scenario.perception.traffic_lights import SignalAhead, SignalsAhead
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import SignalReading
+from eidrive_scenario.sensing.signals import RANGE
 from eidrive_scenario.world.actor import ActorSpec
 
 BEFORE_LINE = 1.5
@@ -41,6 +43,8 @@ READING = 0.5
 """Time from a light being in view to its state being known, for cameras of some images per second [s]."""
 WAIT = 3.0
 """Waiting time at a stop sign [s]: 60 ticks of 0.05 s, as in EI-Drive."""
+LONGEST_RED = 120.0
+"""Waiting time at a red light that is out of view [s]: longer than the cycles of usual traffic lights."""
 
 
 CanReadLight = Callable[[str, float, float, float, float], bool]
@@ -61,8 +65,8 @@ class _Decision:
     distance        of its next stop line in the last tick [m]
     stops           whether the vehicle stops for the light; None: not decided
     yellow_since    time at which the light was first seen in yellow [s]; None in another state
-    standing_since  time at which the vehicle stopped at the sign [s]; None before
-    is_served       whether the vehicle has waited at the sign
+    standing_since  time at which the vehicle stopped at the sign, or at a light that it has not read [s]; None before
+    is_served       whether the vehicle has waited there
     back            distance of the stop point from the usual one, so that the light stays in view [m]
     shown           distance before the stop point up to which the light is in view [m]
     """
@@ -77,7 +81,10 @@ class _Decision:
 
 
 class SignalStops:
-    """Stops for traffic lights and stop signs. At a stop sign the vehicle waits and continues, regardless of others."""
+    """Stops for traffic lights and stop signs. At a stop sign the vehicle waits and continues, regardless of others.
+
+    A light that the vehicle has not read where it should have had it in view is a stop sign, and then a dark light.
+    """
 
     def __init__(self, roads: RoadNetwork | None, spec: ActorSpec) -> None:
         self.signals = SignalsAhead(roads)
@@ -112,12 +119,19 @@ class SignalStops:
                 self._decisions[name] = _Decision(signal.distance, *self._view_of(signal, along, can_read))
             decision = self._decisions[name]
             decision.distance = signal.distance
+            if signal.distance > RANGE:
+                self.signals.forget(name)  # It was read on an earlier passage
             left = signal.distance - self._front - BEFORE_LINE - decision.back
-            holds = _light_holds if signal.kind == "light" else _sign_holds
+            is_unread = signal.kind == "light" and signal.state is None
+            holds = _unread_holds if is_unread else _light_holds if signal.kind == "light" else _sign_holds
             if holds(signal, decision, left, speed, now):
-                what = "traffic light" if signal.kind == "light" else "stop sign"
-                stops.append(StopPoint(along + max(left, 0.0), f"stop at {what} {name}"))
-            elif signal.state is None and left > decision.shown:
+                what = f"{'unread ' if is_unread else ''}traffic light" if signal.kind == "light" else "stop sign"
+                # Without `max`, errors of its position do not move a standing vehicle out of the view of the light.
+                stops.append(StopPoint(along + (left if decision.back else max(left, 0.0)), f"stop at {what} {name}"))
+            elif signal.kind == "light" and decision.is_served:
+                decision.is_served, decision.standing_since = False, None
+                self.signals.update([SignalReading(name, "off")])
+            elif is_unread and left > decision.shown:
                 # It approaches so that it can still stop when it reads the light.
                 late = TOO_LATE * READING
                 entry = math.sqrt(late**2 + 2.0 * TOO_LATE * decision.shown) - late
@@ -181,19 +195,35 @@ def _light_holds(light: SignalAhead, decision: _Decision, left: float, speed: fl
                 decision.yellow_since = now
             remaining = yellow_time(speed) - (now - decision.yellow_since)
         to_line = left + decision.back + BEFORE_LINE
-        can_stop = can_stop_for_light(left, speed, passes_in_time=to_line <= speed * remaining)
-        decision.stops = can_stop or speed < STANDING
-    return decision.stops
+        passes_in_time = to_line <= speed * remaining
+        # It rather stops where the light is out of view than passes at red.
+        way = left if passes_in_time else left + decision.back
+        decision.stops = can_stop_for_light(way, speed, passes_in_time=passes_in_time) or speed < STANDING
+    is_in_view = left >= -STEP or not decision.back
+    return decision.stops and (is_in_view or _sign_holds(light, decision, left, speed, now, LONGEST_RED))
 
 
-def _sign_holds(sign: SignalAhead, decision: _Decision, left: float, speed: float, now: float) -> bool:
+def _sign_holds(
+    sign: SignalAhead, decision: _Decision, left: float, speed: float, now: float, wait: float = WAIT
+) -> bool:
     if not sign.must_stop or decision.is_served:
         return False
     if speed < STANDING and left < AT_LINE:
         if decision.standing_since is None:
             decision.standing_since = now
-        decision.is_served = now - decision.standing_since >= WAIT - TIME_TOLERANCE
+        decision.is_served = now - decision.standing_since >= wait - TIME_TOLERANCE
     return not decision.is_served
+
+
+def _unread_holds(light: SignalAhead, decision: _Decision, left: float, speed: float, now: float) -> bool:
+    """Return whether a light holds the vehicle that has not read it in time, or started where it is out of view.
+
+    A light that is in view from nowhere does not.
+    """
+    if decision.stops is None and left <= min(decision.shown, speed * REACTION + speed * speed / (2.0 * TOO_LATE)):
+        can_stop = can_stop_for_light(left + decision.back, speed, passes_in_time=False)
+        decision.stops = (decision.shown < math.inf and (can_stop or speed < STANDING)) or None
+    return bool(decision.stops) and _sign_holds(light._replace(must_stop=True), decision, left, speed, now)
 
 
 def yellow_time(speed: float) -> float:

@@ -22,7 +22,7 @@ from eidrive_scenario.perception.geometry.projection import in_camera
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
 from eidrive_scenario.perception.learned.image_network import ImageNetwork, object_category
-from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
+from eidrive_scenario.perception.learned.lights import LightsOnMap, LightStates, signal_kinds
 from eidrive_scenario.perception.learned.network_loading import build_network, check_network, runtime_of, weights_path
 from eidrive_scenario.perception.learned.runtimes import runtime_versions
 from eidrive_scenario.perception.learned.settings import LearnedSettings
@@ -48,6 +48,7 @@ class ImageDetector(Detector):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
+    detectable_signals = frozenset({"light"})
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {
         "camera": CameraSettings(width=512, height=384, rate=10.0),
         "lidar": LidarSettings(rate=10.0, field_of_view=110.0),
@@ -56,6 +57,7 @@ class ImageDetector(Detector):
     def __init__(self) -> None:
         self.image_detections: Mapping[str, ImageDetections] = {}
         self._signals: tuple[SignalReading, ...] = ()
+        self._light_states = LightStates()
         self._network: ImageNetwork | None = None
         self._prepared: Mapping[str, ImageDetections] = {}
         """Detections in the next images, by camera, after `prepare_batch`."""
@@ -118,7 +120,8 @@ class ImageDetector(Detector):
                 objects = result.objects
                 image_memory.read_only(objects.boxes, objects.scores, objects.velocity, objects.covariance)
                 memory.stations.add(key, result)
-        self.image_detections, self._signals, objects = result
+        self.image_detections, signals, objects = result
+        self._signals = self._light_states.confirm(signals, readings.time)
         return objects
 
     def _detect_objects(self, network: ImageNetwork, readings: Readings) -> StationDetections:
@@ -147,11 +150,9 @@ class ImageDetector(Detector):
         return type(self), network.identity, self._roads, digest
 
     def can_read_light(self, signal: str, x: float, y: float, z: float, yaw: float) -> bool:
-        """Return whether a light would be inside the image of a camera; True if the network reads no lights."""
+        """Return whether a light would be inside the image of a camera."""
         cameras = (camera.at(mount.level_camera_pose(x, y, z, yaw)) for mount, camera in self._cameras)
-        return "light" not in self.detectable_signals or any(
-            signal == light.id for camera in cameras for light in self._lights.in_view(camera)
-        )
+        return any(signal == light.id for camera in cameras for light in self._lights.in_view(camera))
 
     def range_of(self, sensor: SensorSettings) -> float:
         """Return the distance at which the image of a car has the minimum height of objects in training [m]."""
@@ -166,7 +167,7 @@ class ImageDetector(Detector):
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
     def signals(self) -> tuple[SignalReading, ...]:
-        """Return the traffic lights and stop signs of the map that are in the last images."""
+        """Return the traffic lights and stop signs of the map that are in the last images, in confirmed states."""
         return self._signals
 
     def _lift_image(self, detections: ImageDetections, readings: Readings, camera: str) -> Detections:

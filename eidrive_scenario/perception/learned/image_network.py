@@ -22,6 +22,8 @@ from eidrive_scenario.sensing.readings import CameraReading
 OBJECT_CLASSES = ("car", "truck", "bus", "motorbike", "bicycle", "pedestrian")
 LIGHT_STATES = ("red", "yellow", "green", "off")
 LIGHT = "traffic light"
+UNKNOWN = "unknown"
+"""State of a light whose class has none."""
 STOP_SIGN = "stop sign"
 IMAGE_CLASSES = (*OBJECT_CLASSES, *(f"{LIGHT} {state}" for state in LIGHT_STATES), STOP_SIGN)
 """The classes of the shipped weights, in the order of the networks' outputs."""
@@ -46,7 +48,7 @@ def object_category(name: str) -> str | None:
 def light_state(name: str) -> str | None:
     """Return the state in the name of a traffic light class; None for all other classes."""
     if name == LIGHT:
-        return "unknown"
+        return UNKNOWN
     return name.removeprefix(f"{LIGHT} ") if name.startswith(f"{LIGHT} ") else None
 
 
@@ -60,7 +62,7 @@ def misspelt(name: str) -> str | None:
     if (
         object_category(name)
         or name == STOP_SIGN
-        or (state and (state in ("off", "unknown") or any(mode != OFF for _, mode in lamps(state))))
+        or (state and (state in ("off", UNKNOWN) or any(mode != OFF for _, mode in lamps(state))))
     ):
         return None
     near = get_close_matches(name, (*CLASSES, *_SAME_AS, LIGHT, *IMAGE_CLASSES), n=1, cutoff=VERY_LIKE)

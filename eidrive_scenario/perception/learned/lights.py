@@ -13,11 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Bools, Floats
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
-from eidrive_scenario.perception.learned.image_network import STOP_SIGN, light_state
+from eidrive_scenario.perception.learned.image_network import STOP_SIGN, UNKNOWN, light_state
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors
+from eidrive_scenario.roads.model.signal_states import (
+    FLASHES_PER_SECOND,
+    GREEN,
+    RED,
+    YELLOW,
+    lamp_colors,
+    must_stop,
+)
 from eidrive_scenario.sensing.readings import CameraReading, SignalReading
 from eidrive_scenario.sensing.signals import RANGE, SIGNAL_KINDS, signal_kind
 from eidrive_scenario.world.road_objects import signal_heads
@@ -155,7 +163,7 @@ class LightsOnMap:
         for name, camera in cameras.items() if self.ids else ():
             boxes = self.match(detected[name], camera) if name in detected else {}
             for row, (score, state) in (boxes | self._lamp_states(camera, boxes)).items():
-                if row not in best or score > best[row][0]:
+                if state != UNKNOWN and (row not in best or score > best[row][0]):
                     best[row] = (score, state)
         return tuple(SignalReading(self.ids[row], best[row][1]) for row in sorted(best))
 
@@ -213,6 +221,52 @@ class LightsOnMap:
             if reach[nearest] <= NEAR_BOX and (nearest not in matches or score > matches[nearest][0]):
                 matches[nearest] = (score, state)
         return matches
+
+
+DARK = "off"
+FLASHING_YELLOW = "yellow flashing"
+IMAGES, SPAN = 3, 3.0 / FLASHES_PER_SECOND
+"""Minimum number and usual time [s] of the readings in which a light is dark or flashes."""
+FLASH_SHARE = 0.25
+"""Minimum share of yellow, and of dark, readings of a flashing light, half of which are expected."""
+
+
+class LightStates:
+    """States of lights over several images, as some are misread.
+
+    Red and yellow count from the first reading on, other lamps from the second one in succession. A light is dark if it
+    is in all readings of three periods of flashing lamps, at least three; until then its last state is kept. If some of
+    them are yellow and all others dark, it flashes.
+    """
+
+    def __init__(self) -> None:
+        self._readings: dict[str, list[tuple[float, str]]] = {}
+        """Times and states of the last readings, by the id of the signal, the newest last."""
+        self._states: dict[str, str] = {}
+
+    def confirm(self, readings: Sequence[SignalReading], time: float) -> tuple[SignalReading, ...]:
+        """Return the states of the signals that are read in the images of `time` [s], without those not confirmed."""
+        start = time - SPAN - TIME_TOLERANCE
+        for reading in readings:
+            kept = [*self._readings.get(reading.id, ()), (time, reading.state)]
+            kept = [*(old for old in kept[:-IMAGES] if old[0] >= start), *kept[-IMAGES:]]
+            self._readings[reading.id] = kept
+            confirmed = _confirmed([state for _, state in kept])
+            if confirmed is not None:
+                self._states[reading.id] = confirmed
+        names = (reading.id for reading in readings)
+        return tuple(SignalReading(name, self._states[name]) for name in names if name in self._states)
+
+
+def _confirmed(states: Sequence[str]) -> str | None:
+    """Return the state that these readings of one light confirm, the newest last; None if they confirm no other one."""
+    newest, yellow, dark = states[-1], states.count("yellow"), states.count(DARK)
+    if len(states) >= IMAGES and yellow + dark == len(states):
+        if min(yellow, dark) >= FLASH_SHARE * len(states):
+            return FLASHING_YELLOW
+        if not yellow:
+            return DARK
+    return newest if newest != DARK and (must_stop(newest) or states[-2:-1] == [newest]) else None
 
 
 def signal_kinds(classes: Sequence[str]) -> frozenset[str]:

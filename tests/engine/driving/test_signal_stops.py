@@ -31,6 +31,8 @@ from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.planning.signal_stops import (
     BEFORE_LINE,
+    LONGEST_RED,
+    STANDING,
     WAIT,
     SignalStops,
     can_stop_for_light,
@@ -135,6 +137,61 @@ def test_car_stops_at_the_line_of_a_light_that_no_place_shows() -> None:
     blind.follow(EAST)
     blind.signals.update([SignalReading("east", "red")])
     assert blind.next(50.0, 10.0, 0.0, lambda *place: False) == usual
+
+
+def test_car_that_started_beyond_the_view_of_a_light_stops_and_continues() -> None:
+    """The light of 100 m is in view up to 93 m, the front is at 95 m: at 10 m/s it cannot stop before the line."""
+    roads = street(light("east", 100.0))
+    for speed, expected in ((10.0, False), (0.0, True)):
+        stops = SignalStops(roads, CAR)
+        stops.follow(EAST)
+
+        def holds(now: float, stops: SignalStops = stops, speed: float = speed) -> bool:
+            return stops.next(95.0 - FRONT, speed, now, lambda signal, x, *pose: 50.0 <= x + FRONT <= 93.0) is not None
+
+        assert holds(0.0) == expected
+        assert holds(WAIT - 0.1) == expected
+        assert not holds(WAIT)
+    stops.signals.update([SignalReading("east", "red")])
+    assert holds(WAIT + 1.0), "it is read before the car has started"
+
+
+def test_car_stops_at_a_light_that_it_does_not_read_in_view() -> None:
+    """As in fog: it comes to a stop where it would have the light in view, waits, and continues."""
+    drive = Drive(street(light("east", 120.0)))
+    drive.planner.can_read_light = lambda signal, x, y, z, yaw: 60.0 <= x + FRONT <= 113.0
+    drive.reads = lambda front: False  # type: ignore[method-assign]
+    fronts = np.array([drive.run(0.05, {"east": "red"})[0] for _ in range(400)])
+    standing = np.diff(fronts) < STANDING * 0.05
+    assert 110.0 < fronts[int(np.argmax(standing))] <= 113.0
+    assert np.count_nonzero(standing) * 0.05 == pytest.approx(WAIT, abs=0.6)
+    assert fronts[-1] > 125.0
+    drive.world.close()
+
+
+def test_car_that_reads_red_late_stops_out_of_view_before_the_line() -> None:
+    """From 5 m/s it needs 3 m: 2 m before the end of the view it cannot stop there, but 8.5 m before its line."""
+    stops = SignalStops(street(light("east", 120.0)), CAR)
+    stops.follow(EAST)
+    stops.signals.update([SignalReading("east", "red")])
+
+    def holds(front: float, speed: float, now: float) -> bool:
+        return stops.next(front - FRONT, speed, now, lambda signal, x, *pose: x + FRONT <= 112.5) is not None
+
+    assert holds(110.0, 5.0, 0.0)
+    assert holds(113.5, 0.0, 2.0)
+    assert holds(113.5, 0.0, 2.0 + LONGEST_RED - 0.1)
+    assert not holds(113.5, 0.0, 2.0 + LONGEST_RED)
+
+
+def test_state_of_the_earlier_lap_does_not_count() -> None:
+    """The light of 100 m was green on the first lap; 160 m before it on the second one it is unread."""
+    stops = SignalStops(street(light("east", 100.0)), CAR)
+    stops.follow(np.concatenate([ROUND, ROUND[1:]]))
+    stops.signals.update([SignalReading("east", "green")])
+    assert stops.next(40.0, 10.0, 0.0) is None
+    stops.next(220.0, 10.0, 30.0)
+    assert next(iter(stops.signals.ahead(220.0))).state is None
 
 
 def test_car_without_obey_signals_passes_red() -> None:

@@ -20,6 +20,7 @@ from eidrive_scenario.perception.learned.lights import (
     SHOWN,
     WEIGHTS,
     LightsOnMap,
+    LightStates,
     crops,
     lamp_network,
     signal_kinds,
@@ -177,6 +178,52 @@ def test_light_is_readable_inside_the_image(distance: float, aside: float, reada
     pose = before(CROSSING, "10", distance + 2.0, aside)
     x, y, _ = pose[:3, 3].tolist()
     assert detector.can_read_light("10", x, y, 0.0, math.atan2(pose[1, 2], pose[0, 2])) == readable
+
+
+@pytest.mark.parametrize(
+    ("readings", "confirmed"),
+    [
+        ("R G G R", "R R G R"),  # green is the second in succession, red the first one
+        ("- G - G", "- - - G"),
+        ("G Y R", "- Y R"),
+        ("R o R o o R", "R R R R R R"),  # single misread images
+        ("o o o R", "- - o R"),
+        ("R o o o o", "R R R R o"),  # one per second: 3 s without red
+        ("Y o Y o R", "Y Y F F R"),
+    ],
+)
+def test_light_states_are_confirmed_by_further_images(readings: str, confirmed: str) -> None:
+    """One image per second."""
+    names = {"R": "red", "G": "green", "Y": "yellow", "o": "off", "F": "yellow flashing"}
+    states, reported = LightStates(), []
+    last = "-"
+    for time, letter in enumerate(readings.split()):
+        read = [SignalReading("10", names[letter])] if letter in names else []
+        result = {reading.id: reading.state for reading in states.confirm(read, float(time))}
+        last = next((key for key, name in names.items() if name == result.get("10")), "-")
+        reported.append(last)
+    assert " ".join(reported) == confirmed
+
+
+def test_flashing_yellow_is_recognized_within_two_periods() -> None:
+    """At 10 images per second, half a second lit and half a second dark; then steady yellow and red."""
+    states, reported = LightStates(), []
+    for number in range(100):
+        time = number / 10.0
+        shown = "red" if time >= 8.0 else "yellow" if time >= 4.0 or time % 1.0 < 0.5 else "off"
+        (reading,) = states.confirm([SignalReading("10", shown)], time)
+        reported.append(reading.state)
+    assert set(reported[20:40]) == {"yellow flashing"}
+    assert set(reported[70:80]) == {"yellow"}
+    assert set(reported[80:]) == {"red"}
+
+
+def test_class_without_state_does_not_replace_lamps() -> None:
+    """A second camera, or a network with the class `traffic light` only, does not know the state."""
+    camera = take_image(CROSSING, before(CROSSING, "10", 95.0), {"10": "red"})
+    box = box_around(CROSSING, "10", camera)
+    detected = {"a": found([box], [0.6], ("traffic light red",)), "b": found([box], [0.9], ("traffic light",))}
+    assert SignalReading("10", "red") in LightsOnMap(CROSSING).read(detected, {"a": camera, "b": camera})
 
 
 def test_lamp_network_equals_torch_implementation() -> None:
