@@ -65,7 +65,7 @@ class _Decision:
     distance        of its next stop line in the last tick [m]
     stops           whether the vehicle stops for the light; None: not decided
     yellow_since    time at which the light was first seen in yellow [s]; None in another state
-    standing_since  time at which the vehicle stopped at the sign, or at a light that it has not read [s]; None before
+    standing_since  time at which the vehicle stopped at the sign, or at a light out of its view [s]; None before
     is_served       whether the vehicle has waited there
     back            distance of the stop point from the usual one, so that the light stays in view [m]
     shown           distance before the stop point up to which the light is in view [m]
@@ -127,7 +127,8 @@ class SignalStops:
             if holds(signal, decision, left, speed, now):
                 what = f"{'unread ' if is_unread else ''}traffic light" if signal.kind == "light" else "stop sign"
                 # Without `max`, errors of its position do not move a standing vehicle out of the view of the light.
-                stops.append(StopPoint(along + (left if decision.back else max(left, 0.0)), f"stop at {what} {name}"))
+                held = left if decision.shown < math.inf else max(left, 0.0)
+                stops.append(StopPoint(along + held, f"stop at {what} {name}"))
             elif signal.kind == "light" and decision.is_served:
                 decision.is_served, decision.standing_since = False, None
                 self.signals.update([SignalReading(name, "off")])
@@ -199,7 +200,7 @@ def _light_holds(light: SignalAhead, decision: _Decision, left: float, speed: fl
         # It rather stops where the light is out of view than passes at red.
         way = left if passes_in_time else left + decision.back
         decision.stops = can_stop_for_light(way, speed, passes_in_time=passes_in_time) or speed < STANDING
-    is_in_view = left >= -STEP or not decision.back
+    is_in_view = left >= -STEP or math.isinf(decision.shown)
     return decision.stops and (is_in_view or _sign_holds(light, decision, left, speed, now, LONGEST_RED))
 
 

@@ -227,6 +227,8 @@ DARK = "off"
 FLASHING_YELLOW = "yellow flashing"
 IMAGES, SPAN = 3, 3.0 / FLASHES_PER_SECOND
 """Minimum number and usual time [s] of the readings in which a light is dark or flashes."""
+KEPT = 10
+"""Number of readings that are kept beyond this time, which is too short for lights that are rarely read."""
 FLASH_SHARE = 0.25
 """Minimum share of yellow, and of dark, readings of a flashing light, half of which are expected."""
 
@@ -235,8 +237,8 @@ class LightStates:
     """States of lights over several images, as some are misread.
 
     Red and yellow count from the first reading on, other lamps from the second one in succession. A light is dark if it
-    is in all readings of three periods of flashing lamps, at least three; until then its last state is kept. If some of
-    them are yellow and all others dark, it flashes.
+    is in all of the last ten readings, in those of three periods of flashing lamps, and in three at least; until then
+    its last state is kept. If some of them are yellow and all others dark, it flashes.
     """
 
     def __init__(self) -> None:
@@ -249,7 +251,7 @@ class LightStates:
         start = time - SPAN - TIME_TOLERANCE
         for reading in readings:
             kept = [*self._readings.get(reading.id, ()), (time, reading.state)]
-            kept = [*(old for old in kept[:-IMAGES] if old[0] >= start), *kept[-IMAGES:]]
+            kept = [*(old for old in kept[:-KEPT] if old[0] >= start), *kept[-KEPT:]]
             self._readings[reading.id] = kept
             confirmed = _confirmed([state for _, state in kept])
             if confirmed is not None:

@@ -176,7 +176,7 @@ def test_car_that_reads_red_late_stops_out_of_view_before_the_line() -> None:
     stops.signals.update([SignalReading("east", "red")])
 
     def holds(front: float, speed: float, now: float) -> bool:
-        return stops.next(front - FRONT, speed, now, lambda signal, x, *pose: x + FRONT <= 112.5) is not None
+        return stops.next(front - FRONT, speed, now, lambda signal, x, *pose: 60.0 <= x + FRONT <= 112.5) is not None
 
     assert holds(110.0, 5.0, 0.0)
     assert holds(113.5, 0.0, 2.0)

@@ -188,7 +188,7 @@ def test_light_is_readable_inside_the_image(distance: float, aside: float, reada
         ("G Y R", "- Y R"),
         ("R o R o o R", "R R R R R R"),  # single misread images
         ("o o o R", "- - o R"),
-        ("R o o o o", "R R R R o"),  # one per second: 3 s without red
+        ("R" + 10 * " o", "R" + 9 * " R" + " o"),
         ("Y o Y o R", "Y Y F F R"),
     ],
 )
