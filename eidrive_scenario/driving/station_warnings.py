@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.base.geometry import point_in_polygon
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.driving.agent_factory import build_detector
+from eidrive_scenario.driving.agent_factory import build_detector, selected_extension
 from eidrive_scenario.driving.planner_settings import REACTION, Polygon
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.station_declarations import possible_drivers, property_line, station_controller
@@ -74,11 +74,13 @@ BACK, STEP = 100.0, 5.0
 def lights_out_of_view(
     scenario: Scenario, settings: Mapping[str, AgentSettings], roads: RoadNetwork | None
 ) -> Iterator[Diagnostic]:
-    """Yield a warning for each driving station that obeys traffic lights, and whose cameras show none of the map."""
+    """Yield a warning for each driving station that reads traffic lights by itself, and whose cameras show none of the
+    map."""
     lines = [line for line in stop_lines(roads) if line.kind == "light"] if roads is not None else []
     for name in possible_drivers(scenario, settings) if lines else ():
         station = settings[name]
-        if not station.obey_signals:
+        kind, _ = selected_extension(station, "detector", Detector)
+        if not station.obey_signals or "light" not in kind.detectable_signals:
             continue
         detector = build_detector(station)
         sensors = station.rig_sensors(detector.needs, detector.default_sensors)

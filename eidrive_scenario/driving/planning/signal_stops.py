@@ -144,8 +144,8 @@ class SignalStops:
         """Return how far before its usual place a vehicle at distance `along` of the path has a light in view [m], and
         from there up to which distance.
 
-        0 and inf if it has it in view nowhere, or in one place only. One step more is for errors of the position and of
-        the control.
+        0 and inf if it has it in view nowhere, or in one place only. Two steps more are for errors of the position and
+        of the control.
         """
         if signal.kind != "light" or can_read is None:
             return 0.0, math.inf
@@ -157,7 +157,7 @@ class SignalStops:
         if nearest is None:
             return 0.0, math.inf
         hidden = next((back for back, shown in views if not shown), math.inf)
-        back = nearest + STEP if nearest else 0.0
+        back = nearest + 2.0 * STEP if nearest else 0.0
         shown = hidden - STEP - back
         return (back, shown) if shown > 0.0 else (0.0, math.inf)
 
