@@ -109,8 +109,6 @@ RELEASE = 0.75
 ALMOST_AT_REST = 1.5
 """Speed below which emergency braking goes on until the vehicle stands [m/s]: walking pace, from which it stops within
 a few decimeters, whereas it would creep on into the way of what it brakes for."""
-CRUISE = Proposal(0, 1.0, "all", 4.0)
-"""Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
 NEAR_PLACE = 1.0
 """Distance from its place of waiting within which a vehicle waits there [m]."""
 VIEW_TIME_GAP = 2.0
@@ -147,6 +145,8 @@ class Decider:
         self._roller = Roller(settings, times, spec.max_acceleration)
         self._body = body
         self._emergency = min(settings.emergency_deceleration, spec.max_deceleration)
+        self._cruise = Proposal(0, 1.0, "all", settings.hard_deceleration)
+        """Proposal at the wanted speed, by whose motion the use of an oncoming lane is verified."""
         self._current: LateralProfile | None = None
         self._switched = -math.inf
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
@@ -383,8 +383,8 @@ class Decider:
         """Return the motion along a profile at the wanted speed, with a time gap behind leaders [s]."""
         way = inside_way(scene, profile, self._body.half_width)
         crossing = conflicts(scene, way, situation.s)
-        leads = leading(scene, way, crossing, situation.center, CRUISE.precedence)
-        rolled = self._roll(situation, scene, [Option(CRUISE, profile, situation.stops, leads, time_gap)])
+        leads = leading(scene, way, crossing, situation.center, self._cruise.precedence)
+        rolled = self._roll(situation, scene, [Option(self._cruise, profile, situation.stops, leads, time_gap)])
         return Motion(rolled.s[0], rolled.speed[0])
 
     def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:
