@@ -10,7 +10,13 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
-from eidrive_scenario.driving.planning.behavior.maneuvers import Situation, extended, may_pass, passing_profiles
+from eidrive_scenario.driving.planning.behavior.maneuvers import (
+    KEEP_CLEAR,
+    Situation,
+    extended,
+    may_pass,
+    passing_profiles,
+)
 from eidrive_scenario.driving.planning.behavior.merging import (
     MERGING_TIME_GAP,
     TimeGap,
@@ -210,7 +216,9 @@ class Decider:
             threat = options.uncertain_threat(best, scene.certain, is_hard=is_hard)
             if threat is not None:
                 return self._without_hard_braking(situation, scene, options, threat)
-        is_waiting = options.options[best].proposal.profile in options.waiting
+        chosen = options.options[best]
+        keeps_clear = any(wall.reason == KEEP_CLEAR for wall in chosen.walls)
+        is_waiting = keeps_clear or chosen.proposal.profile in options.waiting
         if not is_waiting and self._walking_pace.is_due(situation, options, best):
             slow = self._at_walking_pace(situation, profiles)
             if slow is not None:

@@ -141,7 +141,7 @@ class Situation(msgspec.Struct, frozen=True):
         length = {scene.owner[row]: 2.0 * scene.half_length[row, 0] + self.settings.standstill_gap for row in between}
         place = end - sum(length.values()) - self.settings.standstill_gap - self.body.front
         wall = self.outside_junctions(place)
-        return [Wall(wall, math.inf, "keep a junction clear")] if wall < place else []
+        return [Wall(wall, math.inf, KEEP_CLEAR)] if wall < place else []
 
     @property
     def stops(self) -> list[Wall]:
@@ -206,6 +206,8 @@ class Situation(msgspec.Struct, frozen=True):
         return max(min(math.sqrt(self.speed**2 + gain), self.wanted, limit), self.speed)
 
 
+KEEP_CLEAR = "keep a junction clear"
+"""Reason to wait before a junction behind which traffic stands."""
 LATE_STOP = 1.0
 """Distance by which a stop before a junction that has begun may come too late [m]."""
 VIEWED = 10.0

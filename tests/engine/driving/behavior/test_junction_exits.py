@@ -20,11 +20,18 @@ SAMPLING = 1.0
 """Maximum error of the extent of a junction along the way [m]."""
 
 
-def drive(seconds: float, *queue: KnownBox, leaves: float = 1e9) -> PlannedDrive:
-    """Return a drive from x = -30 m on behind cars with a front at x; they drive away at a time [s]."""
-    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
-    run = PlannedDrive(behavior(roads, 8.0, lane_changes=False), roads, speed=8.0, start=-30.0, y=0.0)
-    run.run(seconds, lambda now: [_moved(car, now, leaves) for car in queue])
+def drive(
+    seconds: float,
+    *queue: KnownBox,
+    seen: float = 0.0,
+    leaves: float = 1e9,
+    road: str = "four_way_junction",
+    lane_changes: bool = False,
+) -> PlannedDrive:
+    """Return a drive from x = -30 m on behind cars, which are first seen and drive away at these times [s]."""
+    roads = RoadNetwork.load(library_path() / "roads" / f"{road}.xodr")
+    run = PlannedDrive(behavior(roads, 8.0, lane_changes=lane_changes), roads, speed=8.0, start=-30.0, y=0.0)
+    run.run(seconds, lambda now: [_moved(car, now, leaves) for car in queue if now >= seen])
     run.world.close()
     return run
 
@@ -64,6 +71,19 @@ def test_space_behind_the_junction_belongs_to_the_car_ahead() -> None:
     cars = standing(EXIT + SPACE), KnownBox(40.0, 0.0, vx=1.0)
     run = drive(10.0, *cars)
     assert any("clear" in reason for reason in run.reasons)
+
+
+@pytest.mark.parametrize("seen", [0.0, 0.5])
+def test_standing_queue_is_passed_in_the_free_lane_beside_it(seen: float) -> None:
+    """After 20 s the cars behind the junction of two lanes count as parked; up to then the vehicle waits."""
+    cars = standing(EXIT + 5.0), standing(EXIT + 13.0)
+    run = drive(40.0, *cars, seen=seen, road="four_way_signals", lane_changes=True)
+    x, y, speed = np.array(run.path).T
+    yaw = np.unwrap(np.arctan2(np.gradient(y), np.maximum(np.gradient(x), 1e-3)))
+    # Limit of comfort of nuPlan
+    assert np.abs(speed * np.gradient(yaw, 0.05)).max() < 4.89
+    assert x[round(15.0 / 0.05)] + FRONT < ENTRY
+    assert run.front > EXIT + 30.0
 
 
 @pytest.mark.parametrize(
