@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 LIMIT = 500
 """Default maximum number of runs."""
 
@@ -16,6 +18,16 @@ class Decision(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """Properties of a test at one true success rate: probabilities of the decisions and mean number of runs."""
+
+    passed: float
+    failed: float
+    undecided: float
+    mean_runs: float
 
 
 @dataclass(frozen=True)
@@ -80,6 +92,31 @@ class RatioTest:
         if ratio >= high:
             return Decision.FAILED
         return Decision.UNDECIDED if trials >= self.limit else None
+
+    def characteristics(self, rate: float) -> Characteristics:
+        """Return the properties at a true rate, exact by recursion over the number of failures after each run.
+
+        Raise ValueError for a rate out of [0, 1].
+        """
+        if not 0.0 <= rate <= 1.0:
+            raise ValueError(f"rate: not between 0 and 1 (got {rate})")
+        low, high = self.bounds
+        waiting = np.ones(1)
+        passed = failed = mean = 0.0
+        for trials in range(1, self.limit + 1):
+            mean += float(waiting.sum())
+            after = np.zeros(len(waiting) + 1)
+            after[:-1] += rate * waiting
+            after[1:] += (1.0 - rate) * waiting
+            failures = np.arange(len(after))
+            ratio = (trials - failures) * self.step_of_success + failures * self.step_of_failure
+            passed += float(after[ratio <= low].sum())
+            failed += float(after[ratio >= high].sum())
+            after[(ratio <= low) | (ratio >= high)] = 0.0
+            waiting = after
+            if waiting.sum() < 1e-15:
+                break
+        return Characteristics(passed, failed, float(waiting.sum()), mean)
 
 
 def success_rate(

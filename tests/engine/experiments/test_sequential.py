@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -14,37 +13,6 @@ from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTe
 
 WALD = RatioTest(good=0.95, bad=0.80, limit=2000)
 SERIES = 2000
-
-
-@dataclass(frozen=True)
-class Characteristics:
-    """Properties of a test at one true success rate: probabilities of the decisions and mean number of runs."""
-
-    passed: float
-    failed: float
-    undecided: float
-    mean_runs: float
-
-
-def characteristics(test: RatioTest, rate: float) -> Characteristics:
-    """Return the properties of a test at a true rate, by recursion over the number of failures after each run."""
-    low, high = test.bounds
-    waiting = np.ones(1)
-    passed = failed = mean = 0.0
-    for trials in range(1, test.limit + 1):
-        mean += float(waiting.sum())
-        after = np.zeros(len(waiting) + 1)
-        after[:-1] += rate * waiting
-        after[1:] += (1.0 - rate) * waiting
-        failures = np.arange(len(after))
-        ratio = (trials - failures) * test.step_of_success + failures * test.step_of_failure
-        passed += float(after[ratio <= low].sum())
-        failed += float(after[ratio >= high].sum())
-        after[(ratio <= low) | (ratio >= high)] = 0.0
-        waiting = after
-        if waiting.sum() < 1e-15:
-            break
-    return Characteristics(passed, failed, float(waiting.sum()), mean)
 
 
 def first_decision(test: RatioTest, outcomes: np.ndarray) -> tuple[Decision, int]:
@@ -89,7 +57,7 @@ def test_decision_fails_up_to_known_number_of_runs(failures: int, fails_up_to: i
 )
 def test_characteristics_equal_exact_ones_of_other_program(rate: float, passed: float, runs: float) -> None:
     """Probability to accept and mean number of runs without truncation, from a recursion in other code."""
-    found = characteristics(WALD, rate)
+    found = WALD.characteristics(rate)
     assert found.passed == pytest.approx(passed, abs=6e-6)
     assert found.mean_runs == pytest.approx(runs, abs=6e-3)
     assert found.passed + found.failed + found.undecided == pytest.approx(1.0, abs=1e-9)
@@ -113,7 +81,7 @@ def test_errors_of_simulated_series_are_within_promised_ones(
     record_property("mean_runs", f"{mean:.1f}")
     record_property("runs_of_fixed_size", 50)
     assert mean < 50.0
-    exact = characteristics(test, rate)
+    exact = test.characteristics(rate)
     assert mean == pytest.approx(exact.mean_runs, rel=0.06)
 
 
@@ -121,7 +89,7 @@ def test_undecided_at_limit_keeps_error_rates() -> None:
     """With few runs the test is often undecided, and is wrong at most as often as without a limit."""
     short = RatioTest(good=0.95, bad=0.80, limit=25)
     assert short.decision(23, 25) is Decision.UNDECIDED
-    good, bad = characteristics(short, 0.95), characteristics(short, 0.80)
+    good, bad = short.characteristics(0.95), short.characteristics(0.80)
     assert good.undecided > 0.2
     assert good.failed <= 0.05
     assert bad.passed <= 0.05
@@ -130,20 +98,20 @@ def test_undecided_at_limit_keeps_error_rates() -> None:
 
 def test_characteristics_at_certain_rates() -> None:
     """Without failures the test passes after 18 runs; with failures only it fails after 3."""
-    assert characteristics(WALD, 1.0).mean_runs == 18.0
-    assert characteristics(WALD, 1.0).passed == 1.0
-    assert characteristics(WALD, 0.0).mean_runs == 3.0
-    assert characteristics(WALD, 0.0).failed == 1.0
+    assert WALD.characteristics(1.0).mean_runs == 18.0
+    assert WALD.characteristics(1.0).passed == 1.0
+    assert WALD.characteristics(0.0).mean_runs == 3.0
+    assert WALD.characteristics(0.0).failed == 1.0
 
 
 def test_success_rate_rarely_passes_below_required_rate() -> None:
     """The guarantee of a pass holds at the required rate itself, that of a failure at the expected one."""
     test = success_rate(0.9, confidence=0.95, limit=2000)
     assert (test.bad, test.good) == (0.9, 0.95)
-    assert characteristics(test, 0.9).passed <= 0.05
-    assert characteristics(test, 0.85).passed <= 0.05
-    assert characteristics(test, 0.95).failed <= 0.05
-    assert characteristics(success_rate(0.9, expected=0.99), 0.99).mean_runs < characteristics(test, 0.99).mean_runs
+    assert test.characteristics(0.9).passed <= 0.05
+    assert test.characteristics(0.85).passed <= 0.05
+    assert test.characteristics(0.95).failed <= 0.05
+    assert success_rate(0.9, expected=0.99).characteristics(0.99).mean_runs < test.characteristics(0.99).mean_runs
 
 
 @pytest.mark.parametrize(
