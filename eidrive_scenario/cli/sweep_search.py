@@ -124,7 +124,8 @@ class Search:
             self._falsify(plan, execute)
         else:
             self._find_boundary(plan, self.boundary, execute)
-        for run in list(unjudged.values())[:1]:
+        if unjudged:
+            run = next(iter(unjudged.values()))
             echo(f"{len(unjudged)} runs have no verdict and do not count: {run.status}: {run.error}", err=True)
 
     def _find_boundary(self, plan: SweepPlan, axis: Axis, execute: Execute) -> None:

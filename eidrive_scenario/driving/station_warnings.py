@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,14 @@ from eidrive_scenario.driving.agent_factory import build_detector, selected_exte
 from eidrive_scenario.driving.planner_settings import REACTION, Polygon
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.station_declarations import possible_drivers, property_line, station_controller
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import Diagnostic, ErrorSubject
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.traffic_lights import stop_lines
+from eidrive_scenario.perception.traffic_lights import StopLine, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
 from eidrive_scenario.v2x.profile import ChannelProfile
+from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
 
@@ -78,24 +79,8 @@ def lights_out_of_view(
     map."""
     lines = [line for line in stop_lines(roads) if line.kind == "light"] if roads is not None else []
     for name in possible_drivers(scenario, settings) if lines else ():
-        station = settings[name]
-        kind, _ = selected_extension(station, "detector", Detector)
-        if not station.obey_signals or "light" not in kind.detectable_signals:
-            continue
-        detector = build_detector(station)
-        sensors = station.rig_sensors(detector.needs, detector.default_sensors)
-        detector.setup(DetectorContext(actor_spec(name, scenario.entities[name]), sensors, roads))
-        if not any(
-            detector.can_read_light(
-                line.signal,
-                line.x - back * math.cos(line.heading),
-                line.y - back * math.sin(line.heading),
-                line.z,
-                line.heading,
-            )
-            for line in lines
-            for back in np.arange(0.0, BACK, STEP).tolist()
-        ):
+        station, spec = settings[name], actor_spec(name, scenario.entities[name])
+        if station.obey_signals and not ErrorSubject(f"station {name!r}").call(_can_read, station, spec, roads, lines):
             controller = station_controller(scenario, name)
             yield Diagnostic(
                 f"{name!r} passes red lights: its cameras show no traffic light of the map to a vehicle before it",
@@ -103,6 +88,27 @@ def lights_out_of_view(
                 controller.source,
                 property_line(controller, "sensors", "obey_signals"),
             )
+
+
+def _can_read(station: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, lights: Sequence[StopLine]) -> bool:
+    """Return whether the detector of a station would have one of these lights in view, or takes lights from the map."""
+    kind, _ = selected_extension(station, "detector", Detector)
+    if "light" not in kind.detectable_signals:
+        return True
+    detector = build_detector(station)
+    sensors = station.rig_sensors(detector.needs, detector.default_sensors)
+    detector.setup(DetectorContext(spec, sensors, roads))
+    return any(
+        detector.can_read_light(
+            light.signal,
+            light.x - back * math.cos(light.heading),
+            light.y - back * math.sin(light.heading),
+            light.z,
+            light.heading,
+        )
+        for light in lights
+        for back in np.arange(0.0, BACK, STEP).tolist()
+    )
 
 
 def short_channel_delay(

@@ -173,6 +173,16 @@ class Route:
         heading = math.atan2(y[1] - y[0], x[1] - x[0])
         return pose.turned(wrap_angle(heading - pose.h))
 
+    def s_along(self, location: LaneLocation) -> float | None:
+        """Return the distance along the route to the road and s of a location, or None if the route misses it."""
+        _, along, owner, places = self._path
+        for number, leg in enumerate(self.legs):
+            if leg.contains(location):
+                on_leg = np.flatnonzero(owner == number)
+                order = places[on_leg] * leg.direction
+                return float(np.interp(location.s * leg.direction, order, along[on_leg]))
+        return None
+
     def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
         """Return the distances from a to b ahead and to the left along the reference lines of the route [m].
 

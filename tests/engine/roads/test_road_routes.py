@@ -157,6 +157,8 @@ def test_route_passes_intermediate_locations() -> None:
 
 def test_locations_along_a_route(crossing: RoadNetwork) -> None:
     route = crossing.route(crossing.location("3", 3, 25.0), crossing.location("4", 3, 30.0))
+    assert route.s_along(crossing.location("3", 3, 5.0)) == pytest.approx(20.0)
+    assert route.s_along(crossing.location("1", -1, 5.0)) is None
     assert route.project(28.5, 20.0) == pytest.approx((19.5, -1.0))
     assert route.project(30.0, 20.0, near=15.0) == pytest.approx((19.5, 0.5))
     pose = route.pose_at(30.0)

@@ -70,8 +70,6 @@ class Situation(msgspec.Struct, frozen=True):
     """Next lane change that the route requires."""
     passages: tuple[Passage, ...] = ()
     """Current and next passages of junctions."""
-    crossings: tuple[Passage, ...] = ()
-    """Those of junctions with cross traffic."""
 
     @property
     def junction(self) -> float:
@@ -111,18 +109,19 @@ class Situation(msgspec.Struct, frozen=True):
     def lanes_along(self, profile: LateralProfile) -> LanesBeside:
         """Return the lanes beside the line shortly ahead, or, if none of these is of the opposite direction, as in a
         junction, beside what a profile passes."""
-        beside = [self.lanes_ahead, *map(self.line.lanes_beside, profile.places[-3:-1])]
-        return next((lanes for lanes in beside if not math.isnan(lanes.oncoming)), self.lanes_ahead)
+        ahead = self.lanes_ahead
+        beside = (ahead, *map(self.line.lanes_beside, profile.places[-3:-1]))
+        return next((lanes for lanes in beside if not math.isnan(lanes.oncoming)), ahead)
 
-    def outside_junctions(self, place: float) -> float:
-        """Return the place at which the vehicle stops instead of at `place`, where it would obstruct the cross traffic
+    def outside_junctions(self, stop: float) -> float:
+        """Return the place at which the vehicle stops instead of at `stop`, where it would obstruct the cross traffic
         of junctions [m]; those that it cannot stop before any more count as passed."""
-        stop = self.s + self.speed**2 / (2.0 * self.settings.comfortable_deceleration) - LATE_STOP
-        for passage in reversed(self.crossings):
+        nearest = self.s + self.speed**2 / (2.0 * self.settings.comfortable_deceleration) - LATE_STOP
+        for passage in reversed(self.passages):
             before = passage.entry - BEFORE_ZONE - self.body.front
-            if place - self.body.rear < passage.end and place > before >= stop:
-                place = before
-        return place
+            if passage.is_crossed and stop - self.body.rear < passage.end and stop > before >= nearest:
+                stop = before
+        return stop
 
     def clear_of_junctions(self, scene: Surroundings, way: Bools) -> list[Wall]:
         """Return the wall before the junctions that the vehicle would not leave before it stops behind a queue.
@@ -130,7 +129,7 @@ class Situation(msgspec.Struct, frozen=True):
         The vehicles that still move in its way (N, K) will stand there, too (section 11 of the German road traffic
         rules: traffic does not enter a junction in which it would have to wait).
         """
-        if not self.crossings:
+        if not self.passages:
             return []
         ahead = way[:, 0] & scene.may_lead[:, 0] & (scene.rear[:, 0] > self.front) & scene.certain
         stands = ahead & (np.abs(scene.speed[:, 0]) < STILL)
@@ -138,10 +137,11 @@ class Situation(msgspec.Struct, frozen=True):
             return []
         end = float((scene.rear[stands, 0] - scene.passing_gap[stands]).min())
         between = np.flatnonzero(ahead & ~stands & (scene.rear[:, 0] < end))
+        # By object, which may have several hypotheses.
         length = {scene.owner[row]: 2.0 * scene.half_length[row, 0] + self.settings.standstill_gap for row in between}
-        place = end - sum(length.values()) - self.settings.standstill_gap - self.body.front
-        wall = self.outside_junctions(place)
-        return [Wall(wall, math.inf, KEEP_CLEAR)] if wall < place else []
+        behind_queue = end - sum(length.values()) - self.settings.standstill_gap - self.body.front
+        before_junction = self.outside_junctions(behind_queue)
+        return [Wall(before_junction, math.inf, KEEP_CLEAR)] if before_junction < behind_queue else []
 
     @property
     def stops(self) -> list[Wall]:

@@ -273,7 +273,6 @@ class BehaviorPlanner(RoutePlanner):
             hidden=hidden,
             change=self._change(line, s),
             passages=passages,
-            crossings=tuple(filter(self._rules.has_cross_traffic, passages)) if self._rules is not None else (),
         )
         return self._decider.decide(situation)
 

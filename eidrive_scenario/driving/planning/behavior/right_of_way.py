@@ -38,6 +38,7 @@ class Passage(NamedTuple):
     start, end  distances along the way [m];  heading  at the entry [rad];  turn  change of heading, left positive [rad]
     entry       distance along the way of its stop line, or its start without one [m]
     gives_way   whether a stop sign or a sign to give way stands before it;  has_light  whether a light controls it
+    is_crossed  whether ways cross its direction, other than where lanes only part or join, as on motorways
     road        connecting road in a junction with priorities of the map; None in other junctions
     """
 
@@ -49,6 +50,7 @@ class Passage(NamedTuple):
     turn: float
     gives_way: bool
     has_light: bool
+    is_crossed: bool
     road: str | None = None
 
 
@@ -63,8 +65,7 @@ class JunctionRules:
         self._priorities: Mapping[str, frozenset[tuple[str, str]]] = {
             junction.id: frozenset(junction.priorities) for junction in roads.junctions.values() if junction.priorities
         }
-        self._headings: dict[str, Array] = {}
-        """Headings of the roads through each junction at their ends [rad]."""
+        self._headings_in: dict[str, Array] = {}
         self._right = 1.0 if all(road.rule == "RHT" for road in roads.roads.values()) else -1.0
         """Sign of angles, which are exchanged with traffic on the left."""
 
@@ -105,8 +106,18 @@ class JunctionRules:
             kinds = {kind for _, kind in lines}
             entry = min(max((place for place, _ in lines), default=start), start)
             gives_way, has_light = bool(kinds - {"light"}), "light" in kinds
-            passages.append(Passage(junction, entry, start, end, before, turn, gives_way, has_light, road))
+            is_crossed = bool((np.abs(np.sin(self._headings(junction) - before)) > CROSSING).any())
+            passages.append(Passage(junction, entry, start, end, before, turn, gives_way, has_light, is_crossed, road))
         return tuple(passages)
+
+    def _headings(self, junction: str) -> Array:
+        """Return the headings of the roads through a junction at their ends [rad]."""
+        headings = self._headings_in.get(junction)
+        if headings is None:
+            inside = [road for road in self._roads.roads.values() if road.junction_id == junction]
+            ends = [(road.id, s) for road in inside for s in (0.0, road.length)]
+            headings = self._headings_in[junction] = np.array([self._roads.road_pose_at(*end).h for end in ends])
+        return headings
 
     def _lines_near(self, points: Array) -> list[StopLine]:
         """Return the stop lines in the extent of a way (M, 2)."""
@@ -130,17 +141,6 @@ class JunctionRules:
         if own.has_light or abs(relation) <= ALIKE:
             return False
         return relation > 0.0
-
-    def has_cross_traffic(self, own: Passage) -> bool:
-        """Return whether ways through a junction cross the direction of a passage, other than where lanes only part or
-        join, as on motorways."""
-        headings = self._headings.get(own.junction)
-        if headings is None:
-            inside = [road for road in self._roads.roads.values() if road.junction_id == own.junction]
-            ends = [(road.id, s) for road in inside for s in (0.0, road.length)]
-            headings = np.array([self._roads.road_pose_at(*end).h for end in ends])
-            self._headings[own.junction] = headings
-        return bool((np.abs(np.sin(headings - own.heading)) > CROSSING).any())
 
     def may_cross(self, own: Passage, other: Passage) -> bool:
         """Return whether traffic that cannot be seen may cross on another passage of the same junction.

@@ -98,4 +98,4 @@ def test_only_junctions_with_cross_traffic_are_kept_clear(
 ) -> None:
     rules = JunctionRules(RoadNetwork.load(library_path() / "roads" / f"{name}.xodr"))
     passages = rules.passages(np.linspace(first, last, 200))
-    assert [rules.has_cross_traffic(passage) for passage in passages] == [expected]
+    assert [passage.is_crossed for passage in passages] == [expected]
