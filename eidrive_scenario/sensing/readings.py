@@ -39,8 +39,8 @@ class EgoState(msgspec.Struct, frozen=True, gc=False):
 class TruthReading(msgspec.Struct, frozen=True, gc=False):
     """Objects in the line of sight of a truth sensor: the input of the oracle detector.
 
-    names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) [m/s], visibility (N,) share
-    of the sampled points of each object that are in sight, in (0, 1]
+    names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) of their centers [m/s],
+    visibility (N,) share of the sampled points of each object that are in sight, in (0, 1]
     """
 
     names: tuple[str, ...]

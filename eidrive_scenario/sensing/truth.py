@@ -85,11 +85,15 @@ def _reading(sensor: TruthSensor, targets: Sequence[int], shares: Sequence[float
     least = sensor.settings.visibility - 1e-9
     seen = [(row, share) for row, share in zip(targets, shares, strict=True) if share >= least]
     rows = np.array([row for row, _ in seen], dtype=np.intp)
+    boxes = view.boxes.take(rows, axis=0)
+    # The center of a box moves sideways in a turn, unlike the rear axle.
+    x, y = (boxes[:, :2] - view.position.take(rows, axis=0)[:, :2]).T
+    turning = view.yaw_rate.take(rows)[:, None] * np.column_stack([-y, x])
     return TruthReading(
         names=tuple([view.names[row] for row, _ in seen]),
         categories=tuple([view.categories[row] for row, _ in seen]),
-        boxes=view.boxes.take(rows, axis=0),
-        velocity=view.velocity.take(rows, axis=0)[:, :2],
+        boxes=boxes,
+        velocity=view.velocity.take(rows, axis=0)[:, :2] + turning,
         visibility=np.array([share for _, share in seen]),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -100,6 +101,17 @@ def test_truth_reading_equals_view(boxes: Any) -> None:
     assert reading.truth.categories == ("truck",)
     np.testing.assert_array_equal(reading.truth.boxes, view.boxes[1:])
     np.testing.assert_array_equal(reading.truth.velocity, [[3.0, -1.0]])
+
+
+def test_truth_velocity_is_that_of_the_center(boxes: Any) -> None:
+    """A car drives along y with its rear axle on a circle of 12 m; its center is 1.35 m ahead, on a larger circle."""
+    view = boxes.view({"Ego": (0, 0, 0), "Car": (15, 0, math.pi / 2)}, velocity={"Car": (0.0, 6.0)})
+    view = msgspec.structs.replace(
+        view, yaw_rate=np.array([0.0, 6.0 / 12.0]), offset=np.array([[0.0, 0.0, 0.75], [1.35, 0.0, 0.75]])
+    )
+    truth = Rig(boxes.spec("Ego"), {"truth": TruthSettings()}).read(boxes.scene(view), view).truth
+    assert truth is not None
+    np.testing.assert_allclose(truth.velocity, [[-1.35 / 12.0 * 6.0, 6.0]])
 
 
 def test_read_all_casts_one_batch_with_individual_results(boxes: Any) -> None:
