@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
 from functools import cached_property
-from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
-from eidrive_scenario.driving.planning.behavior.right_of_way import Course, JunctionRules, LaneCourses, Passage
+from eidrive_scenario.driving.planning.behavior.right_of_way import (
+    Course,
+    JunctionRules,
+    LaneCourses,
+    Passage,
+    in_turn,
+)
 from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
@@ -144,8 +149,7 @@ class ConflictWays:
             if len(before) > 1:
                 longer = ([key, *chain] for key in before)
                 chains = [self._upstream(extended, length + self._lane_length(extended[0])) for extended in longer]
-                # In turn, so that each of the preceding lanes is among the first ones.
-                return [more for turn in zip_longest(*chains) for more in turn if more is not None][:MOST]
+                return in_turn(chains)[:MOST]
             chain = [before[0], *chain]
             length += self._lane_length(before[0])
         return [chain]

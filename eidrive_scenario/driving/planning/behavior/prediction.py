@@ -17,6 +17,7 @@ from eidrive_scenario.driving.planning.behavior.right_of_way import (
     JunctionRules,
     LaneCourses,
     Passage,
+    in_turn,
 )
 from eidrive_scenario.driving.planning.path import ALIGNED
 from eidrive_scenario.driving.planning.signal_stops import COMFORTABLE, PERCEPTION
@@ -217,9 +218,12 @@ class Predictor:
         x, y, z = np.array([(objects[index].x, objects[index].y, objects[index].z) for index in moving]).T.copy()
         rows, _, owners = self._roads.overlapped_lanes(x, y, None if self._level else z)
         drivable = self._roads.tables.lane_drivable
+        alternatives: list[list[tuple[Course, ...]]] = [[] for _ in moving]
         for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
             if drivable[row]:
-                lanes[moving[owner]] += self._courses.ahead(row)
+                alternatives[owner].append(self._courses.ahead(row))
+        for index, groups in zip(moving, alternatives, strict=True):
+            lanes[index] = in_turn(groups)
         return lanes
 
 

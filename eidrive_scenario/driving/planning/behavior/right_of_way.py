@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from itertools import zip_longest
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -193,6 +194,8 @@ SIMILAR_TURN = 0.6
 MOST = 4
 """Maximum number of courses from one lane."""
 
+Element = TypeVar("Element")
+
 
 FASTEST_TURN, FASTEST_STOP = 4.0, 2.0
 """Maximum lateral acceleration in a curve, and deceleration before it, of a vehicle that is expected to follow a course
@@ -286,6 +289,11 @@ class Course:
         return x + ahead * ux - left * uy, y + ahead * uy + left * ux, heading
 
 
+def in_turn(groups: Sequence[Sequence[Element]]) -> list[Element]:
+    """Return the elements of groups in turn, so that each group is among the first ones."""
+    return [element for turn in zip_longest(*groups) for element in turn if element is not None]
+
+
 class LaneCourses:
     """Courses of all lanes of a road network, computed when they are first needed."""
 
@@ -315,10 +323,8 @@ class LaneCourses:
             if not branches:
                 break
             if len(branches) > 1:
-                chains: list[list[LaneKey]] = []
-                for branch in branches:
-                    chains += self._chains([*chain, branch.lane], length + self._length(branch.lane))
-                return chains[:MOST]
+                longer = ((branch.lane, length + self._length(branch.lane)) for branch in branches)
+                return in_turn([self._chains([*chain, lane], total) for lane, total in longer])[:MOST]
             chain = [*chain, branches[0].lane]
             length += self._length(branches[0].lane)
         return [chain]

@@ -255,3 +255,15 @@ def test_turn_stays_predicted_until_it_is_over(speed: float, late: float) -> Non
         assert (prediction.y[:, -1] < -20.0).any(), time
         # It has left the lane straight ahead by then, and does not drift out of the others.
         assert time < 1.25 or (prediction.y[:, -1] < -20.0).all(), time
+
+
+def test_vehicle_in_a_roundabout_may_take_the_next_exit() -> None:
+    """Each exit doubles the number of alternatives; those at the next exit come first."""
+    roads = RoadNetwork.load(library_path() / "roads" / "roundabout.xodr")
+    pose = roads.lane_pose_at("8", -1, 4.0)
+    box = KnownBox(pose.x, pose.y, 6.0 * math.cos(pose.h), 6.0 * math.sin(pose.h), yaw=pose.h)
+    prediction = Predictor(roads, TIMES).predict(known(box))
+    # The circle of 20 m around (54, 1.75); the next exit leads to the west.
+    from_center = np.hypot(prediction.x[:, -1] - 54.0, prediction.y[:, -1] - 1.75)
+    assert from_center.min() == pytest.approx(20.0, abs=0.5)
+    assert prediction.x[from_center.argmax(), -1] < 20.0
