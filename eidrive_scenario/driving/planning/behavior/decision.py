@@ -397,7 +397,7 @@ class Decider:
 
     def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:
         limits = SpeedLimits(situation.line.along, situation.limits, situation.wanted)
-        return self._roller.roll(options, limits, situation.motion, (self._body.front, self._body.center), scene)
+        return self._roller.roll(options, limits, situation.motion, self._body, scene)
 
     def _verified(
         self, situation: Situation, scene: Surroundings, profile: LateralProfile

@@ -111,6 +111,16 @@ class LateralProfile(msgspec.Struct, frozen=True):
         """Offset at which the vehicle is at the edge of its lane, from where it sees past what it overtakes [m]."""
         return self.side * (self.border - AT_OFFSET)
 
+    def bends(self, lateral_acceleration: float, wanted: float) -> tuple[tuple[float, float, float], ...]:
+        """Return the places between which a lateral motion allows less than the wanted speed with this peak
+        acceleration [m/s²], and that speed [m/s]."""
+        bends = []
+        for begin, end, before, after in zip(self.places, self.places[1:], self.values, self.values[1:], strict=False):
+            speed = (end - begin) / max(math.sqrt(PEAK_ACCELERATION * abs(after - before) / lateral_acceleration), 1e-9)
+            if speed < wanted:
+                bends.append((begin, end, speed))
+        return tuple(bends)
+
     @property
     def last(self) -> float:
         """Offset at the end of the maneuver [m]."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.proposals import Option, Proposal, Wall
+from eidrive_scenario.driving.planning.behavior.proposals import HASTY, Body, Option, Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -23,6 +23,8 @@ on is that of a leading hypothesis."""
 BEFORE = 1e9
 """Length of the line before its first point, where the first limit holds [m]."""
 
+Bend = tuple[float, float, float]
+"""Begin and end of a lateral motion [m], and the speed that it allows [m/s]."""
 WallsOverTime = list[list[tuple[int, float]]]
 """Causes and places of the walls at each time [m]."""
 
@@ -66,17 +68,21 @@ def walls_over_time(walls: Sequence[Wall], times: list[float]) -> WallsOverTime:
 
 
 class Bounds:
-    """Speeds that the wanted speed, speed limits and walls allow to one proposal.
+    """Speeds that the wanted speed, speed limits, lateral motions and walls allow to one proposal.
 
-    wanted  wanted speed [m/s];  gain  twice the deceleration before a wall [m/s²]
+    wanted  wanted speed [m/s];  gain  twice the deceleration before a wall or a lateral motion [m/s²]
+    bends   begin and end of lateral motions, as distances of the reference point [m], and their speeds [m/s]
     """
 
-    def __init__(self, wanted: float, limits: LimitsAhead | None, walls: WallsOverTime, gain: float) -> None:
+    def __init__(
+        self, wanted: float, limits: LimitsAhead | None, walls: WallsOverTime, gain: float, bends: Sequence[Bend] = ()
+    ) -> None:
         self.wanted = wanted
-        self.are_free = wanted <= 0.0 or (limits is None and not walls)
+        self.are_free = wanted <= 0.0 or (limits is None and not walls and not bends)
         """Whether the wanted speed is the only bound."""
         self._limits = limits
         self._walls = walls
+        self._bends = bends
         self._gain = gain
 
     def allow(self, s: float, step: int) -> tuple[float, int]:
@@ -86,6 +92,11 @@ class Bounds:
             limit = self._limits.at(s)
             if limit < speed:
                 speed, cause = limit, LIMIT
+        for begin, end, limit in self._bends:
+            if s < end:
+                limit = math.sqrt(limit**2 + self._gain * max(begin - s, 0.0))
+                if limit < speed:
+                    speed, cause = limit, LIMIT
         if self._walls:
             for number, end in self._walls[step]:
                 allowed = math.sqrt(self._gain * max(end - s, 0.0))
@@ -139,6 +150,7 @@ class Roller:
         self._times: list[float] = times.tolist()
         self._steps: list[float] = np.diff(times).tolist()
         self._braking = settings.comfortable_deceleration
+        self._lateral_acceleration = HASTY * settings.lateral_acceleration
         able = max(max_acceleration, LEAST_ACCELERATION)
         self._driver = IntelligentDriver(
             time_gap=settings.time_gap,
@@ -154,17 +166,13 @@ class Roller:
         options: Sequence[Option],
         limits: SpeedLimits,
         start: tuple[float, float],
-        body: tuple[float, float],
+        body: Body,
         scene: Surroundings,
     ) -> Rollout:
-        """Return the motion of the options.
-
-        start  distance along the line [m] and speed [m/s]
-        body   distances of the front and the center of the vehicle from the reference point [m]
-        """
+        """Return the motion of the options; `start` are the distance along the line [m] and the speed [m/s]."""
         reach = (max(limits.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
         ahead = LimitsAhead.of(limits, start[0], reach)
-        leaders = _Leaders(scene, body)
+        leaders = _Leaders(scene, (body.front, body.center))
         motion_of: dict[object, _Motion] = {}
         stops: dict[object, WallsOverTime] = {}
         motions = []
@@ -172,6 +180,9 @@ class Roller:
             proposal = option.proposal
             number, leading = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
+            # The front axle follows the profile.
+            motions_aside = option.profile.bends(self._lateral_acceleration, limits.wanted)
+            bends = tuple([(begin - body.wheelbase, end - body.wheelbase, top) for begin, end, top in motions_aside])
             passes = ahead is None and not option.profile.overtakes and option.profile.uses_oncoming
             driver = self._brisk_driver if passes else self._driver
             key = (
@@ -181,12 +192,13 @@ class Roller:
                 proposal.is_emergency,
                 number,
                 ends,
+                bends,
                 option.time_gap,
             )
             if key not in motion_of:
                 if ends not in stops:
                     stops[ends] = walls_over_time(option.walls, self._times)
-                bounds = Bounds(proposal.share * limits.wanted, ahead, stops[ends], 2.0 * self._braking)
+                bounds = Bounds(proposal.share * limits.wanted, ahead, stops[ends], 2.0 * self._braking, bends)
                 motion_of[key] = self._motion(proposal, driver, bounds, start, leading, option.time_gap)
             motions.append(motion_of[key])
         s, speed, cause = zip(*motions, strict=True)

@@ -8,21 +8,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.proposals import LateralProfile, Option, Proposal, Wall, speed_limits
+from eidrive_scenario.driving.planning.behavior.proposals import (
+    Body,
+    LateralProfile,
+    Option,
+    Proposal,
+    Wall,
+    speed_limits,
+)
 from eidrive_scenario.driving.planning.behavior.rollout import LimitsAhead, Roller, Rollout, SpeedLimits
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
 SETTINGS = BehaviorSettings()
 TIMES = np.arange(0.0, 60.01, 0.25)
-FRONT, CENTER = 3.8, 1.4
+BODY = Body(1.4, 2.4, 0.9, 2.85)
 ALONG = np.arange(0.0, 1001.0)
 
 
 def leader(gap: float, speed: float) -> Surroundings:
     """Return an object of 5 m length whose rear is `gap` ahead of the front of a vehicle at 0."""
     shape = (1, len(TIMES))
-    s = (FRONT + gap + 2.5 + speed * TIMES)[None]
+    s = (BODY.front + gap + 2.5 + speed * TIMES)[None]
     ones = np.ones(shape)
     still, no = np.zeros(1), np.zeros(1, bool)
     return Surroundings(
@@ -36,7 +43,7 @@ def roll(
     limits = SpeedLimits(ALONG, np.full(len(ALONG), 50.0), wanted)
     leads = np.ones((len(scene), len(TIMES)), dtype=bool)
     option = Option(proposal, LateralProfile("route", (0.0,), (0.0,)), walls or [], leads, SETTINGS.time_gap)
-    return Roller(SETTINGS, TIMES, 4.5).roll([option], limits, (0.0, speed), (FRONT, CENTER), scene)
+    return Roller(SETTINGS, TIMES, 4.5).roll([option], limits, (0.0, speed), BODY, scene)
 
 
 FREE = Proposal(0, 1.0, "all", SETTINGS.hard_deceleration)
@@ -139,5 +146,18 @@ def test_vehicle_accelerates_harder_past_standing_objects_in_the_oncoming_lane(
     roller = Roller(SETTINGS, TIMES, max_acceleration)
     for profile, expected in ((passing, past), (route, usual)):
         option = Option(FREE, profile, [], nobody, SETTINGS.time_gap)
-        rolled = roller.roll([option], limits, (0.0, 0.0), (FRONT, CENTER), leader(900.0, 15.0))
+        rolled = roller.roll([option], limits, (0.0, 0.0), BODY, leader(900.0, 15.0))
         assert rolled.speed[0, 8] == pytest.approx(2.0 * expected, rel=0.02)
+
+
+def test_lateral_motion_limits_the_speed() -> None:
+    """A vehicle that accelerates through a lateral motion for a lower speed keeps to 4 m/s² of lateral acceleration:
+    its front axle follows the motion, and its wanted speed would need 2.5 m · 10/√3 / (9 m)² · (15 m/s)² = 40 m/s²."""
+    passing = LateralProfile("pass", (0.0, 30.0, 39.0, 60.0, 90.0), (0.0, 0.0, 2.5, 2.5, 0.0), side=1, border=0.8)
+    limits = SpeedLimits(ALONG, np.full(len(ALONG), 50.0), 15.0)
+    option = Option(FREE, passing, [], np.zeros((1, len(TIMES)), dtype=bool), SETTINGS.time_gap)
+    rolled = Roller(SETTINGS, TIMES, 4.5).roll([option], limits, (0.0, 0.0), BODY, leader(900.0, 15.0))
+    bend = np.gradient(np.gradient(passing.offset(ALONG[:1000] / 10.0), 0.1), 0.1)
+    sideways = np.interp(rolled.s[0] + BODY.wheelbase, ALONG[:1000] / 10.0, bend) * rolled.speed[0] ** 2
+    assert np.abs(sideways).max() == pytest.approx(2.0 * SETTINGS.lateral_acceleration, rel=0.05)
+    assert rolled.speed[0, -1] == pytest.approx(15.0)
