@@ -204,7 +204,12 @@ class Decider:
         self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
         passes = self._current is not None and self._current.uses_oncoming
         self._oncoming.observe(
-            scene, situation.center, situation.wanted, situation.now, held_up=self._held_up or passes
+            scene,
+            situation.center,
+            situation.wanted,
+            situation.now,
+            held_up=self._held_up or passes,
+            oncoming=situation.lanes_ahead.oncoming,
         )
         if self._held_up:
             if not expects:

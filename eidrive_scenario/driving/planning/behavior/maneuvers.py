@@ -303,8 +303,8 @@ def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bo
     beside = situation.lanes_ahead
     faster, overtaking = beside.faster, beside.overtaking
     if not _is_parked(situation, blocker):
-        profile = None if obstacle is None else _around(situation, obstacle, overtaking)
-        return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
+        ways = [] if obstacle is None else _ways_around(situation, scene, obstacle, overtaking)
+        return [*profiles, *(profile for profile in ways if profile.uses_oncoming)]
     moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
     change = situation.change
@@ -323,8 +323,8 @@ def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bo
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
             may_cross = not solid and obstacle.end < situation.junction - BEFORE_JUNCTION
             sides = (overtaking,) if one_lane else ()
-        around = [_around(situation, obstacle, side) for side in sides]
-        profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]
+        around = [profile for side in sides for profile in _ways_around(situation, scene, obstacle, side)]
+        profiles += [profile for profile in around if may_cross or not profile.uses_oncoming]
     return profiles
 
 
@@ -524,7 +524,12 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool
 
 def _obstacle(situation: Situation, scene: Surroundings, blocker: Present) -> _Obstacle | None:
     """Return the blocker with what stands close behind it; None if it is too fast or not steady enough to pass it."""
-    objects, body = _together(situation, scene, blocker), situation.body
+    return _block(situation, _together(situation, scene, blocker))
+
+
+def _block(situation: Situation, objects: list[Present]) -> _Obstacle | None:
+    """Return objects as an obstacle; None if they are too fast or not steady enough to pass them."""
+    body = situation.body
     wanted = max(situation.wanted, 1.0)
     begin = min([hypothesis.rear for hypothesis in objects]) - (body.front - body.wheelbase) + SWUNG_OUT
     ends = [hypothesis.front for hypothesis in objects]
@@ -543,6 +548,34 @@ def _obstacle(situation: Situation, scene: Surroundings, blocker: Present) -> _O
         begin += slowest * time_to_gain(begin - situation.s, situation.speed - slowest, wanted - slowest, gain)
     end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
     return _Obstacle.between(begin, end, objects, situation)
+
+
+def _ways_around(situation: Situation, scene: Surroundings, obstacle: _Obstacle, side: int) -> list[LateralProfile]:
+    """Return the motions past an obstacle on one side: between it and what stands beside it, and past both."""
+    blocks = [obstacle, _with_neighbors(situation, scene, obstacle, side) if obstacle.fastest < WAITING else None]
+    around = [_around(situation, block, side) for block in blocks if block is not None]
+    return [profile for profile in around if profile is not None]
+
+
+def _with_neighbors(situation: Situation, scene: Surroundings, obstacle: _Obstacle, side: int) -> _Obstacle | None:
+    """Return a standing obstacle with what stands beside it to one side, without space for the vehicle between them;
+    None if nothing does."""
+    objects, needed = list(obstacle.objects), 2.0 * situation.body.half_width + _clearance(situation, obstacle)
+    beside = [
+        hypothesis
+        for hypothesis in scene.present
+        if hypothesis.front > obstacle.begin
+        and hypothesis.rear < obstacle.end
+        and not hypothesis.crosses
+        and abs(hypothesis.speed) < WAITING
+        and not _is_in_way(situation, hypothesis)
+    ]
+    for hypothesis in sorted(beside, key=lambda hypothesis: side * hypothesis.d):
+        outer = max(side * other.d + other.half_width for other in objects)
+        near = side * hypothesis.d - hypothesis.half_width - hypothesis.margin
+        if near < outer + needed and side * hypothesis.d + hypothesis.half_width > outer:
+            objects.append(hypothesis)
+    return _block(situation, objects) if len(objects) > len(obstacle.objects) else None
 
 
 def _around(situation: Situation, obstacle: _Obstacle, side: int) -> LateralProfile | None:

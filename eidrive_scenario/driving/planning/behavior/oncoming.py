@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.prediction import LANE_WIDTH
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
     ONCOMING_SPEED,
@@ -27,7 +28,7 @@ from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
 LANES = 6.0
-"""Offset from the line within which oncoming traffic counts [m]: two lanes."""
+"""Offset from the line within which oncoming traffic counts at least [m]: two lanes."""
 PAUSE = 6.0
 """Time of waiting without oncoming traffic after which traffic out of view is expected to drive as fast as that in view
 did, or as the vehicle wants to, instead of at the speed limit [s]; of the order of the critical gaps of the Highway
@@ -130,14 +131,25 @@ class OncomingTraffic:
         self._free_to, self._free_at = -math.inf, 0.0
         """Place up to which the oncoming lane was free of unseen traffic at a time [m, s]."""
 
-    def observe(self, scene: Surroundings, center: float, wanted: float, now: float, *, held_up: bool) -> None:
+    def observe(
+        self,
+        scene: Surroundings,
+        center: float,
+        wanted: float,
+        now: float,
+        *,
+        held_up: bool,
+        oncoming: float = math.nan,
+    ) -> None:
         """Update by the objects at `now` [s].
 
         center   distance of the center of the vehicle along the line [m]
         wanted   wanted speed of the vehicle [m/s]
         held_up  whether the vehicle would pass something
+        oncoming  center of the lane of the opposite direction [m]; nan without one
         """
-        is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < LANES)
+        reach = np.fmax(LANES, abs(oncoming) + LANE_WIDTH / 2.0)
+        is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < reach)
         is_oncoming &= scene.front[:, 0] > center
         if is_oncoming.any():
             self._last = now

@@ -113,6 +113,13 @@ def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> No
     assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
 
 
+def test_traffic_beside_three_lanes_of_the_own_direction_restarts_the_pause() -> None:
+    """The lane of the opposite direction is the third one beside that of the vehicle, 10.5 m to its left."""
+    waiting = traffic(50.0)
+    waiting.observe(scene((30.0, 10.5, -8.0)), 0.0, 10.0, 4.0, held_up=True, oncoming=10.5)
+    assert waiting.hidden_speed(BESIDE, PAUSE + 1.0) == 15.0
+
+
 @pytest.mark.parametrize(
     ("headways", "longest"),
     # After n headways up to 12 s, 97.5 % of the next ones are shorter than 12 s ((n + 1) 0.025)^(-1/n), the predictive

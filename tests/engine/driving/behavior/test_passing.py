@@ -199,6 +199,33 @@ def test_standing_vehicle_is_passed_over_a_solid_line() -> None:
     assert run.front > 120.0
 
 
+@pytest.mark.parametrize("cars", [0, 4])
+def test_block_of_both_own_lanes_is_passed_in_the_oncoming_lane(cars: int) -> None:
+    """A truck and a van stand side by side. Cars at 12 m/s, one every 60 m, come in the lane of the opposite direction,
+    whose center is two lanes beside that of the vehicle: it passes behind the last one."""
+    # The lanes of the direction of the line are at 1.75 m and 5.25 m below it.
+    width = '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+    side = [f'<lane id="{number}" type="driving">{width}</lane>' for number in (1, -1, -2)]
+    center = '<center><lane id="0" type="none"><roadMark sOffset="0" type="solid"/></lane></center>'
+    lanes = f'<laneSection s="0"><left>{side[0]}</left>{center}<right>{side[1]}{side[2]}</right></laneSection>'
+    roads = RoadNetwork.parse(map_xml(road_xml(length=600.0, lanes=lanes)))
+    right = -5.25
+    block = [KnownBox(140.0, LANE, kind="truck", size=(8.5, 2.5)), KnownBox(143.0, right, size=(6.0, 2.0))]
+    run = PlannedDrive(behavior(roads), roads, y=right)
+
+    def objects(now: float) -> list[KnownBox]:
+        return [*block, *(KnownBox(180.0 + 60.0 * k - 12.0 * now, 1.75, vx=-12.0, yaw=math.pi) for k in range(cars))]
+
+    run.run(60.0, objects)
+    run.world.close()
+    assert run.front > 200.0
+    assert run.path[-1][1] < LANE + 0.1, "back in a lane of its direction"
+    for number, (x, y, _) in enumerate(run.path):
+        if any(abs(car.x - x - CAR.offset[0]) < 4.7 for car in objects(number * 0.05)[2:]):
+            assert y + CAR.size[1] / 2.0 < 1.75 - 0.9, "clear of the oncoming car"
+    assert min(run.least_distance(standing) for standing in block) > 0.25
+
+
 @pytest.mark.parametrize("arrival", [9.0, 11.0, 13.0])
 def test_vehicle_behind_a_junction_is_passed_only_in_a_gap(arrival: float) -> None:
     """A car comes at 8 m/s in the lane of the opposite direction, which the vehicle sees across the junction."""
