@@ -85,6 +85,12 @@ def test_open_route_ends_at_its_last_waypoint(run: Run) -> None:
     assert watched.frames[-1].view.position[0][:2] == pytest.approx((250.0, -2.0), abs=0.1)
 
 
+def test_route_is_joined_between_its_first_waypoints(run: Run) -> None:
+    """From road 1, s 50, past s 20: 200 m out by road 3, without a lap of 338 m back to s 20."""
+    watched = played(run, 10.0, assign("false", (1, 20.0), (3, 800.0)), driven=False)
+    assert watched.frames[-1].view.position[0][:2] == pytest.approx((250.0, -2.0), abs=0.1)
+
+
 @pytest.mark.exhaustive
 @pytest.mark.element("AssignRouteAction")
 @pytest.mark.parametrize("relieved", [False, True], ids=["alone", "switched off for two seconds"])

@@ -45,7 +45,8 @@ def build_route(
 
     The strategy of each waypoint determines the route to it; the random strategy depends on the seed and the name of
     the route. With `again` a closed route returns to its first waypoint. From `start` a route leads to that waypoint,
-    and the closed route is its lap. With `against_traffic` it leads against the driving direction of the lanes.
+    or to the second one if `start` is between both, and the closed route is its lap. With `against_traffic` it leads
+    against the driving direction of the lanes.
     """
     if roads is None:
         message = f"route {route.name!r}: the scenario has no road network"
@@ -84,13 +85,20 @@ def _connect_waypoints(
     *,
     closed: bool,
 ) -> Route:
+    if start is not None and len(waypoints) > 1:
+        behind = connect(waypoints[0], waypoints[1], costs=costs[1:2]).distance(start, waypoints[0])
+        passed = int(behind is not None and behind[0] < -AT_WAYPOINT)
+    else:
+        passed = 0
     if not closed:
         if start is not None:
-            return connect(start, waypoints[-1], waypoints[:-1], costs)
+            return connect(start, waypoints[-1], waypoints[passed:-1], costs[passed:])
         return connect(waypoints[0], waypoints[-1], waypoints[1:-1], costs[1:])
     lap = replace(connect(waypoints[0], waypoints[0], waypoints[1:], [*costs[1:], costs[0]]), closed=True)
     if start is None or (start[:2] == waypoints[0][:2] and abs(start.s - waypoints[0].s) < AT_WAYPOINT):
         return lap
+    if passed:
+        return replace(connect(start, waypoints[0], waypoints[1:], [*costs[1:], costs[0]]), lap=lap)
     return replace(connect(start, waypoints[0], costs=costs[:1]), lap=lap)
 
 
