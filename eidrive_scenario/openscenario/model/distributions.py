@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.model.declarations import File, ParameterAssignment, UnsignedInt
+from eidrive_scenario.openscenario.model.declarations import File, ParameterAssignment, ParameterName, UnsignedInt
 from eidrive_scenario.openscenario.model.element import (
     ALL,
     CHOICE,
@@ -52,7 +52,7 @@ class UserDefinedDistribution(Element):
 class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     """Deterministic values of one parameter."""
 
-    parameter_name: str
+    parameter_name: ParameterName
     distribution_set: DistributionSet | None = None
     distribution_range: DistributionRange | None = None
     user_defined_distribution: UserDefinedDistribution | None = None
@@ -143,7 +143,7 @@ class Histogram(Element):
 class StochasticDistribution(Element, content=CHOICE):
     """Stochastic distribution of one parameter."""
 
-    parameter_name: str
+    parameter_name: ParameterName
     probability_distribution_set: ProbabilityDistributionSet | None = None
     normal_distribution: NormalDistribution | None = None
     log_normal_distribution: LogNormalDistribution | None = child(since="1.3")

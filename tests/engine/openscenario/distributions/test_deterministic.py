@@ -65,6 +65,11 @@ def test_combinations_in_a_file_of_one_line_have_its_order(distribution_file: Wr
     assert [str(run) for run in load_distribution(path)] == ["A=1,B=x", "A=1,B=y", "A=2,B=x", "A=2,B=y"]
 
 
+def test_parameter_name_may_begin_with_a_dollar_sign(distribution_file: Write) -> None:
+    """Files of scenariogeneration declare and vary `$P`, as a parameter was named in version 0.9."""
+    assert texts(distribution_file(deterministic_xml(values_xml("$P", "1", "2")))) == ["1", "2"]
+
+
 def test_values_have_lines(distribution_file: Write) -> None:
     path = distribution_file(deterministic_xml(values_xml("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
     origins = {name: given.origin for name, given in load_distribution(path)[0].assignments.items()}
