@@ -222,11 +222,11 @@ def _lanes_away(road: Road, section: int, direction: int) -> Iterator[LaneKey]:
 def _dead_lanes(road: Road, links: LaneLinks) -> Iterator[tuple[LaneKey, RoadLink | None, MapWarning]]:
     """Yield lanes without a successor, with the link by which their road continues, None within it, and the warning.
 
-    Bidirectional lanes, such as turning lanes in the middle, may end at junctions.
+    Two-way lanes, such as turning lanes in the middle, may end at junctions.
     """
     for section in road.sections:
         for lane in section.lanes.values():
-            if not lane.drivable or lane.id == 0 or lane.type == "bidirectional":
+            if not lane.drivable or lane.id == 0 or lane.is_two_way:
                 continue
             side = road.directions[lane.id]
             inside = 0 <= section.index + side < len(road.sections)
@@ -308,7 +308,12 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
         for n, m in connection.lane_links
         if n in incoming_lanes and m in connecting_lanes and incoming_lanes[n].drivable and connecting_lanes[m].drivable
     ]
-    if driven and all(incoming.directions[n] == -side and connecting.directions[m] == other_side for n, m in driven):
+    if driven and all(
+        incoming.directions[n] == -side
+        and connecting.directions[m] == other_side
+        and not (incoming_lanes[n].is_two_way or connecting_lanes[m].is_two_way)
+        for n, m in driven
+    ):
         message = f"{name} is opposite to the traffic of roads {incoming.id!r} and {connecting.id!r}"
         hint = 'swap them; for left-hand traffic give the roads rule="LHT"'
         yield MapWarning(rule, "connections opposite to the traffic", message, hint, connection.line)

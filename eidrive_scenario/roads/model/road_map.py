@@ -173,6 +173,11 @@ class Lane:
         """True if the lane type is drivable for cars."""
         return self.type in DRIVABLE
 
+    @property
+    def is_two_way(self) -> bool:
+        """True if traffic drives in both directions."""
+        return self.type == "bidirectional" or self.direction == "both"
+
 
 class LaneSection(msgspec.Struct, frozen=True):
     """Section of a road with constant lanes, from s over `length`; lanes by id from left to right."""
