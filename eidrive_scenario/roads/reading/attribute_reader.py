@@ -52,13 +52,15 @@ class AttributeReader:
             self.map_warnings.append(MapWarning(rule, kind, message, hint, line_of(element)))
 
     @overload
-    def number(self, element: etree._Element, name: str) -> float: ...
+    def number(self, element: etree._Element, name: str, *, largest: float = ...) -> float: ...
     @overload
     def number(self, element: etree._Element, name: str, default: float) -> float: ...
     @overload
     def number(self, element: etree._Element, name: str, default: None) -> float | None: ...
-    def number(self, element: etree._Element, name: str, default: float | None = math.nan) -> float | None:
-        """Return a number up to LARGEST.
+    def number(
+        self, element: etree._Element, name: str, default: float | None = math.nan, *, largest: float = LARGEST
+    ) -> float | None:
+        """Return a number of a magnitude of at most `largest`.
 
         A missing attribute without a default or an invalid number is reported and gives 0.
         """
@@ -69,9 +71,9 @@ class AttributeReader:
                 return 0.0
             return default
         value = _number(text)
-        if abs(value) <= LARGEST:
+        if abs(value) <= largest:
             return value
-        hint = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
+        hint = f"give a number of at most {largest:g}" if math.isfinite(value) else "give a finite number"
         self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", hint)
         return 0.0
 
@@ -95,13 +97,14 @@ class AttributeReader:
         """Return the pieces of a function, in the order of their starts.
 
         A piece that the next one replaces within ROUNDING is omitted. RoadRunner writes such pieces with lengths of
-        1e-14 m and coefficients of 1e25.
+        1e-14 m and coefficients of 1e25. Coefficients of a shortest piece reach LARGEST at its end.
         """
         ordered = sorted(((self.number(element, start), element) for element in elements), key=lambda pair: pair[0])
         pieces: list[Piece] = []
         for i, (s, element) in enumerate(ordered):
             if i + 1 == len(ordered) or ordered[i + 1][0] - s > ROUNDING:
-                a, b, c, d = (self.number(element, name) for name in ("a", "b", "c", "d"))
+                limits = ((name, LARGEST / ROUNDING**power) for power, name in enumerate("abcd"))
+                a, b, c, d = (self.number(element, name, largest=limit) for name, limit in limits)
                 pieces.append((s, a, b, c, d))
         return pieces
 

@@ -123,6 +123,17 @@ def test_first_piece_without_extent_is_replaced_from_the_start() -> None:
     assert network.lane_pose_at("1", -1, 0.0).y == pytest.approx(-1.5)
 
 
+def test_short_lane_section_may_have_large_coefficients() -> None:
+    """RoadRunner widens lanes within sections of 2 µm: from 0 to 3 m by 9 u² - 6 u³ with u = ds / 2 µm."""
+    width = '<width sOffset="0" a="{}" b="0" c="{}" d="{}"/>'
+    sections = "".join(
+        section_xml("", f'<lane id="-1" type="driving">{width.format(*coefficients)}</lane>', s=s)
+        for s, coefficients in ((0.0, (3, 0, 0)), (99.999998, (0, 9 / 4e-12, -6 / 8e-18)))
+    )
+    last = RoadNetwork.parse(map_xml(road_xml(lanes=sections))).roads["1"].sections[-1]
+    assert last.lanes[-1].width.value(2e-6) == pytest.approx(3.0)
+
+
 def test_route_over_a_geometry_gap_adds_no_points() -> None:
     far = geometry(0.0, 0.0, 50.0) + geometry(50.0, 9e8, 50.0)
     network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), geometry=far)))
