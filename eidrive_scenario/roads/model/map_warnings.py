@@ -28,7 +28,7 @@ class MapRule(Enum):
     EMPTY_LANE_SECTION = "a lane section with only the center lane"
     LANE_DIRECTION = "a lane whose direction differs from that of its id in another lane section"
     LANE_LAYER = "a temporary layer of lanes, which is not read"
-    ROAD_LINK = "a link to a missing junction, or to a point within a road"
+    ROAD_LINK = "a link to a missing road or junction, or to a point within a road"
     ROAD_SURFACE = "a cross section that is not read, or a superelevation that is too steep"
     ROAD_MARK = "an incomplete road mark"
     SIGNAL_OFF_ROAD = "a signal beyond the ends of its road"

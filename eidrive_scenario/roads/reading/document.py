@@ -242,7 +242,8 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], collector:
     missing = [number for number in (incoming, connecting) if number not in roads]
     for number in missing:
         message = f"<connection> refers to road {number!r}, which does not exist"
-        collector.report_error(element, message, suggestion(number, roads))
+        kind, hint = "connections of missing roads", suggestion(number, roads)
+        collector.report_warning(element, MapRule.JUNCTION_CONNECTION, kind, message, hint)
     links = tuple(
         (collector.integer(link, "from"), collector.integer(link, "to")) for link in element.iterfind("laneLink")
     )
@@ -255,18 +256,15 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], collector:
 def _with_valid_links(
     road: Road, roads: dict[str, Road], junctions: dict[str, Junction], collector: AttributeReader
 ) -> Road:
-    """Return the road without links to junctions that do not exist. SUMO writes such links at dead ends."""
+    """Return the road without links to what does not exist. Parts of maps have such links, and SUMO's dead ends."""
 
     def valid_link(link: RoadLink | None) -> RoadLink | None:
         targets = {} if link is None else roads if link.element_type == "road" else junctions
         if link is None or link.element_id in targets:
             return link
         message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
-        if link.element_type == "road":
-            collector.report_error(link.line, message, suggestion(link.element_id, targets))
-            return link
-        hint = "remove the link or add the junction with its connections"
-        warning = MapWarning(MapRule.ROAD_LINK, "links to missing junctions", message, hint, link.line)
+        hint = f"remove the link or add the {link.element_type}"
+        warning = MapWarning(MapRule.ROAD_LINK, "links to missing roads and junctions", message, hint, link.line)
         collector.map_warnings.append(warning)
         return None
 

@@ -90,7 +90,7 @@ def test_check_road_files_reports_errors_and_map_warnings(eidrive: Eidrive, tmp_
     assert broken.startswith(f"{tmp_path}/broken.xodr:2: not well-formed XML: ")
     assert warned == (
         f"{tmp_path}/doubtful.xodr:2: road '1' links to junction '4', which does not exist; "
-        "remove the link or add the junction with its connections (warning: road-link)"
+        "remove the link or add the junction (warning: road-link)"
     )
     assert wrong == f"{tmp_path}/wrong.xodr:3: <width> has a='wide'; give a finite number"
     assert count == "4 files, 2 errors, 1 warning"

@@ -205,6 +205,8 @@ def test_invalid_connections_are_warnings() -> None:
     assert map_warnings(against) == [("junction-connection", what)]
     two_way = against.replace('type="driving"', 'type="driving" direction="both"')
     assert map_warnings(two_way) == []
+    missing = map_warnings(map_xml(arm, inner, rest=junction("1", "7", fitting)))
+    assert ("junction-connection", "<connection> refers to road '7', which does not exist") in missing
     elsewhere = road_xml("3", y=50.0, lanes=section(0, lane(-1)))
     outside = {message for _, message in map_warnings(map_xml(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
     assert "connection '0' of junction '9' comes from road '3', which does not end at the junction" in outside
