@@ -435,7 +435,8 @@ class Decider:
             waits_at = situation.outside_junctions(waits_at)
             waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene):
-                is_last_place = math.isinf(profile.waits_at)
+                has_place_with_view = situation.steered[0] - NEAR_PLACE < profile.waits_at < math.inf
+                is_last_place = not has_place_with_view
                 is_free = self._oncoming.yields(outlook, viewpoint, is_last_place=is_last_place)
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:

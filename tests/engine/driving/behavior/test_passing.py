@@ -102,6 +102,16 @@ def test_standing_bus_is_passed_with_one_meter_between() -> None:
     assert run.front > 180.0
 
 
+def test_vehicle_that_appears_nearer_than_the_place_with_a_view_passes() -> None:
+    """A car at rest appears 21.2 m behind a truck, which hides the oncoming lane near it; no traffic comes in 45 s."""
+    truck = KnownBox(50.0, kind="truck", size=(10.0, 2.5))
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads, 16.0), roads, speed=0.0)
+    run.run(45.0, lambda now: [truck])
+    run.world.close()
+    assert run.front > 60.0
+
+
 def test_standing_motorbike_is_passed() -> None:
     """The vehicle stops `passing_gap` farther away than the standstill gap of 2 m, and then passes."""
     bike = KnownBox(70.0, kind="motorbike", size=(2.2, 0.8))
