@@ -42,11 +42,13 @@ class TrackHistory:
     is_often_detected  whether the object was detected in n of m successive scans
     number             track number once the track is confirmed
     score              of the last detection
+    parts              number of detections whose box was a part of the object
     """
 
     is_often_detected: bool = False
     number: int | None = None
     hits: int = 0
+    parts: int = 0
     score: float = 0.0
     _recent: list[bool] = field(default_factory=list)
     _names: dict[str, float] = field(default_factory=dict)
@@ -266,6 +268,11 @@ class Tracker(TrackingMethod):
         shape = self._shape[rows]
         confirmed = np.array([self._histories[row].number is not None for row in rows], dtype=bool)
         is_part = confirmed & (boxes[:, 3] < PART * shape[:, 1])
+        for number in np.flatnonzero(is_part).tolist():
+            history = self._histories[rows[number]]
+            history.parts += 1
+            # If most boxes are so short, the first ones were too long: those of distant objects rest on few points.
+            is_part[number] = 2 * history.parts <= history.hits + 1
         differs = is_part | (confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS))
         noise = noise[columns]
         if differs.any():

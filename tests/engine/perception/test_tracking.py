@@ -403,3 +403,18 @@ def test_velocity_of_pedestrian_after_standstill_follows_at_once() -> None:
         speeds[name] = float(held.velocity[0, 1])
     assert speeds["pedestrian"] == pytest.approx(1.5, abs=0.5)
     assert speeds["car"] < 0.2
+
+
+def test_size_of_a_track_follows_when_most_boxes_are_shorter() -> None:
+    """Six distant boxes of a crate have the length of a car, 4.6 m; all later ones have its 1 m. Up to six of them may
+    show a part of a car."""
+    track = tracker()
+    for scan in range(6):
+        track.update(cars(scan * DT, (0, 0)))
+    for scan in range(6, 40):
+        crate = cars(scan * DT, (0, 0))
+        crate.boxes[0, 3:6] = 1.0
+        length = track.update(crate).boxes[0, 3]
+        if scan < 12:
+            assert length == pytest.approx(4.6)
+    assert length == pytest.approx(1.0, abs=0.05)
