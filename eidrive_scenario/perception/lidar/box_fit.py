@@ -13,7 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION
-from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
+from eidrive_scenario.perception.geometry.size_priors import REPORTED, SizePrior, prior_of
 
 HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
 """Tested headings of the first axis [rad]."""
@@ -267,7 +267,7 @@ def fit_box(
     height = blend_size(top, highest - top, prior.mean[2], prior.deviation[2])
     return Fit(
         (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
-        best.name,
+        REPORTED.get(best.name, best.name),
         covariance + _hypothesis_spread(hypotheses, best, center, shapeless),
         best.cost + 2.0 * math.log(prior.share),
     )

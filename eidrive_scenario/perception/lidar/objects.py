@@ -1,9 +1,10 @@
-"""Road users among the points of a scan; poles are excluded."""
+"""Road users among the points of a scan, and other objects on lanes for vehicles; poles beside them are excluded."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
 from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
 from eidrive_scenario.perception.lidar.scan import Scan
-from eidrive_scenario.perception.lidar.segmentation import clusters
+from eidrive_scenario.perception.lidar.segmentation import CLEARANCE, clusters
 
 UNLIKELY = 16.0
 """Sum of squared size deviations above which a cluster is not a road user: with three sizes, one in a thousand exceeds
@@ -30,6 +31,9 @@ COVERED = 0.8
 """Minimum share of the points of such a cluster in the parts that are road users."""
 TOUCHING = 0.2
 """Distance below which boxes are assumed to touch [m]."""
+UNDERSIDE = 2.5
+"""Height of the lowest point of an object that is above the road instead of on it [m]: the least usual headroom of
+bridges and signals is 4.5 m, and gaps between rings are up to 1 m within the range of a usual lidar."""
 NEAR = 1.5
 """Distance of boxes up to which their points may be those of one surface at grazing incidence [m]."""
 
@@ -45,6 +49,7 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
     """Return the objects of a scan with at least `min_points` points.
 
     A cluster that fits no class is split at its gaps. Clusters with overlapping boxes are merged if one box fits both.
+    On a lane for vehicles, what is no road user is an obstacle, of class `misc`.
     """
     candidates = _fit_clusters(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
     separate = [candidate for candidate in candidates if candidate.fit.deviation <= POOR_FIT]
@@ -53,11 +58,37 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
         fitted = _fit_clusters(scan, surroundings, parts, min_points) if len(parts) > 1 else []
         good = [candidate for candidate in fitted if candidate.fit.deviation <= POOR_FIT]
         separate += good or _split_dense(scan, poor) or [poor]
-    return [
-        candidate
-        for candidate in _merge_parts(scan, separate)
-        if candidate.fit.deviation <= UNLIKELY and candidate.fit.name != "pole"
-    ]
+    road_users: list[FittedObject] = []
+    others: list[FittedObject] = []
+    for candidate in _merge_parts(scan, separate):
+        is_road_user = candidate.fit.deviation <= UNLIKELY and candidate.fit.name != "pole"
+        (road_users if is_road_user else others).append(candidate)
+    return road_users + _obstacles(scan, surroundings, others)
+
+
+def _obstacles(scan: Scan, surroundings: MapContext, candidates: list[FittedObject]) -> list[FittedObject]:
+    """Return those of the objects that stand on lanes for vehicles, above the road of the map.
+
+    Below crests and in dips the height of the ground that a scan shows may be wrong, and a part of the road stand out.
+    """
+    if not candidates or not surroundings.has_map:
+        return []
+    centers = scan.frame.to_world(np.array([scan.points[candidate.rows, :2].mean(axis=0) for candidate in candidates]))
+    on_lane = surroundings.on_lane(centers).tolist()
+    headings = surroundings.lane_heading(centers) - scan.frame.yaw
+    # Both heights are those of the map: an error of the own height does not count.
+    roads = surroundings.ground(np.array([*centers, scan.frame.to_world(np.zeros(2))]), scan.foot)
+    rises = roads[:-1] - roads[-1]
+    obstacles = []
+    for candidate, is_on_lane, heading, rise in zip(candidates, on_lane, headings.tolist(), rises, strict=True):
+        height = scan.points[candidate.rows, 2] - scan.foot - rise
+        if not is_on_lane or height.max() <= CLEARANCE or height.min() >= UNDERSIDE:
+            continue
+        fit = scan.fit(candidate.rows, ("misc",), heading if math.isfinite(heading) else None)
+        if fit is not None:
+            # Obstacles have all sizes: theirs says nothing about whether they exist.
+            obstacles.append(FittedObject(candidate.rows, replace(fit, deviation=0.0)))
+    return obstacles
 
 
 def _split_dense(scan: Scan, poor: FittedObject) -> list[FittedObject]:

@@ -39,6 +39,7 @@ class Scan:
         keep: Callable[[Array], NDArray[np.bool_]] | None = None,
     ) -> None:
         self.frame = LevelFrame.of(reading.pose)
+        self.foot = foot
         self.pattern = pattern
         points = self.frame.points(reading)
         ground = ground_height(points, foot)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -39,10 +39,11 @@ class Thing:
     y: float
     yaw: float = 0.0
     kind: str = "car"
+    dimensions: Size | None = None
 
     @property
     def size(self) -> Size:
-        return SIZES[self.kind]
+        return self.dimensions or SIZES[self.kind]
 
     @property
     def box(self) -> np.ndarray:
@@ -51,17 +52,18 @@ class Thing:
     def turned(self, angle: float) -> Thing:
         """Return the object in a scene rotated about the origin."""
         cos, sin = math.cos(angle), math.sin(angle)
-        return Thing(self.name, cos * self.x - sin * self.y, sin * self.x + cos * self.y, self.yaw + angle, self.kind)
+        return replace(self, x=cos * self.x - sin * self.y, y=sin * self.x + cos * self.y, yaw=self.yaw + angle)
 
     def mirrored(self) -> Thing:
         """Return the object in a scene mirrored at the x axis."""
-        return Thing(self.name, self.x, -self.y, -self.yaw, self.kind)
+        return replace(self, y=-self.y, yaw=-self.yaw)
 
 
 def spec_of(thing: Thing) -> ActorSpec:
     height = thing.size[2] / 2
     wheelbase = 0.6 * thing.size[0] if thing.kind in WHEELS else 0.0
-    return ActorSpec(thing.name, thing.kind, thing.kind, thing.size, (0.0, 0.0, height), wheelbase=wheelbase)
+    shape = "box" if thing.kind == "misc" else thing.kind
+    return ActorSpec(thing.name, shape, thing.kind, thing.size, (0.0, 0.0, height), wheelbase=wheelbase)
 
 
 MAST = ActorSpec("Mast", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from opendrive_xml import map_xml, road_xml
+from opendrive_xml import elevation_xml, map_xml, road_xml
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import iou_bev
@@ -226,6 +226,42 @@ def test_detect_with_map_uses_roads_and_lane_directions(street: Any) -> None:
     everywhere = LidarDetector(LidarDetectorSettings(off_road=None))
     everywhere.setup(DetectorContext(street.spec(objects[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
     assert len(everywhere.detect(readings)) == 3
+
+
+@pytest.mark.parametrize("distance", [4.0, 6.0])
+@pytest.mark.parametrize("height", [1.16, 1.27, 1.49])
+def test_detect_children_as_pedestrians(street: Any, distance: float, height: float) -> None:
+    """The heights are medians of the WHO for 6, 8 and 12 years."""
+    child = street.thing("Child", distance, 1.0, 0.0, "pedestrian", (0.34, 0.34, height))
+    found = detect(street.readings([street.thing("Ego", 0, 0), child], {"roof": CLEAN}))
+    assert found.classes == ("pedestrian",)
+    assert math.dist(found.boxes[0, :2], child.box[:2]) < 0.3
+
+
+BARRIER = (3.0, 0.61, 0.81)
+POLE = (0.3, 0.3, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("size", "y", "slope", "count"),
+    [(BARRIER, -0.4, 0.0, 1), (POLE, -2.0, 0.0, 1), (POLE, -3.7, 0.0, 0), (BARRIER, -0.4, 0.25, 0)],
+    ids=["barrier", "pole", "pole beside the road", "part of a rising road"],
+)
+def test_what_stands_on_a_lane_is_detected_though_no_road_user(
+    street: Any, size: tuple[float, float, float], y: float, slope: float, count: int
+) -> None:
+    """The border of the lane is at -3.5 m. On a road that rises by 25 %, what is less than 1 m high after 4 m is the
+    road."""
+    objects = [street.thing("Ego", -20, -1.75), street.thing("X", -16, y, 0.0, "misc", size)]
+    detector = LidarDetector()
+    roads = RoadNetwork.parse(map_xml(road_xml(x=-50.0, profiles=elevation_xml(0.0, slope))))
+    detector.setup(DetectorContext(street.spec(objects[0]), {"roof": CLEAN}, roads))
+    found = detector.detect(street.readings(objects, {"roof": CLEAN}))
+    assert found.classes == ("misc",) * count
+    if count:
+        assert math.dist(found.boxes[0, :2], (-16.0, y)) < 0.5
+    if count and size == BARRIER:
+        assert found.boxes[0, 3:5] == pytest.approx(size[:2], abs=0.3)
 
 
 def test_detect_with_two_lidars_returns_each_object_once(street: Any) -> None:
