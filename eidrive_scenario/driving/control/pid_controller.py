@@ -45,8 +45,11 @@ class PID:
         self._integral = 0.0
         self._last = None
 
-    def update(self, error: float, feed_forward: float = 0.0) -> float:
-        """Return the output for the error of this tick plus a feed-forward part."""
+    def update(self, error: float, feed_forward: float = 0.0, *, learns: bool = True) -> float:
+        """Return the output for the error of this tick plus a feed-forward part.
+
+        learns  whether the integral may accumulate
+        """
         gains = self.gains
         slope = 0.0 if self._last is None else (error - self._last) / self.dt
         self._last = error
@@ -54,7 +57,7 @@ class PID:
         integral = self._integral + error * self.dt
         output = fixed + gains.integral * integral
         free = self.low < output < self.high or (output >= self.high) == (error < 0.0)
-        if free and abs(error) <= self.band:
+        if learns and free and abs(error) <= self.band:
             self._integral = integral
         return min(max(fixed + gains.integral * self._integral, self.low), self.high)
 
@@ -134,7 +137,8 @@ class PidController(VehicleController):
         if abs(back) > LARGEST_APPROACH:
             back = math.copysign(LARGEST_APPROACH, back)
         turn = math.atan2(back, SOFTENING + max(ego.speed, 0.0))
-        self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
+        # A vehicle that stands does not approach its path, whereas the integral would turn its wheels more and more.
+        self._steering = self._direction.update(turn, wrap_angle(heading - ego.yaw), learns=ego.speed >= STANDSTILL)
         return self._steering
 
 

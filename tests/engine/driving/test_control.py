@@ -194,6 +194,14 @@ def test_vehicle_without_brakes_or_drive_has_finite_controls(car: ActorSpec, veh
     assert max(control.throttle, control.brake) == 1.0
 
 
+def test_wheels_of_a_standing_vehicle_keep_their_direction(car: ActorSpec, vehicle: Any) -> None:
+    """Of the lateral law remains the proportional part, -atan(k e / v0), however long the vehicle stands."""
+    ego, controller = vehicle(y=0.02).state(), PidController(car, 0.05)
+    waits = Plan(STRAIGHT, np.zeros(3), "wait")
+    steering = [controller.control(ego, waits).steering for _ in range(1200)]
+    assert steering == pytest.approx([-math.atan(2.0 * 0.02)] * 1200)
+
+
 def test_hold_standstill_applies_full_brake(car: ActorSpec) -> None:
     control = PidController(car, 0.05).hold_standstill()
     assert (control.throttle, control.brake, control.steering) == (0.0, 1.0, 0.0)
