@@ -29,7 +29,10 @@ from eidrive_scenario.driving.planning.behavior.merging import (
 from eidrive_scenario.driving.planning.behavior.oncoming import Motion, OncomingTraffic, Outlook, Verdict
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
+    HASTY,
+    ONCOMING_SPEED,
     ROUTE,
+    WALKING_PACE,
     Body,
     LateralProfile,
     Option,
@@ -37,6 +40,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     Proposal,
     Start,
     Wall,
+    change_length,
     conflicts,
     crossing_walls,
     inside_way,
@@ -191,6 +195,8 @@ class Decider:
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._to_route(situation))
+        if current.uses_oncoming and (given_up := self._given_up(situation, scene, current)) is not None:
+            profiles.append(given_up)
         change = situation.change
         merges = change is not None and current.name == change.name
         self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
@@ -308,6 +314,17 @@ class Decider:
             return LateralProfile(ROUTE, (s,), (0.0,))
         return towards(ROUTE, 0.0, Start(s, start, slope, situation.speed), self._settings.lateral_acceleration)
 
+    def _given_up(self, situation: Situation, scene: Surroundings, current: LateralProfile) -> LateralProfile | None:
+        """Return the motion from a lane of the opposite direction to the route, behind what the vehicle is passing."""
+        s, settings = situation.steered[0], self._settings
+        offset = current.offset_at(s)
+        behind = self._oncoming.place_behind(current, situation.motion, scene, self._emergency)
+        if behind is None or current.side * offset <= current.border:
+            return None
+        begin = max(behind + self._body.wheelbase, s + 0.1)
+        end = begin + change_length(offset, WALKING_PACE, HASTY * settings.lateral_acceleration)
+        return LateralProfile(ROUTE, (s, begin, end), (offset, offset, 0.0), gives_up=True)
+
     def _options(
         self,
         situation: Situation,
@@ -344,15 +361,22 @@ class Decider:
             way = inside_way(scene, profile, self._body.half_width)
             if verdict is not Verdict.WAIT:
                 holds += situation.clear_of_junctions(scene, way)
+            if profile.gives_up:
+                # It falls behind what it is beside, and does not brake for it before.
+                behind = profile.places[1] + self._body.front
+                way &= (scene.speed <= ONCOMING_SPEED) | (scene.rear > behind)
             for hold in holds:
                 way &= scene.rear < hold.s + self._body.front
             crossing = conflicts(scene, way, situation.s)
+            if profile.gives_up:
+                crossing = [conflict for conflict in crossing if conflict.crosses]
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
                 number,
                 crossing,
                 self._settings,
                 emergency=self._emergency,
+                gives_up=profile.gives_up,
                 is_current=number == 0,
                 seeks_gap=seeks_gap,
             ):
@@ -361,6 +385,8 @@ class Decider:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.center, kind)
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
+                if profile.gives_up:
+                    time_gap = 0.0  # It falls behind a vehicle that is faster than it is then.
                 if verdict is Verdict.FOLLOW:
                     time_gap = max(self._settings.time_gap, VIEW_TIME_GAP)
                 options.append(Option(proposal, profile, *reactions[kind], time_gap))

@@ -367,6 +367,27 @@ class OncomingTraffic:
         outside: Bools = profile.side * profile.offset(places + self._body.wheelbase) > profile.border
         return max(float(places[outside.argmax()]) - STOPPING_ERROR, s) if outside.any() else math.inf
 
+    def place_behind(
+        self, profile: LateralProfile, motion: tuple[float, float], scene: Surroundings, deceleration: float
+    ) -> float | None:
+        """Return the place of the reference point at which a vehicle that brakes falls behind what it passes [m]; None
+        if that stands, or if the vehicle does not come beside it.
+
+        motion  distance along the line [m] and speed [m/s]
+        """
+        s, speed = motion
+        passed = self._passed(profile, s, scene).nonzero()[0]
+        if not passed.size:
+            return None
+        nearest = passed[scene.rear[passed, 0].argmin()]
+        gap, other = float(scene.rear[nearest, 0]) - s - self._body.front - BEHIND, float(scene.speed[nearest, 0])
+        closing = speed - other
+        square = closing**2 - 2.0 * deceleration * gap
+        if other <= ONCOMING_SPEED or square <= 0.0 or (gap >= 0.0 and closing <= 0.0):
+            return None
+        duration = min(closing + math.sqrt(square), speed) / deceleration
+        return s + (speed - 0.5 * deceleration * duration) * duration
+
     def _return(self, profile: LateralProfile, motion: Motion, outside: Bools) -> tuple[float, float]:
         """Return time and place of the reference point at which the vehicle is back in its lane; inf if never."""
         if not outside[-1]:

@@ -83,6 +83,10 @@ class LateralProfile(msgspec.Struct, frozen=True):
     border: float = math.inf
     """Distance from the line to `side` beyond which the vehicle is in a lane of the opposite direction [m]."""
 
+    gives_up: bool = False
+    """Whether it leaves a lane of the opposite direction behind what should have been passed: the vehicle may brake for
+    it as in an emergency."""
+
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""
         if len(self.places) == 1:
@@ -388,6 +392,7 @@ def proposals_for(
     *,
     emergency: float,
     is_current: bool,
+    gives_up: bool,
     seeks_gap: bool,
 ) -> list[Proposal]:
     """Return the proposals along one profile.
@@ -397,7 +402,8 @@ def proposals_for(
     """
     hard = settings.hard_deceleration
     kinds: tuple[Precedence, ...] = ("all", "earlier", "none") if any(c.crosses for c in conflicts) else ("all",)
-    made = [Proposal(profile, share, kind, hard) for kind in kinds for share in SPEED_SHARES]
+    most = emergency if gives_up else hard
+    made = [Proposal(profile, share, kind, most) for kind in kinds for share in SPEED_SHARES]
     if seeks_gap:
         made += [Proposal(profile, share, "all", settings.comfortable_deceleration) for share in TOWARDS_GAP]
     if is_current:

@@ -189,6 +189,14 @@ def test_vehicle_past_the_point_of_no_return_goes_on() -> None:
     assert verdict((40.0, 0.0, 0.0), (90.0, 3.5, -10.0), s=-12.0, current=True, begun=True) is Verdict.WAIT
 
 
+def test_vehicle_that_brakes_falls_behind_what_it_passes() -> None:
+    """From 18 m/s with 8 m/s² the vehicle covers 20 m in 2 s, its front then at 23.8 m, and the rear of the other one
+    at 8 m/s at 8.8 + 16 = 24.8 m: 1 m ahead. It never falls behind one that stands, or comes beside one far ahead."""
+    objects = ((11.3, 0.0, 8.0), (11.3, 0.0, 0.0), (40.0, 0.0, 8.0))
+    behind = [traffic(150.0).place_behind(PASSING, (0.0, 18.0), scene(other), 8.0) for other in objects]
+    assert behind == [pytest.approx(20.0), None, None]
+
+
 def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
     motion = Motion(10.0 * TIMES, np.full(len(TIMES), 10.0))
     outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), LanesBeside(), 0.0)

@@ -167,6 +167,32 @@ def test_slow_bicycle_is_overtaken_on_an_empty_road() -> None:
     assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
 
 
+def test_overtaking_is_given_up_behind_the_truck_for_an_oncoming_car() -> None:
+    """The car comes into view 110 m ahead, at 18 m/s, when the front is 3 m behind the truck, which drives 7 m/s. When
+    they meet, the vehicle has left the lane of the car, whose side is 0.85 m beyond the middle of the road."""
+    roads = two_lane_road(700.0)
+    run = PlannedDrive(behavior(roads, 19.4), roads, speed=19.4)
+    cars: list[tuple[float, float]] = []
+    beside = []
+
+    def objects(now: float) -> list[KnownBox]:
+        x, y, _ = run.path[-1] if run.path else (20.0, LANE, 0.0)
+        truck = KnownBox(120.0 + 7.0 * now, vx=7.0, kind="truck", size=(8.5, 2.5))
+        if y > 0.5 and not cars and truck.x - 4.25 - run.front < 3.0:
+            cars.append((now, x + 110.0))
+        if not cars:
+            return [truck]
+        car = KnownBox(cars[0][1] - 18.0 * (now - cars[0][0]), -LANE, vx=-18.0, yaw=math.pi)
+        if run.front > car.x - 2.25 and x - 1.0 < car.x + 2.25:
+            beside.append(y)
+        return [truck, car]
+
+    run.run(24.0, objects)
+    run.world.close()
+    assert beside
+    assert max(beside) < 0.85 - CAR.size[1] / 2.0
+
+
 @pytest.mark.parametrize(
     ("mark", "overtakes"),
     [("solid", False), ("solid solid", False), ("broken solid", False), ("solid broken", True), ("broken", True)],
