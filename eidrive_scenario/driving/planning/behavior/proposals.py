@@ -61,6 +61,14 @@ class Body(NamedTuple):
         return self.half_length - self.center
 
 
+class Bend(NamedTuple):
+    """Lateral motion from `begin` to `end` [m], and the speed that it allows [m/s]."""
+
+    begin: float
+    end: float
+    speed: float
+
+
 class LateralProfile(msgspec.Struct, frozen=True):
     """Offset to the left of the reference line as a function of the distance along it.
 
@@ -82,7 +90,6 @@ class LateralProfile(msgspec.Struct, frozen=True):
     """Place of the front axle at which it may wait at the edge of its lane for a view [m]; inf without one."""
     border: float = math.inf
     """Distance from the line to `side` beyond which the vehicle is in a lane of the opposite direction [m]."""
-
     gives_up: bool = False
     """Whether it leaves a lane of the opposite direction behind what should have been passed: the vehicle may brake for
     it as in an emergency."""
@@ -115,15 +122,14 @@ class LateralProfile(msgspec.Struct, frozen=True):
         """Offset at which the vehicle is at the edge of its lane, from where it sees past what it overtakes [m]."""
         return self.side * (self.border - AT_OFFSET)
 
-    def bends(self, lateral_acceleration: float, wanted: float) -> tuple[tuple[float, float, float], ...]:
-        """Return the places between which a lateral motion allows less than the wanted speed with this peak
-        acceleration [m/s²], and that speed [m/s]."""
+    def bends(self, lateral_acceleration: float, wanted: float) -> list[Bend]:
+        """Return the lateral motions that allow less than the wanted speed [m/s] with this peak acceleration [m/s²]."""
         bends = []
         for begin, end, before, after in zip(self.places, self.places[1:], self.values, self.values[1:], strict=False):
             speed = (end - begin) / max(math.sqrt(PEAK_ACCELERATION * abs(after - before) / lateral_acceleration), 1e-9)
             if speed < wanted:
-                bends.append((begin, end, speed))
-        return tuple(bends)
+                bends.append(Bend(begin, end, speed))
+        return bends
 
     @property
     def last(self) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.proposals import HASTY, Body, Option, Proposal, Wall
+from eidrive_scenario.driving.planning.behavior.proposals import HASTY, Bend, Body, Option, Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -23,8 +23,6 @@ on is that of a leading hypothesis."""
 BEFORE = 1e9
 """Length of the line before its first point, where the first limit holds [m]."""
 
-Bend = tuple[float, float, float]
-"""Begin and end of a lateral motion [m], and the speed that it allows [m/s]."""
 WallsOverTime = list[list[tuple[int, float]]]
 """Causes and places of the walls at each time [m]."""
 
@@ -71,7 +69,7 @@ class Bounds:
     """Speeds that the wanted speed, speed limits, lateral motions and walls allow to one proposal.
 
     wanted  wanted speed [m/s];  gain  twice the deceleration before a wall or a lateral motion [m/s²]
-    bends   begin and end of lateral motions, as distances of the reference point [m], and their speeds [m/s]
+    bends   lateral motions, between places of the reference point
     """
 
     def __init__(
@@ -181,8 +179,10 @@ class Roller:
             number, leading = leaders.of(option.leads)
             ends = tuple([(wall.s, wall.until) for wall in option.walls])
             # The front axle follows the profile.
-            motions_aside = option.profile.bends(self._lateral_acceleration, limits.wanted)
-            bends = tuple([(begin - body.wheelbase, end - body.wheelbase, top) for begin, end, top in motions_aside])
+            bends = tuple(
+                Bend(begin - body.wheelbase, end - body.wheelbase, top)
+                for begin, end, top in option.profile.bends(self._lateral_acceleration, limits.wanted)
+            )
             passes = ahead is None and not option.profile.overtakes and option.profile.uses_oncoming
             driver = self._brisk_driver if passes else self._driver
             key = (
