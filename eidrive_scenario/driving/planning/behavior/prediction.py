@@ -169,6 +169,8 @@ class Predictor:
             turn = float(wrap_angle(direction - heading))
             along_lane, lane_speed = travelled, speed
             if not known_object.has_course:
+                if now >= noise and math.cos(turn) < 0.0:
+                    continue  # It reverses slowly.
                 share, turn = max(math.cos(turn), 0.0), 0.0
                 along_lane, lane_speed = travelled * share, speed * share
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
