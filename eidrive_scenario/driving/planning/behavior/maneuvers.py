@@ -310,7 +310,7 @@ def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bo
     change = situation.change
     last = situation.end if change is None else change.begin
     returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
-    may_change = not math.isnan(faster) and returns
+    may_change = not math.isnan(faster) and returns and not _is_shut(situation, scene, faster, blocker)
     if may_change and has_gap_now(scene, faster, situation.motion, situation.body):
         profiles.append(to_lane(faster, situation.start, situation.settings.lateral_acceleration))
     if obstacle is not None:
@@ -427,6 +427,16 @@ def _behind_neighbor(situation: Situation, scene: Surroundings) -> LateralProfil
     border = _border(situation.line.lanes_beside(end), side, situation.body.half_width)
     back = _length_at(situation, end, abs(d), is_hasty=abs(d) > border)
     return LateralProfile(_name(situation, last, side), (s, end, end + back), (d, d, 0.0), slope, side, border)
+
+
+def _is_shut(situation: Situation, scene: Surroundings, lane: float, blocker: Present) -> bool:
+    """Return whether something stands in the lane at an offset [m], not farther ahead than the blocker."""
+    return any(
+        situation.front < hypothesis.rear < blocker.front
+        and abs(hypothesis.d - lane) < hypothesis.half_width + situation.body.half_width
+        and abs(hypothesis.speed) < WAITING
+        for hypothesis in scene.present
+    )
 
 
 def _name(situation: Situation, passed: Present, side: int) -> str:
