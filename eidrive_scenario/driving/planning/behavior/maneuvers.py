@@ -303,8 +303,8 @@ def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bo
     beside = situation.lanes_ahead
     faster, overtaking = beside.faster, beside.overtaking
     if not _is_parked(situation, blocker):
-        ways = [] if obstacle is None else _ways_around(situation, scene, obstacle, overtaking)
-        return [*profiles, *(profile for profile in ways if profile.uses_oncoming)]
+        profile = None if obstacle is None else _around(situation, scene, obstacle, overtaking)
+        return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
     change = situation.change
@@ -323,8 +323,8 @@ def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bo
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
             may_cross = not solid and obstacle.end < situation.junction - BEFORE_JUNCTION
             sides = (overtaking,) if one_lane else ()
-        around = [profile for side in sides for profile in _ways_around(situation, scene, obstacle, side)]
-        profiles += [profile for profile in around if may_cross or not profile.uses_oncoming]
+        around = [_around(situation, scene, obstacle, side) for side in sides]
+        profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]
     return profiles
 
 
@@ -380,7 +380,7 @@ def _evasions(situation: Situation, scene: Surroundings, head_on: Present) -> li
     evasions = []
     if situation.kind_of(head_on.owner) in VULNERABLE:
         obstacle = _meeting(situation, head_on)
-        around = [_around(situation, obstacle, side) for side in (here.overtaking, -here.overtaking)]
+        around = [_around(situation, scene, obstacle, side) for side in (here.overtaking, -here.overtaking)]
         evasions += [profile for profile in around if profile is not None]
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
@@ -560,17 +560,12 @@ def _block(situation: Situation, objects: list[Present]) -> _Obstacle | None:
     return _Obstacle.between(begin, end, objects, situation)
 
 
-def _ways_around(situation: Situation, scene: Surroundings, obstacle: _Obstacle, side: int) -> list[LateralProfile]:
-    """Return the motions past an obstacle on one side: between it and what stands beside it, and past both."""
-    blocks = [obstacle, _with_neighbors(situation, scene, obstacle, side) if obstacle.fastest < WAITING else None]
-    around = [_around(situation, block, side) for block in blocks if block is not None]
-    return [profile for profile in around if profile is not None]
-
-
-def _with_neighbors(situation: Situation, scene: Surroundings, obstacle: _Obstacle, side: int) -> _Obstacle | None:
-    """Return a standing obstacle with what stands beside it to one side, without space for the vehicle between them;
-    None if nothing does."""
-    objects, needed = list(obstacle.objects), 2.0 * situation.body.half_width + _clearance(situation, obstacle)
+def _with_neighbors(situation: Situation, scene: Surroundings, obstacle: _Obstacle, side: int) -> _Obstacle:
+    """Return an obstacle with what stands beside it to one side without space for the vehicle between them, if it
+    stands itself."""
+    if not all(-ONCOMING_SPEED <= hypothesis.speed < WAITING for hypothesis in obstacle.objects):
+        return obstacle
+    objects, needed = list(obstacle.objects), 2.0 * (situation.body.half_width + LEAST_CLEARANCE)
     beside = [
         hypothesis
         for hypothesis in scene.present
@@ -582,14 +577,15 @@ def _with_neighbors(situation: Situation, scene: Surroundings, obstacle: _Obstac
     ]
     for hypothesis in sorted(beside, key=lambda hypothesis: side * hypothesis.d):
         outer = max(side * other.d + other.half_width for other in objects)
-        near = side * hypothesis.d - hypothesis.half_width - hypothesis.margin
+        near = side * hypothesis.d - hypothesis.half_width
         if near < outer + needed and side * hypothesis.d + hypothesis.half_width > outer:
             objects.append(hypothesis)
-    return _block(situation, objects) if len(objects) > len(obstacle.objects) else None
+    return obstacle if len(objects) == len(obstacle.objects) else _block(situation, objects) or obstacle
 
 
-def _around(situation: Situation, obstacle: _Obstacle, side: int) -> LateralProfile | None:
-    """Return the motion past an obstacle on one side; None if that is too narrow."""
+def _around(situation: Situation, scene: Surroundings, obstacle: _Obstacle, side: int) -> LateralProfile | None:
+    """Return the motion past an obstacle, and what stands beside it, on one side; None if that is too narrow."""
+    obstacle = _with_neighbors(situation, scene, obstacle, side)
     clearance, half_width = _clearance(situation, obstacle), situation.body.half_width
     outer, every = _sides(obstacle, side)
     room = every - outer - 2.0 * half_width
