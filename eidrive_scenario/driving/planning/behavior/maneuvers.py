@@ -220,8 +220,6 @@ LONG = 15.0
 """Time after which a vehicle in the middle of the lane counts as parked [s]; before, the vehicle waits behind it."""
 WAITING = 1.0
 """Speed below which the vehicle waits [m/s]."""
-WRONG_WAY = 2.0
-"""Speed against the direction of the lane from which on a vehicle in it is oncoming [m/s]; slower ones maneuver."""
 ASIDE = 0.8
 """Offset from the route from which on a standing vehicle is parked at the edge of the lane [m]."""
 SETTING_OFF = 5.0
@@ -358,9 +356,11 @@ def _head_on(situation: Situation, scene: Surroundings) -> Present | None:
     center = situation.center
 
     def comes(hypothesis: Present) -> bool:
+        if hypothesis.speed >= -ONCOMING_SPEED:
+            return False
         if situation.kind_of(hypothesis.owner) in VULNERABLE:
-            return hypothesis.speed < -ONCOMING_SPEED and _is_in_way(situation, hypothesis)
-        return hypothesis.speed < -WRONG_WAY and abs(hypothesis.d) - hypothesis.half_width < situation.body.half_width
+            return _is_in_way(situation, hypothesis)
+        return abs(hypothesis.d) - hypothesis.half_width < situation.body.half_width
 
     oncoming = [
         hypothesis
