@@ -190,12 +190,7 @@ def _lane(
         level=collector.flag(element, "level"),
         direction=element.get("direction", "standard"),
         road_marks=tuple(sorted(_read_marks(element, begin, collector), key=lambda mark: mark.s_offset)),
-        heights=tuple(
-            LaneHeight(
-                collector.number(e, "sOffset") + begin, collector.number(e, "inner"), collector.number(e, "outer")
-            )
-            for e in element.iterfind("height")
-        ),
+        heights=tuple(_read_height(e, begin, collector) for e in element.iterfind("height")),
         speeds=tuple(sorted((s, limit) for s, limit in speeds if limit is not None)),
         width_from=width_from,
         line=line_of(element),
@@ -224,6 +219,13 @@ def _read_width(
 
 def _linked(link: etree._Element | None, name: str, collector: AttributeReader) -> tuple[int, ...]:
     return () if link is None else tuple(collector.integer(element, "id") for element in link.iterfind(name))
+
+
+def _read_height(element: etree._Element, begin: float, collector: AttributeReader) -> LaneHeight:
+    # Maps of OpenDRIVE 1.1, such as the samples of VIRES, have other names.
+    names = ("heightInner", "heightOuter") if "heightInner" in element.attrib else ("inner", "outer")
+    inner, outer = (collector.number(element, name) for name in names)
+    return LaneHeight(collector.number(element, "sOffset") + begin, inner, outer)
 
 
 def _read_marks(element: etree._Element, begin: float, collector: AttributeReader) -> Iterable[RoadMark]:

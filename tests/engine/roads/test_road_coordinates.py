@@ -147,12 +147,13 @@ def test_road_pose_with_superelevation_and_slope() -> None:
     assert math.sin(aside.p) == pytest.approx(-math.cos(math.atan(0.05)) * math.sin(0.1))
 
 
-def test_lane_height_raises_sidewalk() -> None:
+@pytest.mark.parametrize(("inner", "outer"), [("inner", "outer"), ("heightInner", "heightOuter")])
+def test_lane_height_raises_sidewalk(inner: str, outer: str) -> None:
     lanes = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
         '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
         '<lane id="-2" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/>'
-        '<height sOffset="0" inner="0.1" outer="0.14"/></lane></right></laneSection>'
+        f'<height sOffset="0" {inner}="0.1" {outer}="0.14"/></lane></right></laneSection>'
     )
     network = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
     assert network.lane_pose_at("1", -1, 10.0).z == 0.0
