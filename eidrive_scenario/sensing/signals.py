@@ -76,8 +76,8 @@ _SIGNS: Mapping[str, Kind] = {
 
 
 def signal_kind(signal: Signal) -> Kind | None:
-    """Return the kind of a signal; None for signals without right-of-way."""
-    if signal.dynamic:
+    """Return the kind of a signal; None for those without right-of-way, and lights for pedestrians and cyclists."""
+    if signal.stops_vehicles:
         return "light"
     number = signal.type.upper()
     return _SIGNS.get(f"R1-{signal.subtype}" if number == "R1" else number)

@@ -45,7 +45,7 @@ class StopLines:
         self._signals: list[str] = []
         lines: list[tuple[int, float, int]] = []
         for signal in lanes.roads.signals.values():
-            if not signal.dynamic:
+            if not signal.stops_vehicles:
                 continue
             for place in (signal.place, *signal.references):
                 lines += [(lane, progress, len(self._signals)) for lane, progress in self._on_lanes(place)]

@@ -310,6 +310,10 @@ class SignalPlace(msgspec.Struct, frozen=True):
     validity: tuple[tuple[int, int], ...] = ()
 
 
+NOT_FOR_VEHICLES = ("1000002", "1000013")
+"""Types of the lights for pedestrians and cyclists in the OpenDRIVE signal catalog."""
+
+
 class Signal(msgspec.Struct, frozen=True):
     """Traffic sign (dynamic False) or light (dynamic True). `references` are further roads for which it is valid."""
 
@@ -328,6 +332,11 @@ class Signal(msgspec.Struct, frozen=True):
     width: float
     height: float
     references: tuple[SignalPlace, ...] = ()
+
+    @property
+    def stops_vehicles(self) -> bool:
+        """True for a traffic light for vehicles."""
+        return self.dynamic and self.type not in NOT_FOR_VEHICLES
 
 
 class SignalController(msgspec.Struct, frozen=True):

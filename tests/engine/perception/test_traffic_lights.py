@@ -37,6 +37,8 @@ def test_stop_lines_apply_to_lanes_of_signal_direction() -> None:
 def test_stop_lines_exclude_other_signs() -> None:
     roads = street(stop_sign("stop", 80.0), SIGNAL.format(
         s=50, t=-4.5, id="limit", dynamic="no", orientation="+", z=2.0, type="274"
+    ), SIGNAL.format(
+        s=60, t=-4.5, id="for pedestrians", dynamic="yes", orientation="+", z=2.0, type="1000002"
     ))  # fmt: skip
     assert [(line.signal, line.kind) for line in stop_lines(roads)] == [("stop", "stop sign")]
 

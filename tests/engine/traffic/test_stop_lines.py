@@ -13,9 +13,11 @@ FRONT = 1.4 + 0.5 * 4.6
 """Distance from the reference point to the front bumper [m]."""
 
 
-def light(s: float = 200.0, orientation: str = "+", validity: str = "", dynamic: str = "yes") -> str:
+def light(
+    s: float = 200.0, orientation: str = "+", validity: str = "", dynamic: str = "yes", kind: int = 1000001
+) -> str:
     return (
-        f'<signals><signal id="7" s="{s}" t="-9" dynamic="{dynamic}" orientation="{orientation}" type="1000001" '
+        f'<signals><signal id="7" s="{s}" t="-9" dynamic="{dynamic}" orientation="{orientation}" type="{kind}" '
         f'zOffset="3" name="light">{validity}</signal></signals>'
     )
 
@@ -83,9 +85,11 @@ def test_light_stops_cars_on_its_valid_lanes_only(orientation: str, validity: st
     assert (place.speed < 0.05) is stops
 
 
-def test_static_signal_does_not_stop_cars() -> None:
+@pytest.mark.parametrize(("dynamic", "kind"), [("no", 1000001), ("yes", 1000002), ("yes", 1000013)])
+def test_static_signal_does_not_stop_cars(dynamic: str, kind: int) -> None:
+    """Types 1000002 and 1000013 of the OpenDRIVE catalog are lights for pedestrians and cyclists."""
     lights = Lights()
-    fleet = approaching(street(right=1, extra=light(dynamic="no")), lights)
+    fleet = approaching(street(right=1, extra=light(dynamic=dynamic, kind=kind)), lights)
     for _ in range(300):
         place = fleet.step(None, 0.05)["me"]
     assert not lights.asked
