@@ -65,6 +65,11 @@ FILLED = 0.8
 """Minimum share of its box that an outline covers to be modeled as that box."""
 CONVEX = 4
 """Maximum number of corners of outlines that are always modeled as boxes."""
+HEADROOM = 4.5
+"""Least height of an object without a type that is a tree if it reaches over a lane [m]: the clearance of roads."""
+GRID = np.array([(ahead, aside) for ahead in (-1.0, 0.0, 1.0) for aside in (-1.0, 0.0, 1.0)])
+CENTER = 4
+"""Points of a box as shares of its half length and half width, and the number of its center."""
 CLEARANCE = 2.1
 """Default height of the lower edge of a signal that the map has on the ground [m]."""
 
@@ -195,14 +200,25 @@ def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObj
     name = road_object.name or f"{kind} {road_object.id}"
     for pose, given_length, given_width in footprint(roads, placed):
         length, width = given_length or usual[0], given_width or usual[1]
-        if kind == "tree":
-            yield RoadObjectBody(name, kind, pose, length, width, height, TRUNK * height)
+        is_crown = road_object.type in _WITHOUT_TYPE and height > HEADROOM and _overhangs(roads, pose, length, width)
+        if kind == "tree" or is_crown:
+            yield RoadObjectBody(name, "tree", pose, length, width, height, TRUNK * height)
         elif kind == "vegetation":
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=False)
         elif kind in ("pole", "lamp", "guide post") or road_object.radius:
             yield RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
         else:
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
+
+
+def _overhangs(roads: RoadNetwork, pose: Pose, length: float, width: float) -> bool:
+    """Return whether a box stands beside the lanes for vehicles and reaches over one, as crowns of trees do."""
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    ahead, aside = 0.5 * length * GRID[:, 0], 0.5 * width * GRID[:, 1]
+    x, y = pose.x + cos * ahead - sin * aside, pose.y + sin * ahead + cos * aside
+    lanes, _, points = roads.overlapped_lanes(x, y, np.full(len(x), pose.z))
+    over = points[roads.tables.lane_drivable[lanes]]
+    return over.size > 0 and not (over == CENTER).any()
 
 
 def _height(placed: PlacedObject) -> float:

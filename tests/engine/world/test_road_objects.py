@@ -73,8 +73,20 @@ def test_paint_buildings_and_flat_objects_have_no_body(attributes: str) -> None:
     assert list(road_object_bodies(network(attributes))) == []
 
 
-def test_object_of_unknown_type_with_height_is_an_obstacle() -> None:
-    assert only('type="none" s="50" t="-8" zOffset="0" length="2" width="1" height="1">').kind == "obstacle"
+@pytest.mark.parametrize(
+    ("t", "size", "height", "kind"),
+    [
+        (-8, 2, 1, "obstacle"),
+        (-7, 8, 12, "tree"),
+        (-7, 8, 4, "obstacle"),
+        (-2, 8, 12, "obstacle"),
+        (-9, 8, 12, "obstacle"),
+    ],
+)
+def test_high_object_of_unknown_type_over_a_lane_is_a_tree(t: float, size: float, height: float, kind: str) -> None:
+    """The lane is 4 m wide and ends at t = -4 m."""
+    text = f'type="none" s="50" t="{t}" zOffset="0" length="{size}" width="{size}" height="{height}">'
+    assert only(text).kind == kind
 
 
 def test_outline_determines_position_and_size() -> None:
