@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.roads import RoadNetwork, Signal
+from eidrive_scenario.roads import LaneKey, RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
@@ -116,13 +116,17 @@ def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -
         return
     for number in roads.signal_lanes(place):
         direction = roads.driving_direction(road.id, number)
-        beyond = None
-        s = place.s
-        if road.junction_id is not None:
-            middle = roads.lane_pose_at(road.id, number, road.length / 2.0)
+        if road.junction_id is None:
+            beyond = None
+            pose = roads.lane_pose_at(road.id, number, place.s)
+        else:
+            section = road.section_at(place.s)
+            middle = roads.lane_pose_at(road.id, number, (section.s + section.end) / 2.0)
             beyond = (middle.x, middle.y)
-            s = 0.0 if direction > 0 else road.length
-        pose = roads.lane_pose_at(road.id, number, s)
+            entry = roads.entry_lane(LaneKey(road.id, section.index, number))
+            if entry is None:
+                continue
+            pose = roads.lane_pose_at(road.id, entry.lane, 0.0 if direction > 0 else road.length)
         heading = pose.h + (0.0 if direction > 0 else math.pi)
         back = 0.0
         if beyond is not None:  # a light may stand before the entry of the junction

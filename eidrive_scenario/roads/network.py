@@ -189,6 +189,17 @@ class RoadNetwork:
         width = self.lane_width(location.road, location.lane, location.s)
         return abs(location.offset) <= 0.5 * width
 
+    def entry_lane(self, lane: LaneKey) -> LaneKey | None:
+        """Return the lane at the start of a road, in driving direction, that leads to a lane of it; if none does, the
+        nearest drivable one in number, or None."""
+        road = self.roads[lane.road]
+        first = road.sections[0 if self.driving_direction(lane.road, lane.lane) > 0 else -1]
+        number = self.links.continued(lane, lane.road, first.index)
+        if number is None:
+            drivable = [other.id for other in first.lanes.values() if other.id and other.drivable]
+            number = min(drivable, key=lambda other: abs(other - lane.lane), default=None)
+        return None if number is None else LaneKey(lane.road, first.index, number)
+
     def signal_lanes(self, place: SignalPlace) -> tuple[int, ...]:
         """Return the drivable lanes for which a signal at this place is valid, from left to right.
 

@@ -62,10 +62,10 @@ class StopLines:
         if road is None:
             return []
         section = road.section_at(place.s).index
-        signal_lanes = [lanes.row_of(LaneKey(road.id, section, number)) for number in lanes.roads.signal_lanes(place)]
+        keys = [LaneKey(road.id, section, number) for number in lanes.roads.signal_lanes(place)]
         if road.junction_id is not None:
-            return [(lane, 0.0) for lane in signal_lanes]
-        return [(lane, float(lanes.progress(np.array(lane), np.array(place.s)))) for lane in signal_lanes]
+            return [(lanes.row_of(entry), 0.0) for key in keys if (entry := lanes.roads.entry_lane(key)) is not None]
+        return [(row, float(lanes.progress(np.array(row), np.array(place.s)))) for row in map(lanes.row_of, keys)]
 
     def closed(self) -> Occupants:
         """Return the stop lines at which traffic has to stop now as occupants."""

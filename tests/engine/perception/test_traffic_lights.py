@@ -8,7 +8,17 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from opendrive_xml import junction_xml, lanes_xml, map_xml, predecessor_xml, road_xml, successor_xml
+from opendrive_xml import (
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    lanes_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 from signal_street import CAR, EAST, ROUND, SIGNAL, WEST, light, stop_sign, street
 
 from eidrive_scenario.perception.traffic_lights import SignalsAhead, stop_lines
@@ -32,6 +42,25 @@ def test_stop_lines_apply_to_lanes_of_signal_direction() -> None:
     assert names(roads, WEST) == [("both", 49.0), ("west", 139.0)]
     assert names(roads, EAST, 130.0) == [("both", 20.0)]
     assert names(roads, EAST + np.array([0.0, 8.0])) == []
+
+
+def test_light_behind_a_change_of_lanes_stops_the_lane_at_the_entry() -> None:
+    """Lane -1 of the connecting road is lane -2 from s = 10 m on, where the light of that lane stands."""
+    sections = section_xml(right=lane_xml(-1, link=lane_links_xml(after=-2)))
+    sections += section_xml(right=lane_xml(-1) + lane_xml(-2, link=lane_links_xml(before=-1)), s=10.0)
+    lamp = light("inside", 15.0).replace("/>", '><validity fromLane="-2" toLane="-2"/></signal>')
+    inner = road_xml(
+        "2",
+        length=20.0,
+        x=50.0,
+        link=predecessor_xml("1"),
+        lanes=sections,
+        extra=f"<signals>{lamp}</signals>",
+        junction="9",
+    )
+    arm = road_xml("1", length=50.0, link=successor_xml(junction="9"))
+    (line,) = stop_lines(RoadNetwork.parse(map_xml(arm, inner, rest=junction_xml("9", "1", {"2": -1}))))
+    assert (line.x, line.y) == (50.0, -1.75)
 
 
 def test_stop_lines_exclude_other_signs() -> None:
