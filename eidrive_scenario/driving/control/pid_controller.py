@@ -80,6 +80,8 @@ LEARNING = 0.1
 """Maximum turn towards the path at which the integral accumulates [rad]; beyond it the approach would be integrated."""
 SOFTENING = 1.0
 """Softening constant of the Stanley law, for calm steering near standstill [m/s]."""
+AT_REST = 0.1
+"""Speed below which a vehicle stands [m/s]; a faster one approaches its path."""
 STANDSTILL = 0.3
 """Speed below which a stopping vehicle holds its brake [m/s]."""
 GRAVITY = 9.81
@@ -138,7 +140,7 @@ class PidController(VehicleController):
             back = math.copysign(LARGEST_APPROACH, back)
         turn = math.atan2(back, SOFTENING + max(ego.speed, 0.0))
         # A vehicle that stands does not approach its path, whereas the integral would turn its wheels more and more.
-        self._steering = self._direction.update(turn, wrap_angle(heading - ego.yaw), learns=ego.speed >= STANDSTILL)
+        self._steering = self._direction.update(turn, wrap_angle(heading - ego.yaw), learns=ego.speed >= AT_REST)
         return self._steering
 
 
