@@ -84,14 +84,11 @@ class MapContext:
 
     def on_lane(self, plan: Array) -> Bools:
         """Return whether points (N, 2) are on a lane for vehicles; False without a map."""
-        if self._roads is None or not len(plan):
-            return np.zeros(len(plan), dtype=bool)
-        located = self._roads.locate(plan[:, 0], plan[:, 1])
-        on = (located.road >= 0) & (located.outside <= 0.0)
-        for point in np.flatnonzero(on).tolist():
-            road, s = located.roads[int(located.road[point])], float(located.s[point])
-            on[point] = int(located.lane[point]) in self._roads.lane_ids(road, s, drivable=True)
-        return np.asarray(on)
+        on = np.zeros(len(plan), dtype=bool)
+        if self._roads is not None and len(plan):
+            lanes, _, points = self._roads.overlapped_lanes(plan[:, 0], plan[:, 1])
+            on[points[self._roads.tables.lane_drivable[lanes]]] = True
+        return on
 
     def facing(self, boxes: Array) -> Array:
         """Return headings (N,) of boxes (N, 7) [rad], reversed if their lane clearly has the opposite direction."""

@@ -233,9 +233,9 @@ def test_detect_with_map_uses_roads_and_lane_directions(street: Any) -> None:
 def test_detect_children_as_pedestrians(street: Any, distance: float, height: float) -> None:
     """The heights are medians of the WHO for 6, 8 and 12 years."""
     child = street.thing("Child", distance, 1.0, 0.0, "pedestrian", (0.34, 0.34, height))
-    found = detect(street.readings([street.thing("Ego", 0, 0), child], {"roof": CLEAN}))
-    assert found.classes == ("pedestrian",)
-    assert math.dist(found.boxes[0, :2], child.box[:2]) < 0.3
+    detections = detect(street.readings([street.thing("Ego", 0, 0), child], {"roof": CLEAN}))
+    assert detections.classes == ("pedestrian",)
+    assert math.dist(detections.boxes[0, :2], child.box[:2]) < 0.3
 
 
 BARRIER = (3.0, 0.61, 0.81)
@@ -256,12 +256,12 @@ def test_what_stands_on_a_lane_is_detected_though_no_road_user(
     detector = LidarDetector()
     roads = RoadNetwork.parse(map_xml(road_xml(x=-50.0, profiles=elevation_xml(0.0, slope))))
     detector.setup(DetectorContext(street.spec(objects[0]), {"roof": CLEAN}, roads))
-    found = detector.detect(street.readings(objects, {"roof": CLEAN}))
-    assert found.classes == ("misc",) * count
+    detections = detector.detect(street.readings(objects, {"roof": CLEAN}))
+    assert detections.classes == ("misc",) * count
     if count:
-        assert math.dist(found.boxes[0, :2], (-16.0, y)) < 0.5
+        assert math.dist(detections.boxes[0, :2], (-16.0, y)) < 0.5
     if count and size == BARRIER:
-        assert found.boxes[0, 3:5] == pytest.approx(size[:2], abs=0.3)
+        assert detections.boxes[0, 3:5] == pytest.approx(size[:2], abs=0.3)
 
 
 def test_detect_with_two_lidars_returns_each_object_once(street: Any) -> None:

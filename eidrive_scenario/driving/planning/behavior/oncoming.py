@@ -146,7 +146,7 @@ class OncomingTraffic:
         center   distance of the center of the vehicle along the line [m]
         wanted   wanted speed of the vehicle [m/s]
         held_up  whether the vehicle would pass something
-        oncoming  center of the lane of the opposite direction [m]; nan without one
+        oncoming center of the lane of the opposite direction [m]; nan without one
         """
         reach = np.fmax(LANES, abs(oncoming) + LANE_WIDTH / 2.0)
         is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < reach)

@@ -95,8 +95,8 @@ def test_vehicle_across_its_lane_is_not_led_along_it() -> None:
 @pytest.mark.parametrize("speed", [-0.9, -0.5])
 def test_vehicle_that_reverses_slowly_moves_back(speed: float) -> None:
     roads = RoadNetwork.parse(map_xml(road_xml(length=250.0)))
-    found = Predictor(roads, TIMES).predict(known(KnownBox(100.0, -1.75, speed)))
-    np.testing.assert_allclose(found.x[0], 100.0 + speed * TIMES)
+    prediction = Predictor(roads, TIMES).predict(known(KnownBox(100.0, -1.75, speed)))
+    np.testing.assert_allclose(prediction.x[0], 100.0 + speed * TIMES)
 
 
 def test_vehicle_that_changes_lanes_ends_on_the_next_one() -> None:
