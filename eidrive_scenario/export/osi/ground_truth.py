@@ -43,11 +43,11 @@ def set_environment(
     fixed  weather that overrides that of the scenario
     """
     if fixed is not None:
-        _set_weather(osi, conditions, fixed)
+        _set_weather(osi.environment, conditions, fixed)
     if environment is None:
         return
     if fixed is None:
-        _set_environment_weather(osi, conditions, environment, time)
+        _set_weather(osi.environment, conditions, weather_from_environment(environment, time), environment)
     if environment.temperature is not None:
         conditions.temperature = environment.temperature
     if environment.pressure is not None:
@@ -59,69 +59,36 @@ def set_environment(
             conditions.unix_timestamp = int(clock.timestamp())
 
 
-def _set_weather(osi: Osi, conditions: Any, weather: Weather) -> None:
-    conditions.precipitation = _precipitation(osi, weather)
-    conditions.fog = _fog(osi, weather.visual_range)
-    conditions.ambient_illumination = _illumination(osi, weather)
-    conditions.clouds.fractional_cloud_cover = _clouds(osi, weather.cloud_cover)
-    _set_wind(conditions, weather.wind_direction, weather.wind_speed)
-    _set_sun(conditions, weather)
+def _set_weather(kinds: Any, conditions: Any, weather: Weather, given: Environment | None = None) -> None:
+    """Set the values of the weather; of an environment, only those that it contains.
 
-
-def _set_environment_weather(osi: Osi, conditions: Any, environment: Environment, time: float) -> None:
-    """Set the values of the weather that the environment contains."""
-    weather = weather_from_environment(environment, time)
-    given = environment.precipitation_intensity, environment.precipitation_share
-    if environment.precipitation == "dry" or given != (None, None):
-        conditions.precipitation = _precipitation(osi, weather)
-    if environment.fog_range is not None:
-        conditions.fog = _fog(osi, environment.fog_range)
-    if environment.clouds not in (None, _NO_SKY):
-        conditions.clouds.fractional_cloud_cover = _clouds(osi, weather.cloud_cover, environment.clouds == _OBSCURED)
-    if environment.wind_speed is not None:
-        _set_wind(conditions, weather.wind_direction, environment.wind_speed)
-    if (environment.sun_elevation, environment.date_time) != (None, None):
-        conditions.ambient_illumination = _illumination(osi, weather)
-        _set_sun(conditions, weather)
-
-
-def _precipitation(osi: Osi, weather: Weather) -> int:
-    name = _RAINS[bisect_right(_RAIN, weather.precipitation_intensity)]
-    return int(osi.environment.Precipitation.Value(f"PRECIPITATION_{name}"))
-
-
-def _fog(osi: Osi, visual_range: float) -> int:
-    return int(osi.environment.Fog.Value(f"FOG_{_FOGS[bisect_right(_RANGE, visual_range)]}"))
-
-
-def _illumination(osi: Osi, weather: Weather) -> int:
-    """Return the class of the light on level ground in camera images, by sun, sky and street lamps."""
-    lamps = weather.street_lighting if weather.lamps_on else 0.0
-    level = bisect_right(_LIGHT, float(daylight(weather).ground @ LUMA) + lamps) + 1
-    return int(osi.environment.AmbientIllumination.Value(f"AMBIENT_ILLUMINATION_LEVEL{level}"))
-
-
-def _clouds(osi: Osi, cover: float, obscured: bool = False) -> int:
-    """Return the class of a share of the sky in eighths; only a sky without a cloud and a full one are 0 and 8."""
-    eighths = min(max(round(8.0 * cover), 1), 7) if 0.0 < cover < 1.0 else round(8.0 * cover)
-    name = "SKY_OBSCURED" if obscured else f"{_EIGHTHS[eighths]}_OKTAS"
-    return int(osi.environment.CloudLayer.FractionalCloudCover.Value(f"FRACTIONAL_CLOUD_COVER_{name}"))
-
-
-def _set_wind(conditions: Any, direction: float, speed: float) -> None:
-    """Set the direction of origin [rad], counterclockwise from north, of a wind to `direction` [degrees] from x over y.
-
-    North is y.
+    Directions are counterclockwise from north (y) [rad]. OSI has the origin of the wind, and the illuminance of the sun
+    without clouds [lx].
     """
-    conditions.wind.origin_direction = math.radians((direction + 90.0) % 360.0)
-    conditions.wind.speed = speed
-
-
-def _set_sun(conditions: Any, weather: Weather) -> None:
-    """Set azimuth, counterclockwise from north, elevation [rad] and illuminance without clouds [lx] of the sun."""
-    conditions.sun.azimuth = math.radians(-weather.sun_azimuth % 360.0)
-    conditions.sun.elevation = math.radians(weather.sun_elevation)
-    conditions.sun.intensity = float(daylight(weather.model_copy(update={"cloud_cover": 0.0})).sun @ LUMA)
+    amounts = () if given is None else (given.precipitation_intensity, given.precipitation_share)
+    if given is None or given.precipitation == "dry" or amounts != (None, None):
+        name = _RAINS[bisect_right(_RAIN, weather.precipitation_intensity)]
+        conditions.precipitation = kinds.Precipitation.Value(f"PRECIPITATION_{name}")
+    if given is None or given.fog_range is not None:
+        conditions.fog = kinds.Fog.Value(f"FOG_{_FOGS[bisect_right(_RANGE, weather.visual_range)]}")
+    if given is None or given.clouds not in (None, _NO_SKY):
+        is_obscured = given is not None and given.clouds == _OBSCURED
+        # Only a sky without a cloud and a full one are 0 and 8 eighths
+        eighths, cover = round(8.0 * weather.cloud_cover), weather.cloud_cover
+        name = _EIGHTHS[min(max(eighths, 1), 7) if 0.0 < cover < 1.0 else eighths]
+        value = f"FRACTIONAL_CLOUD_COVER_{'SKY_OBSCURED' if is_obscured else f'{name}_OKTAS'}"
+        conditions.clouds.fractional_cloud_cover = kinds.CloudLayer.FractionalCloudCover.Value(value)
+    if given is None or given.wind_speed is not None:
+        conditions.wind.origin_direction = math.radians((weather.wind_direction + 90.0) % 360.0)
+        conditions.wind.speed = weather.wind_speed if given is None else given.wind_speed
+    if given is None or (given.sun_elevation, given.date_time) != (None, None):
+        # The light on level ground in camera images
+        lamps = weather.street_lighting if weather.lamps_on else 0.0
+        level = bisect_right(_LIGHT, float(daylight(weather).ground @ LUMA) + lamps) + 1
+        conditions.ambient_illumination = kinds.AmbientIllumination.Value(f"AMBIENT_ILLUMINATION_LEVEL{level}")
+        conditions.sun.azimuth = math.radians(-weather.sun_azimuth % 360.0)
+        conditions.sun.elevation = math.radians(weather.sun_elevation)
+        conditions.sun.intensity = float(daylight(weather.model_copy(update={"cloud_cover": 0.0})).sun @ LUMA)
 
 
 _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
