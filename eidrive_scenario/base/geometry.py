@@ -63,6 +63,13 @@ def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[float
     )
 
 
+def rigid_transform(turn: Array, position: Array | Sequence[float]) -> Array:
+    """Return the pose (4, 4) of a rotation matrix (3, 3) and a position (3,)."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, position
+    return pose
+
+
 def equidistant(start: float, end: float, spacing: float) -> list[float]:
     """Return numbers from start to end with equal steps of at most `spacing`."""
     numbers: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()

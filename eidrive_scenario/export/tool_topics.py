@@ -7,19 +7,21 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.export.foxglove.writer import FoxgloveTopics, check_foxglove
-from eidrive_scenario.export.mcap_topics import ToolTopics
-from eidrive_scenario.export.osi.trace import OsiTopics, check_osi
+from eidrive_scenario.export.foxglove.schemas import Foxglove
+from eidrive_scenario.export.foxglove.writer import FoxgloveTopics
+from eidrive_scenario.export.mcap_topics import ToolTopics, protobuf_registration
+from eidrive_scenario.export.osi.schemas import Osi
+from eidrive_scenario.export.osi.trace import OsiTopics
 from eidrive_scenario.export.recorded_run import RecordedRun, open_run
 from eidrive_scenario.files.atomic import atomic_output
 from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.recording.recorder import Recorder
 
-_TOPICS: Mapping[str, tuple[Callable[[], None], type[ToolTopics]]] = {
-    "foxglove": (check_foxglove, FoxgloveTopics),
-    "osi": (check_osi, OsiTopics),
+_TOPICS: Mapping[str, tuple[Callable[[], object], type[ToolTopics]]] = {
+    "foxglove": (Foxglove, FoxgloveTopics),
+    "osi": (Osi, OsiTopics),
 }
-"""Check for the libraries, and topics of a file, by name."""
+"""Message classes, which import the libraries, and topics of a file, by name."""
 ALL_TOPICS = tuple(_TOPICS)
 """Names of the topics for other tools."""
 
@@ -33,6 +35,7 @@ def check_topics(names: Iterable[str]) -> tuple[str, ...]:
         if name not in _TOPICS:
             raise SettingError(Diagnostic(f"there are no topics {name!r}", f"give {' or '.join(_TOPICS)}"))
         _TOPICS[name][0]()
+        protobuf_registration()
     return topics
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.base.geometry import box_corners, rotation_matrix
+from eidrive_scenario.base.geometry import box_corners, rigid_transform, rotation_matrix
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.files.bounded import is_regular_file
@@ -114,9 +114,8 @@ def _describe(reading: CameraReading, frame: Frame, station: str, path: Path) ->
     """Write the description of a camera."""
     view = frame.view
     row = view.row(station)
-    body = np.eye(4)
-    body[:3, :3] = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
-    body[:3, 3] = view.position[row]
+    turn = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+    body = rigid_transform(turn, view.position[row])
     height, width = reading.rgb.shape[:2]
     text = json.dumps(
         {

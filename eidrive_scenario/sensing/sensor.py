@@ -12,7 +12,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import ViewSector
-from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.extensions.settings import settings_type_of, validate_by_kind
 from eidrive_scenario.sensing.settings import CameraSettings, Mount, SensorSettings
@@ -67,10 +67,8 @@ class Mounting(msgspec.Struct, frozen=True):
         return _optical(self._pose(np.array([x, y, z]), rotation_matrix(yaw)))
 
     def _pose(self, position: Array, body: Array) -> Array:
-        pose = np.eye(4)
-        pose[:3, :3] = body @ rotation_matrix(self.yaw, self.pitch)
-        pose[:3, 3] = position + body @ (self.x, self.y, self.z)
-        return pose
+        position = position + body @ (self.x, self.y, self.z)
+        return rigid_transform(body @ rotation_matrix(self.yaw, self.pitch), position)
 
 
 def _optical(pose: Array) -> Array:

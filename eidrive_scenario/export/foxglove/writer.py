@@ -37,7 +37,7 @@ from eidrive_scenario.export.foxglove.schemas import (
     stamp,
     vector,
 )
-from eidrive_scenario.export.mcap_topics import ToolTopics, protobuf_registration, write_topics
+from eidrive_scenario.export.mcap_topics import ToolTopics, write_topics
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder
@@ -60,12 +60,6 @@ def write_foxglove(run: RecordedRun, path: Path) -> None:
     """
     metadata = run.recording.metadata
     write_topics(run, path, FoxgloveTopics, {name: metadata[name] for name in _METADATA if name in metadata})
-
-
-def check_foxglove() -> None:
-    """Raise SettingError if a library is missing."""
-    Foxglove()
-    protobuf_registration()
 
 
 class FoxgloveTopics(ToolTopics):

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
 from eidrive_scenario.export.geometry import angles
 
 MIRROR: Array = np.diag([1.0, -1.0, 1.0, 1.0])
@@ -29,7 +29,5 @@ def opv2v_pose(matrix: Array) -> list[float]:
 def pose_matrix(pose: Sequence[float]) -> Array:
     """Return the right-handed pose (4, 4) of a pose of OPV2V."""
     x, y, z, roll, yaw, pitch = pose
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation_matrix(-math.radians(yaw), -math.radians(pitch), math.radians(roll))
-    matrix[:3, 3] = x, -y, z
-    return matrix
+    turn = rotation_matrix(-math.radians(yaw), -math.radians(pitch), math.radians(roll))
+    return rigid_transform(turn, (x, -y, z))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
 from eidrive_scenario.driving.agent_factory import station_sensors
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
@@ -211,15 +211,12 @@ class Opv2vWriter:
         if removed:
             self.warnings.append(f"{len(removed)} frames are omitted, in which a station is absent")
         for name in self._written:
-            for path in self._files(name, removed):
+            folder = self.folder / str(self.stations[name])
+            for path in [path for number in removed for path in folder.glob(f"{number:06d}[._]*")]:
                 path.unlink()
         self.stations = {name: number for name, number in self.stations.items() if name in self._written}
         self.frames = sorted(common)
         self.warnings += self._limits.warnings()
-
-    def _files(self, name: str, numbers: set[int]) -> Iterator[Path]:
-        for number in sorted(numbers):
-            yield from (self.folder / str(self.stations[name])).glob(f"{number:06d}[._]*")
 
     def close(self) -> None:
         """Do nothing: each file is complete once it is written."""
@@ -235,10 +232,8 @@ def _center_pose(view: WorldView, row: int, estimate: EgoState | None = None) ->
         position, angles = view.position[row], (view.yaw[row], view.pitch[row], view.roll[row])
     else:
         position, angles = estimate.position, (estimate.yaw, estimate.pitch, estimate.roll)
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_matrix(*angles)
-    pose[:3, 3] = position + pose[:3, :3] @ view.offset[row]
-    return pose
+    turn = rotation_matrix(*angles)
+    return rigid_transform(turn, position + turn @ view.offset[row])
 
 
 def _base_pose(view: WorldView, row: int, estimate: EgoState | None = None) -> Array:

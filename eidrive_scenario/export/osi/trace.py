@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.export.mcap_topics import ToolTopics, protobuf_registration, write_topics
+from eidrive_scenario.export.mcap_topics import ToolTopics, write_topics
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
@@ -52,12 +52,6 @@ def write_osi(run: RecordedRun, path: Path) -> None:
         for frame in run.frames():
             for data in run.converted(frame, lambda frame: [builder.build(frame).SerializeToString()]):
                 stream.write(struct.pack("<I", len(data)) + data)
-
-
-def check_osi() -> None:
-    """Raise SettingError if a library is missing."""
-    Osi()
-    protobuf_registration()
 
 
 class OsiTopics(ToolTopics):

@@ -16,7 +16,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.assignment import associate
-from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.export.traffic_recording.scene import (
     LIDAR_HEIGHT,
@@ -97,12 +97,10 @@ class _JsonFile:
 
     def pose(self, owner: Any, path: str = "") -> Array:
         """Return the pose (4, 4) of a rotation and a translation."""
-        pose = np.eye(4)
-        pose[:3, :3] = self.array(owner, "rotation", (3, 3), path)
-        pose[:3, 3] = self.array(owner, "translation", (3,), path)
-        if np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max() > 1e-2:
+        turn, position = self.array(owner, "rotation", (3, 3), path), self.array(owner, "translation", (3,), path)
+        if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-2:
             self.fail(f"{path}rotation is no rotation matrix")
-        return pose
+        return rigid_transform(turn, position)
 
 
 @dataclass(frozen=True)
@@ -291,9 +289,7 @@ def _label(file: _JsonFile, at: str, category: str, identity: str, corners: Arra
     height = float(abs(corners[4:, 2].mean() - corners[:4, 2].mean()))
     if min(length, width, height) < 1e-3:
         file.fail(f"{at}world_8_points are no corners of a box")
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_matrix(math.atan2(ahead[1], ahead[0]))
-    pose[:3, 3] = corners.mean(axis=0)
+    pose = rigid_transform(rotation_matrix(math.atan2(ahead[1], ahead[0])), corners.mean(axis=0))
     return _Label(category, identity, (length, width, height), pose)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from lxml import etree
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import rotation_matrix
+from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
 from eidrive_scenario.export.geometry import angles
 from eidrive_scenario.export.traffic_recording.scene import LidarStation, Track, TrafficScene
 from eidrive_scenario.extensions.library import CATALOGS, LIBRARY_FOLDER, SCENARIO_SUFFIX, library_path
@@ -28,18 +28,11 @@ MAST_BASE = 0.5
 SAME_SIZE = 0.01
 """Difference of sizes up to which a body is that of a catalog [m]. Only then it may be an emergency vehicle."""
 _CATEGORY = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}
-
-
-@dataclass(frozen=True)
-class Body:
-    """Vehicle or Pedestrian element with a recorded box, and the center of the box relative to the reference point."""
-
-    element: etree._Element
-    center: tuple[float, float, float]
+Size = tuple[float, float, float]
 
 
 @cache
-def _entries() -> tuple[tuple[etree._Element, tuple[float, float, float]], ...]:
+def _entries() -> tuple[tuple[etree._Element, Size], ...]:
     """Return the vehicles and pedestrians of the library with their sizes [m]."""
     bodies = []
     for name in ("vehicles", "pedestrians"):
@@ -52,13 +45,14 @@ def _entries() -> tuple[tuple[etree._Element, tuple[float, float, float]], ...]:
     return tuple(bodies)
 
 
-def body_of(category: str, size: tuple[float, float, float]) -> Body:
-    """Return the body of a road user of a category ("" for any) with this length, width and height [m].
+def body_of(category: str, size: Size) -> tuple[etree._Element, Size]:
+    """Return the Vehicle or Pedestrian element of a category ("" for any) with this length, width and height [m].
 
-    Axles and center of the nearest entry are scaled with the length.
+    Axles and center of the nearest entry are scaled with the length. Return the center of the box relative to the
+    reference point as well [m].
     """
 
-    def difference(entry: tuple[etree._Element, tuple[float, float, float]]) -> float:
+    def difference(entry: tuple[etree._Element, Size]) -> float:
         return sum(abs(own - given) for own, given in zip(entry[1], size, strict=True))
 
     candidates = [entry for entry in _entries() if category in ("", entry[0].get(_CATEGORY[str(entry[0].tag)]))]
@@ -72,22 +66,24 @@ def body_of(category: str, size: tuple[float, float, float]) -> Body:
     center, dimensions = element.find("BoundingBox/Center"), element.find("BoundingBox/Dimensions")
     assert center is not None
     assert dimensions is not None
-    ahead = float(center.get("x", "0")) * scale
-    for key, value in zip(("x", "y", "z"), (ahead, 0.0, size[2] / 2.0), strict=True):
+    middle = float(center.get("x", "0")) * scale, 0.0, size[2] / 2.0
+    for key, value in zip(("x", "y", "z"), middle, strict=True):
         center.set(key, repr(value))
     for key, value in zip(("length", "width", "height"), size, strict=True):
         dimensions.set(key, repr(value))
     for axle in element.iter("FrontAxle", "RearAxle"):
         axle.set("positionX", repr(float(axle.get("positionX", "0")) * scale))
-    return Body(element, (ahead, 0.0, size[2] / 2.0))
+    return element, middle
 
 
 @dataclass(frozen=True)
 class _Actor:
-    """Entity of the scenario: its body, and the poses (N, 4, 4) of its reference point."""
+    """Entity of the scenario: its element, the center of its box relative to its reference point, and the poses
+    (N, 4, 4) of that point."""
 
     name: str
-    body: Body
+    element: etree._Element
+    center: Size
     times: Array
     poses: Array
 
@@ -127,11 +123,11 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
     for track in scene.tracks:
         actor = _actor(track)
         entity = _add(entities, "ScenarioObject", name=actor.name)
-        entity.append(actor.body.element)
+        entity.append(actor.element)
         station = stations.get(track.name)
         if station is not None:
             yaw, pitch, _ = angles(station.lidar[:3, :3])
-            _add_stack(entity, track.name, _mount(station.lidar[:3, 3] + actor.body.center, yaw, pitch), lidar)
+            _add_stack(entity, track.name, _mount(station.lidar[:3, 3] + actor.center, yaw, pitch), lidar)
         _add_motion(start, act, actor, scene.end, is_station=station is not None)
     for unit in scene.roadside:
         _add_mast(entities, start, unit, lidar)
@@ -149,10 +145,10 @@ def _add(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
 
 
 def _actor(track: Track) -> _Actor:
-    body = body_of(track.category, track.size)
+    element, center = body_of(track.category, track.size)
     poses = track.poses.copy()
-    poses[:, :3, 3] -= track.poses[:, :3, :3] @ np.array(body.center)
-    return _Actor(track.name, body, track.times, poses)
+    poses[:, :3, 3] -= track.poses[:, :3, :3] @ np.array(center)
+    return _Actor(track.name, element, center, track.times, poses)
 
 
 def _mount(position: Sequence[float] | Array, yaw: float, pitch: float) -> dict[str, float]:
@@ -250,10 +246,7 @@ def _add_mast(entities: etree._Element, start: etree._Element, unit: LidarStatio
     assignments = _add(reference, "ParameterAssignments")
     _add(assignments, "ParameterAssignment", parameterRef="Height", value=repr(mast))
     _add_stack(entity, unit.name, _mount((0.0, 0.0, height), 0.0, pitch), lidar)
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_matrix(yaw)
-    pose[:2, 3] = x, y
-    _add_teleport(_add(start, "Private", entityRef=unit.name), pose)
+    _add_teleport(_add(start, "Private", entityRef=unit.name), rigid_transform(rotation_matrix(yaw), (x, y, 0.0)))
 
 
 def _trigger(tag: str, name: str, time: float) -> etree._Element:
